@@ -1,0 +1,197 @@
+/* gtc.h - bias of a gyro from its temperature: the whole public interface of the gyrotc runtime.
+ *
+ * The generator (`gyrotc emit`) writes one constant table for each axis of each gyro serial. The
+ * functions below read it and keep their state in a struct of the caller: no heap, no libm, no
+ * I/O, no writable static data. A state has one writer; any number of tasks or interrupts may
+ * read one table. Every function exists for each arithmetic <n>:
+ *
+ *   f32  float32: temperatures in C, slopes in C per block, biases in deg/h
+ *   q31  fixed point: temperatures in 2^-16 C, slopes in 2^-16 C per block,
+ *        biases in 2^-bias_frac_bits deg/h (a member of the table)
+ *
+ * Use, once for every temperature sample, in this order:
+ *
+ *   status = gtc_f32_sample(&state, &temp_c);    // then
+ *   status = gtc_f32_bias(&state, &bias_dph);    // compensated = measured - bias
+ *
+ * A block is `samples_per_block` samples. The correction in force during block n is what the
+ * blocks up to n-1 gave: T, the mean of the last block, and dT/dt, the least-squares slope over
+ * the last `slope_blocks` blocks. From the first valid sample on there is a correction (the map
+ * at that sample with slope 0, GTC_WARMING); before it the correction is 0 with GTC_HELD.
+ *
+ * A float32 build must keep to C99 arithmetic (-std=c99 -ffp-contract=off, no -ffast-math);
+ * gtc_f32_check() at boot proves that it does. Fixed point needs no flag.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_H_INCLUDED
+#define GTC_H_INCLUDED
+
+#include "gtc_table.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Semantic version of the functions below. The table layout has a number of its own. */
+#define GTC_VERSION_MAJOR 0
+#define GTC_VERSION_MINOR 1
+#define GTC_VERSION_PATCH 0
+
+/* What a call did. 0: done. Positive: done, with remarks as bits. Negative: nothing was written.
+ * A released value keeps its meaning for ever; treat an unknown negative one as a failure. */
+#define GTC_OK 0
+#define GTC_WARMING 1    /* slope and mean are not full yet; slope taken as 0 */
+#define GTC_CLAMPED 2    /* input outside the envelope: the correction at its edge */
+#define GTC_UNCOVERED 4  /* inside the envelope, but no training data near: interpolated */
+#define GTC_HELD 8       /* sample or block missing, stuck or impossible: last correction kept */
+#define GTC_FALLBACK 16  /* held too long: the table's constant correction */
+#define GTC_E_ARG (-1)       /* NULL pointer, not a number, count or size out of range */
+#define GTC_E_LAYOUT (-2)    /* table of another layout, or one that needs what was not compiled in */
+#define GTC_E_SELF_TEST (-3) /* arithmetic or a known answer wrong: do not navigate with this build */
+#define GTC_E_IMAGE (-4)     /* image or saved state corrupted, truncated or torn */
+#define GTC_E_ID (-5)        /* image or saved state of another table */
+
+/* The q31 mark of a sample that did not arrive. (In f32 a NaN is one.) */
+#define GTC_TEMP_MISSING (-2147483647L - 1L)
+
+#if defined(__GNUC__) || defined(__clang__)
+#define GTC_MUST_CHECK __attribute__((warn_unused_result))
+#else
+#define GTC_MUST_CHECK
+#endif
+
+/* State of one table, owned by the caller. Contents are private; copying it copies the state. */
+typedef struct {
+    const gtc_f32_table_t *table;
+    uint_least32_t samples_per_block;
+    uint_least32_t position;       /* samples of the running block so far */
+    uint_least32_t valid;          /* valid ones among them */
+    uint_least32_t gap;            /* samples since the last believed one */
+    uint_least32_t suspects;       /* suspect samples in a row that agree */
+    uint_least32_t repeats;        /* identical samples in a row */
+    uint_least32_t held_blocks;    /* invalid blocks in a row */
+    uint_least32_t filled;         /* blocks in the window since the last restart */
+    uint_least32_t window_valid;   /* one bit a block, newest lowest */
+    int_least32_t status;          /* of the correction in force */
+    float step_per_sample;         /* C */
+    float last;                    /* last believed sample, C */
+    float candidate;               /* last suspect sample, C */
+    float received;                /* last finite sample, C */
+    float base;                    /* first valid sample of the block, C */
+    float sum;                     /* of differences from base, C */
+    float mean;                    /* last valid block mean, C */
+    float bias;                    /* in force, deg/h */
+    float angle[2];                /* carried remainder, arcsec */
+    float window[GTC_MAX_SLOPE_BLOCKS];  /* block means, C */
+    float channel[GTC_MAX_TERMS];        /* block sums of auxiliary channels */
+    float term[GTC_MAX_TERMS][2];        /* states of the terms */
+    float elapsed;                 /* blocks since init */
+} gtc_f32_state_t;
+
+typedef struct {
+    const gtc_q31_table_t *table;
+    uint_least32_t samples_per_block;
+    uint_least32_t position;
+    uint_least32_t valid;
+    uint_least32_t gap;
+    uint_least32_t suspects;
+    uint_least32_t repeats;
+    uint_least32_t held_blocks;
+    uint_least32_t filled;
+    uint_least32_t window_valid;
+    int_least32_t status;
+    int_least32_t step_per_sample; /* 2^-16 C */
+    int_least32_t last;
+    int_least32_t candidate;
+    int_least32_t received;
+    int_least32_t base;
+    int_least32_t mean;
+    int_least32_t bias;            /* 2^-bias_frac_bits deg/h */
+    int_least64_t sum;
+    int_least64_t angle;           /* carried remainder */
+    int_least32_t window[GTC_MAX_SLOPE_BLOCKS];
+    int_least64_t channel[GTC_MAX_TERMS];
+    int_least32_t term[GTC_MAX_TERMS][2];
+    int_least32_t elapsed;
+} gtc_q31_state_t;
+
+/* Words of a saved state, see gtc_<n>_save(). */
+#define GTC_SAVE_WORDS (12 + GTC_MAX_SLOPE_BLOCKS + (3 * GTC_MAX_TERMS))
+
+/* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
+ * no flushed subnormals that the table needs), checksum over its values, its known answers.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE (checksum) or GTC_E_SELF_TEST.
+ * Cost: n_probes + 2 evaluations of the map and about 40 operations for each word of the table. */
+GTC_MUST_CHECK int gtc_f32_check(const gtc_f32_table_t *table);
+GTC_MUST_CHECK int gtc_q31_check(const gtc_q31_table_t *table);
+
+/* Makes a table from a binary image (gtc_<id>.bin) in flash: a new calibration without a new
+ * executable. `table` receives pointers into `words`, which must stay in place. `expected_id` is
+ * GTC_<ID>_ID of the emitted header. Nothing is written unless the whole image is sound.
+ * Returns 0, GTC_E_ARG, GTC_E_IMAGE (magic, byte order, length, CRC, sizes), GTC_E_LAYOUT (another
+ * layout, or it needs what was not compiled in) or GTC_E_ID. Cost: about 40 operations a word. */
+GTC_MUST_CHECK int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words,
+                                uint_least32_t n_words, uint_least32_t expected_id);
+GTC_MUST_CHECK int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words,
+                                uint_least32_t n_words, uint_least32_t expected_id);
+
+/* The static map without terms: bias at a temperature and a slope (C per block), stateless.
+ * Returns 0, GTC_CLAMPED, GTC_UNCOVERED, or GTC_E_ARG (NULL, not a number). */
+GTC_MUST_CHECK int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bias);
+GTC_MUST_CHECK int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp,
+                               int_least32_t slope, int_least32_t *bias);
+
+/* Starts a state. samples_per_block = block_s of the emitted header / sample period of this
+ * target, 1 ... 2^20. Returns 0, GTC_E_ARG or GTC_E_LAYOUT. */
+GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table,
+                                uint_least32_t samples_per_block);
+GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table,
+                                uint_least32_t samples_per_block);
+
+/* One sample: channels[0] is the temperature, further ones (n_channels of the table) are the
+ * auxiliary channels. A missing, stuck or impossible temperature is held, never an error.
+ * Returns the status of the correction in force, with GTC_HELD if this sample was not believed;
+ * GTC_E_ARG for a NULL pointer.
+ * Cost: about 30 operations; the call that opens a block also makes the correction (one
+ * evaluation of the map, slope_blocks multiplications, the terms). */
+GTC_MUST_CHECK int gtc_f32_sample(gtc_f32_state_t *state, const float *channels);
+GTC_MUST_CHECK int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *channels);
+
+/* `count` samples that did not arrive. Same statuses as a sample that is held. Cost: that of the
+ * blocks that end, at most hold_blocks + slope_blocks + 2 of them. */
+GTC_MUST_CHECK int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count);
+GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
+
+/* The correction in force; compensated = measured - bias. Returns its status or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
+GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
+
+/* The angle to subtract from an angle increment over dt; what rounding leaves is carried on.
+ * f32: dt in s, angle in arcsec, a multiple of 2^-16. q31: dt in microseconds, angle in
+ * 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t.
+ * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s). */
+GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);
+GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_state_t *state, int_least32_t dt, int_least32_t *angle);
+
+/* State over power cycles. `save` writes GTC_SAVE_WORDS words with version, the table's checksum
+ * and a CRC. `restore` starts `state` for `table` as gtc_<n>_init() would, then takes over what
+ * survives `off_blocks` blocks without power (memories and plays always, the slope window only
+ * if off_blocks is 0); a torn or foreign image leaves `state` unwritten.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE or GTC_E_ID. */
+GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
+GTC_MUST_CHECK int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
+GTC_MUST_CHECK int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,
+                                   uint_least32_t samples_per_block,
+                                   const gtc_word_t words[GTC_SAVE_WORDS],
+                                   uint_least32_t off_blocks);
+GTC_MUST_CHECK int gtc_q31_restore(gtc_q31_state_t *state, const gtc_q31_table_t *table,
+                                   uint_least32_t samples_per_block,
+                                   const gtc_word_t words[GTC_SAVE_WORDS],
+                                   uint_least32_t off_blocks);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* GTC_H_INCLUDED */

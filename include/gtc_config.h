@@ -1,0 +1,58 @@
+/* gtc_config.h - every option of the gyrotc runtime, with its default and the reason for it.
+ *
+ * To change one, define it on the compiler's command line, or name a header of your own in
+ * GTC_CONFIG_HEADER (for example -DGTC_CONFIG_HEADER='"my_gtc.h"'); it is read first. All
+ * translation units of one program must see the same options: they set the size of the state.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_CONFIG_H_INCLUDED
+#define GTC_CONFIG_H_INCLUDED
+
+#ifdef GTC_CONFIG_HEADER
+#include GTC_CONFIG_HEADER
+#endif
+
+/* Longest slope window in blocks. 20 blocks of 10 s are 200 s, the longest window that `fit`
+ * chooses. Each block costs one number of RAM in the state; a table that needs more is refused. */
+#ifndef GTC_MAX_SLOPE_BLOCKS
+#define GTC_MAX_SLOPE_BLOCKS 20
+#endif
+
+/* Most extension terms of one table. Diagnosis ships at most three causes; four leaves room for
+ * one that is known beforehand. Each costs four numbers of RAM in the state. */
+#ifndef GTC_MAX_TERMS
+#define GTC_MAX_TERMS 4
+#endif
+
+/* 1: a table may hold several networks, chosen by temperature and slope (a model bank).
+ * 0: such a table is refused, and the code of the hand-over is not compiled. One network over the
+ * whole envelope is the default of the generator, hence 0. */
+#ifndef GTC_WITH_BANK
+#define GTC_WITH_BANK 0
+#endif
+
+/* 1: gtc_<n>_open() accepts images that carry extension terms, which links every term's code.
+ * 0: such an image is refused. A table compiled in links only the terms that it names, always. */
+#ifndef GTC_OPEN_TERMS
+#define GTC_OPEN_TERMS 0
+#endif
+
+/* 1: multiply 32 x 32 -> 64 bits in 16-bit halves. The bits are the same; it is faster on cores
+ * without a long multiply (Cortex-M0, AVR) and slower on all others. */
+#ifndef GTC_HALF_MULTIPLY
+#if defined(__AVR__) || defined(__ARM_ARCH_6M__)
+#define GTC_HALF_MULTIPLY 1
+#else
+#define GTC_HALF_MULTIPLY 0
+#endif
+#endif
+
+#if (GTC_MAX_SLOPE_BLOCKS < 2) || (GTC_MAX_SLOPE_BLOCKS > 32)
+#error "GTC_MAX_SLOPE_BLOCKS must lie in 2 ... 32 (one bit of a 32-bit word each)"
+#endif
+#if (GTC_MAX_TERMS < 1) || (GTC_MAX_TERMS > 8)
+#error "GTC_MAX_TERMS must lie in 1 ... 8"
+#endif
+
+#endif /* GTC_CONFIG_H_INCLUDED */

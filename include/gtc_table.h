@@ -1,0 +1,117 @@
+/* gtc_table.h - table layout 1: what an emitted table file holds.
+ *
+ * Tables are written by `gyrotc emit`, never by hand; docs/FORMAT.md gives every word. A table is
+ * one axis of one gyro serial. The order of the members below is the order of the values in the
+ * binary image and in the checksum. Unused parts have length 0 and a NULL pointer.
+ *
+ * Only least-width integers occur, because `char` has 16 bits on some DSPs. A float value is held
+ * as `gtc_word_t`, so that one array of 32-bit words serves as table and as flash image.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_TABLE_H_INCLUDED
+#define GTC_TABLE_H_INCLUDED
+
+#include <stdint.h>
+
+#include "gtc_config.h"
+
+/* A runtime reads exactly this layout; an emitted file refuses to compile against another. */
+#define GTC_TABLE_LAYOUT 1
+
+/* First word of a binary image; reads 0x31435447 when the image has the other byte order. */
+#define GTC_IMAGE_MAGIC 0x47544331UL
+
+/* Codes of `quantity` and `unit`. */
+#define GTC_QUANTITY_BIAS 0 /* bias of angular rate */
+#define GTC_UNIT_DEG_PER_H 0
+
+/* Kinds of extension terms (first word of a term record). */
+#define GTC_TERM_MEMORY 1    /* first-order memory: cavity_lag (input) and thermal_gradient */
+#define GTC_TERM_PLAY 2      /* play operator: hysteresis */
+#define GTC_TERM_WARM_UP 3   /* exponential in the time since power-on */
+#define GTC_TERM_HARMONIC 4  /* harmonic in T: path_length_periodicity */
+#define GTC_TERM_AUXILIARY 5 /* linear in an auxiliary channel */
+
+/* One 32-bit word: a float32 value or an unsigned integer. */
+typedef union {
+    uint_least32_t bits;
+    float value;
+} gtc_word_t;
+
+/* Sizes of the records in the arrays below, in words. */
+#define GTC_NETWORK_WORDS 8 /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
+#define GTC_CENTER_WORDS 5  /* T: center, gain; slope: center, gain; weight (q31: s1, k1, s2, k2, w) */
+#define GTC_TERM_WORDS 8    /* kind, channel, then six parameters of the kind */
+#define GTC_PROBE_WORDS 4   /* temperature, slope, bias, status */
+
+struct gtc_f32_term_code; /* the functions of one kind of term; private */
+struct gtc_q31_term_code;
+
+/* Table in float32. Gains are 1/width with sqrt(log2 e) folded in. */
+typedef struct {
+    uint_least32_t layout;         /* GTC_TABLE_LAYOUT */
+    uint_least32_t quantity;       /* GTC_QUANTITY_... */
+    uint_least32_t unit;           /* GTC_UNIT_... */
+    uint_least32_t id;             /* CRC-32 of the table's id as text; in the emitted header */
+    uint_least32_t slope_blocks;   /* window of the slope, 2 ... GTC_MAX_SLOPE_BLOCKS */
+    uint_least32_t hold_blocks;    /* invalid blocks in a row that are bridged; then fallback */
+    uint_least32_t stuck_samples;  /* identical samples that are believed; 0: any number */
+    uint_least32_t bias_frac_bits; /* 0 in float32 */
+    gtc_word_t max_step;           /* C: believable change between samples, besides ... */
+    gtc_word_t max_slope;          /* ... C per block, by which it grows with the gap */
+    gtc_word_t fallback;           /* deg/h: constant correction after hold_blocks */
+    gtc_word_t scale[3];           /* C, 1/C, block/C: center of T, gain of T, gain of slope */
+    gtc_word_t envelope[4];        /* C, C, C/block, C/block: T min, max; slope min, max */
+    uint_least32_t n_networks;     /* 1, or more where GTC_WITH_BANK */
+    uint_least32_t n_centers;      /* of all networks together */
+    uint_least32_t n_channels;     /* 1 + auxiliary channels */
+    uint_least32_t n_terms;        /* 0 ... GTC_MAX_TERMS */
+    uint_least32_t coverage_cells[2]; /* cells in T and slope over the envelope; 0, 0: none */
+    uint_least32_t sigma_cells[2];    /* the same for the uncertainty; 0, 0: none */
+    uint_least32_t n_probes;          /* known answers */
+    const gtc_word_t *networks;    /* [n_networks][GTC_NETWORK_WORDS] */
+    const gtc_word_t *centers;     /* [n_centers][GTC_CENTER_WORDS] */
+    const gtc_word_t *terms;       /* [n_terms][GTC_TERM_WORDS] */
+    const gtc_word_t *coverage;    /* one bit a cell, T fastest, 32 cells a word, low bit first */
+    const gtc_word_t *sigma;       /* [slope cell][T cell] deg/h, 1 sigma of compensated bias */
+    const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
+    uint_least32_t crc;            /* CRC-32 over all of the above */
+    const struct gtc_f32_term_code *term_code[GTC_MAX_TERMS]; /* one for each term, else NULL */
+    const char *serial;            /* as given by the gyro's maker; NULL in an opened image */
+} gtc_f32_table_t;
+
+/* Table in fixed point. Words are two's complement 32-bit integers in `bits`. */
+typedef struct {
+    uint_least32_t layout;
+    uint_least32_t quantity;
+    uint_least32_t unit;
+    uint_least32_t id;
+    uint_least32_t slope_blocks;
+    uint_least32_t hold_blocks;
+    uint_least32_t stuck_samples;
+    uint_least32_t bias_frac_bits; /* bias = integer * 2^-bias_frac_bits deg/h */
+    int_least32_t max_step;        /* 2^-16 C */
+    int_least32_t max_slope;       /* 2^-16 C per block */
+    int_least32_t fallback;        /* 2^-bias_frac_bits deg/h */
+    int_least32_t scale[6];        /* maps T and slope onto 16 bits, see docs/numerics.md */
+    int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
+    uint_least32_t n_networks;
+    uint_least32_t n_centers;
+    uint_least32_t n_channels;
+    uint_least32_t n_terms;
+    uint_least32_t coverage_cells[2];
+    uint_least32_t sigma_cells[2];
+    uint_least32_t n_probes;
+    const gtc_word_t *networks;
+    const gtc_word_t *centers;
+    const gtc_word_t *terms;
+    const gtc_word_t *coverage;
+    const gtc_word_t *sigma;
+    const gtc_word_t *probes;
+    uint_least32_t crc;
+    const struct gtc_q31_term_code *term_code[GTC_MAX_TERMS];
+    const char *serial;
+} gtc_q31_table_t;
+
+#endif /* GTC_TABLE_H_INCLUDED */
