@@ -1,0 +1,46 @@
+# gyrotc - the one door. `make help` lists what there is.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+PYTHON := .venv/bin/python
+GYROTC := .venv/bin/gyrotc
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+## show this list
+help:
+	@awk '/^## /{text=substr($$0,4);next} /^[a-z][a-z-]*:/{if(text!=""){split($$1,a,":");printf "  make %-10s %s\n",a[1],text;text=""}}' $(MAKEFILE_LIST)
+
+## install what is missing (system packages, .venv with the C++ core)
+setup:
+	@tools/setup.sh
+
+## the main job: data -> verified C and a report in build/demo (DATA=folder [AXIS=x] for your own recordings)
+demo: setup
+ifdef DATA
+	@$(GYROTC) build "$(DATA)" --out build/demo $(if $(AXIS),--axis $(AXIS))
+else
+	@$(GYROTC) simulate paper --seed 1 --out build/demo-data
+	@$(GYROTC) build build/demo-data --out build/demo
+endif
+
+## all tests (CTest for the C library, pytest for the generator); installs its own tools
+test:
+	@tools/setup.sh test
+	@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
+	@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
+	@ctest --test-dir build/ctest --output-on-failure
+	@$(PYTHON) -m pytest -q -n 2 --dist loadfile tests/py
+
+## style and promises: ruff, mypy, and what the C library must not contain
+check:
+	@tools/setup.sh test
+	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools
+	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
+	@cd gen && ../.venv/bin/mypy gyrotc
+
+## remove what was built (not .venv)
+clean:
+	rm -rf build
+
+.PHONY: help setup demo test check clean

@@ -1,0 +1,358 @@
+"""The fitted model of one axis of one gyro: frozen in memory, JSON on disk (docs/FORMAT.md, section 1).
+
+Stage 4 of the house (recordings → samples → **model** → tables → C → proof → report). Reads and
+writes `model.json` and evaluates the network's equation in float64; knows nothing of rounding.
+
+The network is eq. (1), (2) of Ding et al. 2014, with one width per input and center:
+
+    bias(T, r) = w0 + linear · z + Σ_i w_i exp(−((z_T − c_iT)/δ_iT)² − ((z_r − c_ir)/δ_ir)²)
+
+where z normalises temperature T (C) and its rate r (C/min) by `scale`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .errors import InputError
+
+__all__ = [
+    "SCHEMA",
+    "Coverage",
+    "DataFile",
+    "Envelope",
+    "Model",
+    "Network",
+    "Scale",
+    "Term",
+    "Uncertainty",
+    "load_model",
+    "table_id",
+    "write_atomically",
+]
+
+SCHEMA = "gyrotc.model/1"
+SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
+_MAX_FILE_BYTES = 4 * 2**20
+_MAX_CENTERS = 512
+_C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
+_LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
+
+Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
+CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Dph = Annotated[float, Field(ge=-7.5e6, le=7.5e6)]
+Width = Annotated[float, Field(ge=1e-3, le=1e3)]
+Positive = Annotated[float, Field(gt=0.0, le=1e6)]
+Cells = tuple[Annotated[int, Field(ge=1, le=256)], Annotated[int, Field(ge=1, le=256)]]
+
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError("minimum above maximum")
+    return pair
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+
+class Scale(_Frozen):
+    """Normalisation of the inputs: z_T = (T − center)/half_range, z_r = r/slope_c_per_min."""
+
+    temperature_c: tuple[Celsius, Positive]
+    slope_c_per_min: Positive
+
+
+class Envelope(_Frozen):
+    """Range of the inputs, C and C/min; also the region of one network of a bank."""
+
+    temperature_c: Annotated[tuple[Celsius, Celsius], AfterValidator(_ordered)]
+    slope_c_per_min: Annotated[tuple[CelsiusPerMin, CelsiusPerMin], AfterValidator(_ordered)]
+
+
+class Coverage(_Frozen):
+    """Where training data was: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
+
+    cells: Cells
+    rows: tuple[Annotated[str, Field(pattern="^[01]+$")], ...]
+
+    @model_validator(mode="after")
+    def _shape(self) -> Coverage:
+        if len(self.rows) != self.cells[1] or any(len(r) != self.cells[0] for r in self.rows):
+            raise ValueError("rows do not have the size that cells gives")
+        return self
+
+
+class Uncertainty(_Frozen):
+    """1 σ of the compensated bias, deg/h: `rows[j][i]` for cell i of T and j of dT/dt."""
+
+    cells: Cells
+    rows: tuple[tuple[Annotated[float, Field(ge=0.0, le=7.5e6)], ...], ...]
+
+    @model_validator(mode="after")
+    def _shape(self) -> Uncertainty:
+        if len(self.rows) != self.cells[1] or any(len(r) != self.cells[0] for r in self.rows):
+            raise ValueError("rows do not have the size that cells gives")
+        return self
+
+
+class Network(_Frozen):
+    """One network: w0, linear part and Gaussians. Centers in C and C/min, widths δ in normalised units."""
+
+    w0: Dph
+    linear: tuple[Dph, Dph]
+    centers: Annotated[tuple[tuple[Celsius, CelsiusPerMin], ...], Field(max_length=_MAX_CENTERS)]
+    widths: tuple[tuple[Width | None, Width | None], ...]
+    weights: tuple[Dph, ...]
+    region: Envelope | None = None
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Network:
+        if not len(self.centers) == len(self.widths) == len(self.weights):
+            raise ValueError("centers, widths and weights differ in length")
+        return self
+
+
+class Term(_Frozen):
+    """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel."""
+
+    id: Literal[
+        "cavity_lag", "thermal_gradient", "hysteresis", "warm_up", "path_length_periodicity", "auxiliary"
+    ]
+    parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]]
+    channel: str | None = None
+
+    @model_validator(mode="after")
+    def _known_parameters(self) -> Term:
+        names = {
+            "cavity_lag": {"tau_s"},
+            "thermal_gradient": {"tau_s", "amplitude_dph_per_c"},
+            "hysteresis": {"width_c", "amplitude_dph_per_c"},
+            "warm_up": {"tau_s", "amplitude_dph"},
+            "path_length_periodicity": {"period_c", "amplitude_dph", "phase_rad"},
+            "auxiliary": {"slope_dph_per_unit", "reference"},
+        }[self.id]
+        if set(self.parameters) != names:
+            raise ValueError(f"term {self.id} takes the parameters {', '.join(sorted(names))}")
+        positive = [n for n in ("tau_s", "width_c", "period_c") if n in names]
+        if any(self.parameters[n] <= 0.0 for n in positive):
+            raise ValueError(f"{positive[0]} of term {self.id} must be above 0")
+        if (self.id == "auxiliary") != (self.channel is not None):
+            raise ValueError("a channel belongs to an auxiliary term and to no other")
+        return self
+
+
+class DataFile(_Frozen):
+    """One recording, or a span of one, that the model was fitted to (or that was left for the exam)."""
+
+    file: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    span: tuple[float | None, float | None] | None
+    role: Literal["train", "exam"]
+
+
+class Model(_Frozen):
+    """Everything that is known of one axis of one serial. See docs/FORMAT.md for every field."""
+
+    schema_: Annotated[Literal["gyrotc.model/1"], Field(alias="schema")] = "gyrotc.model/1"
+    serial: Annotated[str, Field(pattern=SERIAL)]
+    axis: Literal["x", "y", "z"] | None
+    method: Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,31}$")]
+    block_s: Annotated[float, Field(gt=0.0, le=3600.0)]
+    slope_blocks: Annotated[int, Field(ge=2, le=20)]
+    scale: Scale
+    envelope: Envelope
+    coverage: Coverage | None
+    networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)]
+    terms: Annotated[tuple[Term, ...], Field(max_length=4)] = ()
+    fallback_dph: Dph
+    hold_blocks: Annotated[int, Field(ge=1, le=100000)]
+    stuck_samples: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    max_step_c: Positive
+    max_rate_c_per_min: Positive
+    noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None
+    noise_floor_source: Literal["estimated"] | None
+    average_s: Annotated[float, Field(gt=0.0, le=1e6)] = 100.0
+    uncertainty_dph: Uncertainty | None = None
+    data: tuple[DataFile, ...]
+    seed: int
+    meta: dict[str, Any] = {}
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, strict=True, populate_by_name=True
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> Model:
+        if sum(len(n.centers) for n in self.networks) > _MAX_CENTERS:
+            raise ValueError(f"more than {_MAX_CENTERS} centers")
+        regions = [n.region is not None for n in self.networks]
+        if len(regions) > 1 and not all(regions):
+            raise ValueError("every network of a bank needs a region")
+        if sum(t.id == "cavity_lag" for t in self.terms) > 1:
+            raise ValueError("cavity_lag can be there only once")
+        return self
+
+    @property
+    def id(self) -> str:
+        """Id of the table: part of every emitted name."""
+        return table_id(self.serial, self.axis)
+
+    @property
+    def symbol(self) -> str:
+        """The id within C names, so short that `gtc_<symbol>_f32` keeps within 31 characters."""
+        return self.id if len(self.id) <= _LONGEST_SYMBOL else f"{self.id[:14]}_{self.id[-8:]}"
+
+    @property
+    def n_centers(self) -> int:
+        return sum(len(n.centers) for n in self.networks)
+
+    @property
+    def sum_abs_weights_dph(self) -> float:
+        """Largest Σ|w| of the networks, deg/h: the lever of the arithmetic error."""
+        return max(math.fsum(abs(w) for w in n.weights) for n in self.networks)
+
+    def normalise(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64]:
+        """Inputs as the network sees them, shape (n, 2), clamped to the envelope."""
+        e = self.envelope
+        t = np.clip(np.asarray(temperature_c, dtype=np.float64), *e.temperature_c)
+        r = np.clip(np.asarray(slope_c_per_min, dtype=np.float64), *e.slope_c_per_min)
+        center, half = self.scale.temperature_c
+        return np.stack([(t - center) / half, r / self.scale.slope_c_per_min], axis=-1)
+
+    def map_dph(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64]:
+        """Static map without terms in float64, deg/h; inputs C and C/min, clamped to the envelope."""
+        z = self.normalise(temperature_c, slope_c_per_min)
+        if len(self.networks) == 1:
+            return self._network_dph(self.networks[0], z)
+        return self._bank_dph(z, temperature_c, slope_c_per_min)
+
+    def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        bias = network.w0 + z @ np.array(network.linear)
+        center, half = self.scale.temperature_c
+        for (c_t, c_r), (d_t, d_r), weight in zip(
+            network.centers, network.widths, network.weights, strict=True
+        ):
+            u = np.zeros(z.shape[:-1])
+            if d_t is not None:
+                u = u + ((z[..., 0] - (c_t - center) / half) / d_t) ** 2
+            if d_r is not None:
+                u = u + ((z[..., 1] - c_r / self.scale.slope_c_per_min) / d_r) ** 2
+            bias = bias + weight * np.exp(-u)
+        return np.asarray(bias)
+
+    def _bank_dph(
+        self, z: NDArray[np.float64], temperature_c: ArrayLike, slope_c_per_min: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Networks blended linearly over the overlap of their regions (distance to the region's edge)."""
+        t = np.clip(np.asarray(temperature_c, float), *self.envelope.temperature_c)
+        r = np.clip(np.asarray(slope_c_per_min, float), *self.envelope.slope_c_per_min)
+        total = np.zeros(z.shape[:-1])
+        share = np.zeros(z.shape[:-1])
+        for network in self.networks:
+            assert network.region is not None
+            (t0, t1), (r0, r1) = network.region.temperature_c, network.region.slope_c_per_min
+            inside = np.minimum.reduce(
+                [
+                    np.where(t0 > self.envelope.temperature_c[0], (t - t0) / (t1 - t0 or 1.0), 1.0),
+                    np.where(t1 < self.envelope.temperature_c[1], (t1 - t) / (t1 - t0 or 1.0), 1.0),
+                    np.where(r0 > self.envelope.slope_c_per_min[0], (r - r0) / (r1 - r0 or 1.0), 1.0),
+                    np.where(r1 < self.envelope.slope_c_per_min[1], (r1 - r) / (r1 - r0 or 1.0), 1.0),
+                ]
+            )
+            weight = np.maximum(inside, 0.0)
+            total = total + weight * self._network_dph(network, z)
+            share = share + weight
+        return np.asarray(np.where(share > 0.0, total / np.where(share > 0.0, share, 1.0), self.fallback_dph))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON object, in the order of docs/FORMAT.md."""
+        return self.model_dump(mode="json", by_alias=True)
+
+    def to_json(self) -> str:
+        return json.dumps(self.to_dict(), indent=1, ensure_ascii=True, allow_nan=False) + "\n"
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical form: sorted keys, no spaces, ASCII."""
+        text = json.dumps(
+            self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False
+        )
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+    def save(self, path: Path) -> None:
+        """Writes `model.json` to a temporary name, then renames."""
+        write_atomically(path, self.to_json())
+
+
+def table_id(serial: str, axis: str | None) -> str:
+    """Id of a table: the serial in lower case with every non-alphanumeric as `_`, plus the axis.
+
+    Where that loses information beyond case and `-`, or is too long for a C name of 31 characters,
+    the first 18 characters, `_` and 8 hex digits of SHA-256(serial + axis).
+    """
+    suffix = f"_{axis}" if axis else ""
+    plain = re.sub(r"[^a-z0-9]", "_", serial.lower())
+    lossless = not re.search(r"[^A-Za-z0-9_-]", serial)
+    if lossless and len(plain) + len(suffix) <= _LONGEST_SYMBOL:
+        return plain + suffix
+    digest = hashlib.sha256((serial + (axis or "")).encode("ascii")).hexdigest()
+    return f"{(plain + suffix)[:18]}_{digest[:8]}"
+
+
+def load_model(path: Path) -> Model:
+    """Reads and checks a `model.json`.
+
+    Raises:
+        InputError: The file is missing, too large, not JSON, of another schema, or a field is illegal.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "model.json"
+    try:
+        if path.stat().st_size > _MAX_FILE_BYTES:
+            raise InputError(str(path), "the file is larger than 4 MiB", "a model file")
+        raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})", "a model.json") from error
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise InputError(str(path), f"is not JSON ({error})", "a model.json") from error
+    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
+        found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
+        raise InputError(f"{path}, field schema", repr(found), repr(SCHEMA))
+    try:
+        # JSON has no tuples: validated in JSON mode, so that lists pass and strings for numbers do not.
+        return Model.model_validate_json(json.dumps(raw))
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"]) or "(whole)"
+        raise InputError(f"{path}, field {field}", first["msg"]) from error
+
+
+def _refuse_constant(text: str) -> float:
+    raise ValueError(f"{text} is not a finite number")
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Writes a file under a temporary name in the same folder, then renames it into place."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data.encode("utf-8") if isinstance(data, str) else data)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# Installs what gyrotc needs: system packages (Debian, Ubuntu) that are missing, then the virtual environment .venv.
+#
+#   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt
+#   tools/setup.sh test       besides, what `make test` uses
+#   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
+#   tools/setup.sh prove      besides, the proof tools of `make prove`
+#   tools/setup.sh bench      besides, the peers of `make bench`
+#
+# A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+level=${1:-demo}
+
+base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
+test=(clang cmake cppcheck gcc-arm-none-eabi qemu-system-arm gcc-s390x-linux-gnu qemu-user
+      libclang-rt-14-dev clang-tidy lcov)
+targets=(gcc-aarch64-linux-gnu gcc-riscv64-linux-gnu gcc-powerpc-linux-gnu gcc-m68k-linux-gnu libc6-dev-i386 lib32gcc-12-dev
+         gcc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc simavr)
+prove=(frama-c-base gappa)
+
+case $level in
+  demo | bench) packages=("${base[@]}") ;;
+  test) packages=("${base[@]}" "${test[@]}") ;;
+  targets) packages=("${base[@]}" "${test[@]}" "${targets[@]}") ;;
+  prove) packages=("${base[@]}" "${test[@]}" "${prove[@]}") ;;
+  *) echo "setup: unknown level '$level' (demo, test, targets, prove, bench)" >&2; exit 2 ;;
+esac
+
+install_missing() {
+  local missing=() p
+  for p in "${packages[@]}"; do
+    dpkg-query -W -f='${Status}' "$p" 2>/dev/null | grep -q 'install ok installed' || missing+=("$p")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  echo "setup: installing system packages: ${missing[*]}"
+  local as=()
+  if [ "$(id -u)" != 0 ]; then
+    command -v sudo >/dev/null || { echo "setup: not root and no sudo: install these packages by hand: ${missing[*]}" >&2; exit 2; }
+    if [ -t 0 ]; then
+      read -r -p "setup: use sudo apt-get for this? [y/N] " answer
+      [ "$answer" = y ] || { echo "setup: stopped; install by hand: ${missing[*]}" >&2; exit 2; }
+    fi
+    as=(sudo)
+  fi
+  "${as[@]}" apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive "${as[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+if command -v dpkg-query >/dev/null && command -v apt-get >/dev/null; then
+  install_missing
+else
+  echo "setup: no apt-get here; needed are: ${packages[*]} (or what your system calls them)" >&2
+fi
+
+# The environment is made again when what it is made of has changed.
+extras=""
+[ "$level" = demo ] || extras="[test]"
+[ "$level" = bench ] && extras="[test,bench]"
+stamp=.venv/.gyrotc$extras
+fingerprint=$(cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh | sha256sum | cut -d' ' -f1)
+if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
+  [ -x .venv/bin/python ] || { echo "setup: making .venv"; python3 -m venv .venv; }
+  echo "setup: installing gyrotc into .venv (builds the C++ core)"
+  .venv/bin/python -m pip install -q --disable-pip-version-check -e "gen$extras"
+  echo "$fingerprint" >"$stamp"
+  [ "$level" = demo ] || echo "$fingerprint" >.venv/.gyrotc
+fi
