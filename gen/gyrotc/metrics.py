@@ -1,0 +1,123 @@
+"""Figures of merit of a gyro record before and after compensation (means over `average_s`).
+
+Knows arrays only. All RMS figures are of averaged rates; standard deviations are about the mean
+with ddof 0; pooled figures are over all averaged samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Averages", "average", "pooled", "statistics", "time_statistics"]
+
+Array = NDArray[np.float64]
+_HALF_HOUR_S = 1800.0
+_HOUR_S = 3600.0
+_FIRST_S = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Averages:
+    """Means over `average_s` of one run: their times (s), and rates before and after (deg/h)."""
+
+    time_s: Array
+    before_dph: Array
+    after_dph: Array
+    temperature_c: Array
+
+
+def _bins(time_s: Array, scored: NDArray[np.bool_], average_s: float) -> tuple[NDArray[np.int64], int]:
+    """Bin of every row (from the first row on) and their number; a bin less than half full gets -1."""
+    if time_s.size == 0:
+        return np.zeros(0, dtype=np.int64), 0
+    period = float(np.median(np.diff(time_s))) if time_s.size > 1 else average_s
+    # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
+    raw = np.floor((time_s - time_s[0] + 1e-3 * period) / max(average_s, period)).astype(np.int64)
+    full = max(average_s, period) / period
+    count = np.bincount(raw[scored], minlength=int(raw[-1]) + 1)
+    keep = count >= max(0.5 * full, 1.0)
+    number = np.where(keep, np.cumsum(keep) - 1, -1)
+    return np.where(scored, number[raw], -1), int(keep.sum())
+
+
+def _means(bins: NDArray[np.int64], n: int, values: Array) -> Array:
+    used = bins >= 0
+    total = np.bincount(bins[used], weights=values[used], minlength=n)
+    return np.asarray(total / np.bincount(bins[used], minlength=n))
+
+
+def average(
+    time_s: Array,
+    temperature_c: Array,
+    before_dph: Array,
+    after_dph: Array,
+    *,
+    scored: NDArray[np.bool_],
+    average_s: float,
+) -> Averages:
+    """Averages the scored rows of one run over `average_s`; bins less than half full are left out."""
+    scored = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
+    bins, n = _bins(time_s, scored, average_s)
+    finite_t = np.where(np.isfinite(temperature_c), temperature_c, 0.0)
+    return Averages(
+        time_s=_means(bins, n, time_s),
+        before_dph=_means(bins, n, before_dph),
+        after_dph=_means(bins, n, after_dph),
+        temperature_c=_means(bins, n, finite_t),
+    )
+
+
+def statistics(values: Array) -> dict[str, float | None]:
+    """mean, standard deviation, RMS and largest magnitude, deg/h; None where there is no sample."""
+    if values.size == 0:
+        return dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
+    return {
+        "mean_dph": float(values.mean()),
+        "std_dph": float(values.std()),
+        "rms_dph": float(np.sqrt(np.mean(values**2))),
+        "max_abs_dph": float(np.abs(values).max()),
+    }
+
+
+def time_statistics(a: Averages, average_s: float) -> dict[str, float | None]:
+    """What the residual does over longer times.
+
+    RMS of 30-minute means; RMS of the angle that one hour adds up to (1 deg/h is 1 arcsec/s);
+    RMS of the first 10 minutes. None where the run is too short.
+    """
+    first = a.after_dph[a.time_s < a.time_s[0] - average_s / 2 + _FIRST_S] if a.time_s.size else a.after_dph
+    return {
+        "rms_30min_dph": _rms_of_windows(a, _HALF_HOUR_S, average_s),
+        "angle_1h_arcsec": _scaled(_rms_of_windows(a, _HOUR_S, average_s), _HOUR_S),
+        "first_10min_rms_dph": float(np.sqrt(np.mean(first**2))) if first.size else None,
+    }
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def _rms_of_windows(a: Averages, window_s: float, average_s: float) -> float | None:
+    """RMS of the means over windows that are at least 90 % full."""
+    if a.time_s.size == 0:
+        return None
+    number = np.floor((a.time_s - a.time_s[0]) / window_s + 1e-9).astype(np.int64)
+    count = np.bincount(number)
+    means = np.bincount(number, weights=a.after_dph) / np.maximum(count, 1)
+    full = means[count >= 0.9 * window_s / average_s]
+    return float(np.sqrt(np.mean(full**2))) if full.size else None
+
+
+def pooled(runs: list[Averages]) -> dict[str, Any]:
+    """`before` and `after` over all samples of several runs, and the improvement (RMS ÷ RMS)."""
+    before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
+    after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
+    result: dict[str, Any] = {"before": statistics(before), "after": statistics(after)}
+    rms = result["after"]["rms_dph"]
+    result["improvement"] = result["before"]["rms_dph"] / rms if rms else None
+    result["samples"] = int(after.size)
+    return result
