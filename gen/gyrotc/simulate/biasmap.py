@@ -1,0 +1,81 @@
+"""The static bias of the simulated cavity: a smooth function of its temperature and of how fast that changes.
+
+    bias(T, r) = low + (high − low) · normalised[ s(T) + r/√(1 + (r/r0)²) · (a + b atan((T − T1)/w1)) + c (√(1 + (r/r1)²) − 1) ]
+
+s(T) is a cubic spline through random knots plus a rational well (losses around a working point) plus an arctangent
+(alignment that goes over from one state to another). The second part is a gas flow that saturates and whose effect
+depends on T; the third is even in r. None of it is a Gaussian: the map shares no family with the model that is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+__all__ = ["BiasMap", "draw"]
+
+Array = NDArray[np.float64]
+
+T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
+R_LIMIT_C_PER_MIN = 2.5
+
+
+@dataclass(frozen=True, slots=True)
+class BiasMap:
+    """One gyro's static map; `parameters` hold everything that was drawn (they go into truth.json)."""
+
+    parameters: dict[str, Any]
+    scale_dph: float
+    offset_dph: float
+    _spline: CubicSpline = field(repr=False)
+
+    def __call__(self, cavity_c: Array, slope_c_per_min: Array) -> Array:
+        """Bias in deg/h at cavity temperatures (C) and their rates of change (C/min), broadcast."""
+        shape = _shape(self.parameters, self._spline, cavity_c, slope_c_per_min)
+        return np.asarray(self.offset_dph + self.scale_dph * shape)
+
+
+def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: Array, slope: Array) -> Array:
+    level = spline(cavity_c)
+    level = level + p["well"] / (1.0 + ((cavity_c - p["well_c"]) / p["well_width_c"]) ** 2)
+    level = level + p["turn"] * np.arctan((cavity_c - p["turn_c"]) / p["turn_width_c"])
+    flow = slope / np.sqrt(1.0 + (slope / p["flow_c_per_min"]) ** 2)
+    gain = p["flow"] + p["flow_turn"] * np.arctan((cavity_c - p["flow_turn_c"]) / p["flow_width_c"])
+    even = p["even"] * (np.sqrt(1.0 + (slope / p["even_c_per_min"]) ** 2) - 1.0)
+    return np.asarray(level + flow * gain + even)
+
+
+def draw(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
+    """One gyro: a map whose values over the operating range lie in `range_dph` (deg/h) and reach both ends."""
+    knots_c = np.linspace(*T_RANGE_C, 6)
+    values = rng.normal(0.0, 0.35, len(knots_c))
+    sign = rng.choice([-1.0, 1.0])
+    parameters: dict[str, Any] = {
+        "knots_c": knots_c.tolist(),
+        "knots": values.tolist(),
+        "well": -rng.uniform(0.8, 1.6),
+        "well_c": rng.uniform(0.0, 35.0),
+        "well_width_c": rng.uniform(30.0, 50.0),
+        "turn": sign * rng.uniform(0.1, 0.4),
+        "turn_c": rng.uniform(-20.0, 50.0),
+        "turn_width_c": rng.uniform(18.0, 35.0),
+        "flow": rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.3),
+        "flow_c_per_min": rng.uniform(2.0, 4.0),
+        "flow_turn": rng.uniform(-0.1, 0.1),
+        "flow_turn_c": rng.uniform(-10.0, 40.0),
+        "flow_width_c": rng.uniform(25.0, 45.0),
+        "even": rng.uniform(-0.15, 0.15),
+        "even_c_per_min": rng.uniform(1.5, 3.0),
+    }
+    spline = CubicSpline(knots_c, values, bc_type="natural")
+    grid_c, grid_slope = np.meshgrid(
+        np.linspace(*T_RANGE_C, 118), np.linspace(-R_LIMIT_C_PER_MIN, R_LIMIT_C_PER_MIN, 25), indexing="ij"
+    )
+    shape = _shape(parameters, spline, grid_c, grid_slope)
+    low, high = range_dph
+    scale = (high - low) / float(np.ptp(shape))
+    return BiasMap(parameters, scale, low - scale * float(shape.min()), spline)
