@@ -1,0 +1,204 @@
+#include "evidence.hpp"
+
+#include <nlopt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+namespace gyrotc {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kOfT = 40;         // functions of temperature alone, shared by s1 and s2
+constexpr int kCoupledT = 10;    // functions of the coupled part, by input
+constexpr int kCoupledR = 8;
+constexpr int kBasis = 1 + kOfT + kCoupledT * kCoupledR;
+constexpr double kReach = 1.4;            // domain over largest |input|: the basis vanishes at its edge
+constexpr double kConstVariance = 100.0;  // of the constant, in units of the bias' variance
+constexpr double kVarianceFloor = 1e-10;
+constexpr double kPi = 3.14159265358979323846;
+
+// Log-normal priors of the parameters: weak, but they keep unused parts from drifting.
+const EvidenceParameters kPriorMean =
+    (EvidenceParameters() << std::log(0.3), std::log(0.15), std::log(1.0), std::log(0.7), std::log(0.3),
+     std::log(0.8), std::log(0.8), std::log(0.3))
+        .finished();
+const EvidenceParameters kPriorSd =
+    (EvidenceParameters() << 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5, 3.0).finished();
+constexpr double kShortScaleStarts[] = {0.08, 0.35};
+
+double frequency(int j, double reach) { return kPi * (j + 1) / (2.0 * reach); }
+
+// Rows: points. Columns: sin(w_j (x + reach)) / sqrt(reach), by recurrence.
+MatrixXd sines(const VectorXd &x, int n, double reach) {
+    const Eigen::ArrayXd angle = frequency(0, reach) * (x.array() + reach);
+    const Eigen::ArrayXd twice_cos = 2.0 * angle.cos();
+    MatrixXd s(x.size(), n);
+    s.col(0) = angle.sin() / std::sqrt(reach);
+    if (n > 1) s.col(1) = twice_cos * s.col(0).array();
+    for (int j = 2; j < n; ++j) s.col(j) = twice_cos * s.col(j - 1).array() - s.col(j - 2).array();
+    return s;
+}
+
+// Spectral density of a squared-exponential process of one input at w, and its derivatives by log s and log l.
+struct Density {
+    double value, by_s, by_l;
+};
+Density density(double s, double l, double w) {
+    const double lw2 = l * l * w * w;
+    const double v = s * s * std::sqrt(2.0 * kPi) * l * std::exp(-0.5 * lw2);
+    return {v, 2.0 * v, v * (1.0 - lw2)};
+}
+
+double reach_of(const VectorXd &x) { return kReach * std::max(x.cwiseAbs().maxCoeff(), 1e-3); }
+
+}  // namespace
+
+EvidenceModel::EvidenceModel(const Bins &bins) : samples_(bins.samples) {
+    if (bins.t.size() == 0) throw std::invalid_argument("evidence: no bins");
+    reach_t_ = reach_of(bins.t);
+    reach_r_ = reach_of(bins.r);
+    const MatrixXd weighted = bins.count.cwiseSqrt().asDiagonal() * basis(bins.t, bins.r);
+    gram_ = MatrixXd::Zero(kBasis, kBasis);
+    gram_.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
+    gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
+    moment_ = weighted.transpose() * bins.count.cwiseSqrt().cwiseProduct(bins.mean);
+    squares_ = bins.count.dot(bins.mean.cwiseAbs2()) + bins.within;
+}
+
+MatrixXd EvidenceModel::basis(const VectorXd &t, const VectorXd &r) const {
+    const MatrixXd of_t = sines(t, kOfT, reach_t_);
+    const MatrixXd of_r = sines(r, kCoupledR, reach_r_);
+    MatrixXd phi(t.size(), kBasis);
+    phi.col(0).setOnes();
+    phi.middleCols(1, kOfT) = of_t;
+    for (int i = 0; i < kCoupledT; ++i)
+        for (int j = 0; j < kCoupledR; ++j)
+            phi.col(1 + kOfT + i * kCoupledR + j) = of_t.col(i).cwiseProduct(of_r.col(j));
+    return phi;
+}
+
+VectorXd EvidenceModel::prior_variance(const EvidenceParameters &log_parameters, MatrixXd *derivative) const {
+    const EvidenceParameters p = log_parameters.array().exp();
+    VectorXd variance(kBasis);
+    variance[0] = kConstVariance;
+    if (derivative) derivative->setZero(kBasis, kEvidenceParameters);
+    for (int j = 0; j < kOfT; ++j) {
+        const double w = frequency(j, reach_t_);
+        const Density a = density(p[0], p[1], w), b = density(p[2], p[3], w);
+        variance[1 + j] = a.value + b.value + kVarianceFloor;
+        if (derivative) derivative->row(1 + j).head<4>() << a.by_s, a.by_l, b.by_s, b.by_l;
+    }
+    for (int i = 0; i < kCoupledT; ++i)
+        for (int j = 0; j < kCoupledR; ++j) {
+            const Density a = density(p[4], p[5], frequency(i, reach_t_));
+            const Density b = density(1.0, p[6], frequency(j, reach_r_));
+            const int k = 1 + kOfT + i * kCoupledR + j;
+            variance[k] = a.value * b.value + kVarianceFloor;
+            if (derivative)
+                derivative->row(k).segment<3>(4) << a.by_s * b.value, a.by_l * b.value, a.value * b.by_l;
+        }
+    return variance;
+}
+
+double EvidenceModel::objective(const EvidenceParameters &log_parameters, EvidenceParameters *gradient) const {
+    MatrixXd slope;
+    const VectorXd lambda = prior_variance(log_parameters, gradient ? &slope : nullptr);
+    const VectorXd h = lambda.cwiseSqrt();
+    const double noise = std::exp(2.0 * log_parameters[7]);
+    MatrixXd a = h.asDiagonal() * gram_ * h.asDiagonal();
+    a.diagonal().array() += noise;
+    const Eigen::LLT<MatrixXd> llt(a);
+    if (llt.info() != Eigen::Success || !std::isfinite(noise)) return std::numeric_limits<double>::infinity();
+    const VectorXd hg = h.cwiseProduct(moment_);
+    const VectorXd alpha = llt.solve(hg);
+    const double fitted = squares_ - hg.dot(alpha);
+    const EvidenceParameters deviation = (log_parameters - kPriorMean).cwiseQuotient(kPriorSd);
+    const double value = 0.5 * fitted / noise + llt.matrixLLT().diagonal().array().log().sum() +
+                         (samples_ - kBasis) * log_parameters[7] + 0.5 * deviation.squaredNorm();
+    if (gradient) {
+        const MatrixXd inverse_l = llt.matrixL().solve(MatrixXd::Identity(kBasis, kBasis));
+        const VectorXd inverse_diagonal = inverse_l.colwise().squaredNorm();
+        const VectorXd by_log_lambda =
+            0.5 * (1.0 - noise * inverse_diagonal.array() - alpha.array().square()).matrix();
+        *gradient = slope.transpose() * by_log_lambda.cwiseQuotient(lambda);
+        (*gradient)[7] = samples_ - kBasis + noise * inverse_diagonal.sum() - fitted / noise + alpha.squaredNorm();
+        *gradient += deviation.cwiseQuotient(kPriorSd);
+    }
+    return value;
+}
+
+void EvidenceModel::condition(const EvidenceParameters &log_parameters) {
+    log_parameters_ = log_parameters;
+    const VectorXd h = prior_variance(log_parameters, nullptr).cwiseSqrt();
+    const double noise = std::exp(2.0 * log_parameters[7]);
+    MatrixXd a = h.asDiagonal() * gram_ * h.asDiagonal();
+    a.diagonal().array() += noise;
+    const Eigen::LLT<MatrixXd> llt(a);
+    if (llt.info() != Eigen::Success) throw std::runtime_error("evidence: the posterior is not positive definite");
+    coefficients_ = h.cwiseProduct(llt.solve(h.cwiseProduct(moment_)));
+    const MatrixXd inverse_l = llt.matrixL().solve(MatrixXd::Identity(kBasis, kBasis));
+    factor_ = std::sqrt(noise) * (h.asDiagonal() * inverse_l.transpose());
+    freedom_ = kBasis - noise * inverse_l.squaredNorm();
+}
+
+void EvidenceModel::optimise(const EvidenceParameters *start) {
+    struct Search {
+        const EvidenceModel *model;
+        int evaluations;
+    } search{this, 0};
+    const auto call = [](unsigned, const double *x, double *gradient, void *data) -> double {
+        auto &s = *static_cast<Search *>(data);
+        ++s.evaluations;
+        EvidenceParameters g = EvidenceParameters::Zero();
+        const double v = s.model->objective(Eigen::Map<const EvidenceParameters>(x), gradient ? &g : nullptr);
+        if (!std::isfinite(v)) g.setZero();
+        if (gradient) std::copy(g.begin(), g.end(), gradient);
+        return std::isfinite(v) ? v : std::numeric_limits<double>::max();
+    };
+    std::vector<EvidenceParameters> starts;
+    if (start) {
+        starts.push_back(*start);
+    } else {
+        for (const double scale : kShortScaleStarts) {
+            starts.push_back(kPriorMean);
+            starts.back()[1] = std::log(scale);
+        }
+    }
+    const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> opt(
+        nlopt_create(NLOPT_LD_LBFGS, kEvidenceParameters), nlopt_destroy);
+    if (!opt) throw std::bad_alloc();
+    const EvidenceParameters low = kPriorMean - 5.0 * kPriorSd, high = kPriorMean + 5.0 * kPriorSd;
+    nlopt_set_min_objective(opt.get(), call, &search);
+    nlopt_set_lower_bounds(opt.get(), low.data());
+    nlopt_set_upper_bounds(opt.get(), high.data());
+    nlopt_set_ftol_abs(opt.get(), 1e-3);
+    nlopt_set_maxeval(opt.get(), 150);
+    double best = std::numeric_limits<double>::infinity();
+    EvidenceParameters at = starts.front();
+    for (EvidenceParameters x : starts) {
+        double v = 0.0;
+        nlopt_optimize(opt.get(), x.data(), &v);  // whatever it says, x is the best point that it saw
+        if (v < best) {
+            best = v;
+            at = x;
+        }
+    }
+    value_ = best;
+    evaluations_ = search.evaluations;
+    condition(at);
+}
+
+VectorXd EvidenceModel::mean(const VectorXd &t, const VectorXd &r) const { return basis(t, r) * coefficients_; }
+
+VectorXd EvidenceModel::variance(const VectorXd &t, const VectorXd &r) const {
+    return (basis(t, r) * factor_).rowwise().squaredNorm();
+}
+
+}  // namespace gyrotc

@@ -1,0 +1,270 @@
+#include "varpro.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+namespace gyrotc {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Walls of c, d, log s, log q: beyond them the objective grows quadratically.
+const double kLow[kNonlinear] = {-1.2, -1.2, std::log(0.03), std::log(0.05)};
+const double kHigh[kNonlinear] = {1.2, 1.2, std::log(4.0), std::log(4.0)};
+constexpr double kWall = 0.02;  // stiffness of a wall, in units of the cloud's weighted square sum
+
+// The ladder of widths that candidates offer.
+constexpr double kWidthsT[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
+constexpr double kWidthsR[] = {0.1, 0.25, 0.6, 1.2, 3.0};
+
+constexpr int kMaxRefineSteps = 40;
+constexpr int kExactGains = 200;  // of so many candidates the gain is computed exactly
+
+double beyond(double x, int k) { return x < kLow[k] ? x - kLow[k] : x > kHigh[k] ? x - kHigh[k] : 0.0; }
+
+// Positive definite by construction (ridge); the jitter only meets rounding.
+Eigen::LLT<MatrixXd> factorise(MatrixXd a) {
+    Eigen::LLT<MatrixXd> llt(a);
+    for (double jitter = 1e-14; llt.info() != Eigen::Success && jitter < 1.0; jitter *= 100.0) {
+        MatrixXd b = a;
+        b.diagonal() *= 1.0 + jitter;
+        llt.compute(b);
+    }
+    return llt;
+}
+
+// Columns x of the cloud with the ridge on the Gaussians' weights: normal matrix.
+MatrixXd normal_matrix(const MatrixXd &x, double ridge) {
+    MatrixXd a = MatrixXd::Zero(x.cols(), x.cols());
+    a.selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
+    a.triangularView<Eigen::StrictlyUpper>() = a.transpose();
+    const double floor = 1e-13 * a.diagonal().maxCoeff();
+    a.diagonal().array() += floor;
+    a.diagonal().tail(x.cols() - kLinear).array() += ridge;
+    return a;
+}
+
+bool distant(const Shapes &candidates, Eigen::Index a, Eigen::Index b) {
+    const Eigen::Matrix<double, kNonlinear, 1> d = candidates.col(a) - candidates.col(b);
+    const double s = std::exp(std::min(candidates(2, a), candidates(2, b)));
+    const double q = std::exp(std::min(candidates(3, a), candidates(3, b)));
+    const bool apart = std::hypot(d[0] / s, d[1] / q) > 1.0;
+    return apart || std::abs(d[2]) > 1.2 || std::abs(d[3]) > 1.2;
+}
+
+Shapes with(const Shapes &shapes, const Eigen::Matrix<double, kNonlinear, 1> &one) {
+    Shapes more(kNonlinear, shapes.cols() + 1);
+    more << shapes, one;
+    return more;
+}
+
+Shapes without(const Shapes &shapes, Eigen::Index j) {
+    Shapes fewer(kNonlinear, shapes.cols() - 1);
+    fewer << shapes.leftCols(j), shapes.rightCols(shapes.cols() - j - 1);
+    return fewer;
+}
+
+// Every center with every pair of widths.
+Shapes dictionary(const MatrixXd &centers) {
+    constexpr Eigen::Index widths = std::size(kWidthsT) * std::size(kWidthsR);
+    Shapes all(kNonlinear, centers.rows() * widths);
+    Eigen::Index k = 0;
+    for (Eigen::Index i = 0; i < centers.rows(); ++i)
+        for (const double s : kWidthsT)
+            for (const double q : kWidthsR) all.col(k++) << centers(i, 0), centers(i, 1), std::log(s), std::log(q);
+    return all;
+}
+
+}  // namespace
+
+VariableProjection::VariableProjection(const Cloud &cloud, double ridge)
+    : t_(cloud.t), r_(cloud.r), root_(cloud.weight.cwiseSqrt()), target_(root_.cwiseProduct(cloud.target)),
+      ridge_(ridge) {
+    if (t_.size() == 0) throw std::invalid_argument("variable projection: no points");
+    wall_ = kWall * std::max(target_.squaredNorm(), std::numeric_limits<double>::min());
+}
+
+// Gaussians times sqrt(weight), one column each.
+MatrixXd VariableProjection::gaussians(const Shapes &shapes) const {
+    MatrixXd g(t_.size(), shapes.cols());
+    for (Eigen::Index j = 0; j < shapes.cols(); ++j) {
+        const double s = std::exp(-shapes(2, j)), q = std::exp(-shapes(3, j));
+        g.col(j) = root_.array() *
+                   (-((t_.array() - shapes(0, j)) * s).square() - ((r_.array() - shapes(1, j)) * q).square()).exp();
+    }
+    return g;
+}
+
+MatrixXd VariableProjection::columns(const Shapes &shapes) const {
+    MatrixXd x(t_.size(), kLinear + shapes.cols());
+    x.col(0) = root_;
+    x.col(1) = root_.cwiseProduct(t_);
+    x.col(2) = root_.cwiseProduct(r_);
+    x.rightCols(shapes.cols()) = gaussians(shapes);
+    return x;
+}
+
+Network VariableProjection::project(const Shapes &shapes) const {
+    const MatrixXd x = columns(shapes);
+    Network n;
+    n.shapes = shapes;
+    n.weights = factorise(normal_matrix(x, ridge_)).solve(x.transpose() * target_);
+    n.misfit = (target_ - x * n.weights).squaredNorm();
+    n.cost = n.misfit + ridge_ * n.weights.tail(shapes.cols()).squaredNorm();
+    for (Eigen::Index j = 0; j < shapes.cols(); ++j)
+        for (int k = 0; k < kNonlinear; ++k) n.cost += wall_ * std::pow(beyond(shapes(k, j), k), 2);
+    if (!std::isfinite(n.cost)) n.cost = std::numeric_limits<double>::infinity();
+    return n;
+}
+
+namespace {
+
+// Derivatives of the network's columns by its nonlinear parameters, times the weights: points x 4 M.
+MatrixXd derivatives(const VectorXd &t, const VectorXd &r, const MatrixXd &columns, const Network &n) {
+    const Eigen::Index m = n.shapes.cols();
+    MatrixXd d(t.size(), kNonlinear * m);
+    for (Eigen::Index j = 0; j < m; ++j) {
+        const double s = std::exp(-n.shapes(2, j)), q = std::exp(-n.shapes(3, j));
+        const ArrayXd a = (t.array() - n.shapes(0, j)) * s, b = (r.array() - n.shapes(1, j)) * q;
+        const ArrayXd g = 2.0 * n.weights[kLinear + j] * columns.col(kLinear + j).array();
+        d.col(kNonlinear * j) = g * a * s;
+        d.col(kNonlinear * j + 1) = g * b * q;
+        d.col(kNonlinear * j + 2) = g * a.square();
+        d.col(kNonlinear * j + 3) = g * b.square();
+    }
+    return d;
+}
+
+}  // namespace
+
+Shapes VariableProjection::gradient(const Network &network) const {
+    const MatrixXd x = columns(network.shapes);
+    const VectorXd residual = target_ - x * network.weights;
+    const VectorXd g = -2.0 * derivatives(t_, r_, x, network).transpose() * residual;
+    Shapes out = Eigen::Map<const Shapes>(g.data(), kNonlinear, network.shapes.cols());
+    for (Eigen::Index j = 0; j < out.cols(); ++j)
+        for (int k = 0; k < kNonlinear; ++k) out(k, j) += 2.0 * wall_ * beyond(network.shapes(k, j), k);
+    return out;
+}
+
+Network VariableProjection::refine(const Network &start, double tolerance, int max_steps) const {
+    Network best = start;
+    const Eigen::Index m = start.shapes.cols();
+    if (m == 0) return best;
+    double damping = 1e-3;
+    for (int step = 0; step < max_steps; ++step) {
+        const MatrixXd x = columns(best.shapes);
+        const MatrixXd d = derivatives(t_, r_, x, best);
+        const VectorXd residual = target_ - x * best.weights;
+        const MatrixXd cross = x.transpose() * d;
+        VectorXd down = d.transpose() * residual;
+        MatrixXd h = MatrixXd::Zero(d.cols(), d.cols());
+        h.selfadjointView<Eigen::Lower>().rankUpdate(d.transpose());
+        const MatrixXd projected = factorise(normal_matrix(x, ridge_)).matrixL().solve(cross);
+        h.selfadjointView<Eigen::Lower>().rankUpdate(projected.transpose(), -1.0);
+        for (Eigen::Index i = 0; i < h.rows(); ++i) {
+            const double b = beyond(best.shapes(i % kNonlinear, i / kNonlinear), static_cast<int>(i % kNonlinear));
+            down[i] -= wall_ * b;
+            if (b != 0.0) h(i, i) += wall_;
+        }
+        h.triangularView<Eigen::StrictlyUpper>() = h.transpose();
+        const VectorXd diagonal = h.diagonal().cwiseMax(1e-12 * h.diagonal().maxCoeff() + 1e-300);
+        double gained = 0.0;
+        while (damping < 1e8) {
+            MatrixXd damped = h;
+            damped.diagonal() += damping * diagonal;
+            const VectorXd move = factorise(damped).solve(down).cwiseMax(-0.7).cwiseMin(0.7);
+            const Shapes shapes = best.shapes + Eigen::Map<const Shapes>(move.data(), kNonlinear, m);
+            Network trial = project(shapes);
+            if (trial.cost < best.cost) {
+                gained = best.cost - trial.cost;
+                best = std::move(trial);
+                damping = std::max(damping * 0.2, 1e-7);
+                break;
+            }
+            damping *= 5.0;
+        }
+        if (gained <= tolerance) break;
+    }
+    return best;
+}
+
+// Gain in the objective that one more Gaussian brings at first order (error reduction of orthogonal least squares).
+// Only the candidates that promise most without orthogonalisation are computed exactly; the others have gain 0.
+VectorXd VariableProjection::gains(const Network &network, const Dictionary &candidates) const {
+    const MatrixXd x = columns(network.shapes);
+    const VectorXd moment = candidates.columns.transpose() * (target_ - x * network.weights);
+    const VectorXd promise = moment.cwiseAbs2().cwiseQuotient(candidates.norms.cwiseMax(1e-300));
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(promise.size()));
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return promise[a] > promise[b]; });
+    order.resize(std::min<std::size_t>(order.size(), kExactGains));
+    const Eigen::LLT<MatrixXd> llt = factorise(normal_matrix(x, ridge_));
+    const MatrixXd orthogonal = llt.matrixL().solve(x.transpose() * candidates.columns(Eigen::all, order));
+    VectorXd gain = VectorXd::Zero(promise.size());
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        const Eigen::Index j = order[k];
+        const double rest = candidates.norms[j] - orthogonal.col(static_cast<Eigen::Index>(k)).squaredNorm();
+        if (rest > 1e-10 * candidates.norms[j]) gain[j] = moment[j] * moment[j] / (rest + ridge_);
+    }
+    return gain;
+}
+
+// The better of two trials: the candidate with the largest gain, and the best one far from it.
+Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance) const {
+    const VectorXd gain = gains(network, candidates);
+    Eigen::Index first = 0;
+    gain.maxCoeff(&first);
+    Eigen::Index second = -1;
+    for (Eigen::Index j = 0; j < gain.size(); ++j)
+        if ((second < 0 || gain[j] > gain[second]) && distant(candidates.shapes, first, j)) second = j;
+    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, kMaxRefineSteps);
+    if (second >= 0) {
+        const Shapes shapes = with(network.shapes, candidates.shapes.col(second));
+        Network other = refine(project(shapes), tolerance, kMaxRefineSteps);
+        if (other.cost < best.cost) best = std::move(other);
+    }
+    return best;
+}
+
+// The best of the two cheapest deletions.
+Network VariableProjection::prune(const Network &network, double tolerance) const {
+    const Eigen::Index m = network.shapes.cols();
+    std::vector<Network> trials;
+    for (Eigen::Index j = 0; j < m; ++j) trials.push_back(project(without(network.shapes, j)));
+    std::stable_sort(trials.begin(), trials.end(), [](const Network &a, const Network &b) { return a.cost < b.cost; });
+    Network best = refine(trials[0], tolerance, kMaxRefineSteps);
+    if (m > 1) {
+        Network other = refine(trials[1], tolerance, kMaxRefineSteps);
+        if (other.cost < best.cost) best = std::move(other);
+    }
+    return best;
+}
+
+std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_size, double enough,
+                                              double tolerance) const {
+    Dictionary candidates{dictionary(centers), {}, {}};
+    candidates.columns = gaussians(candidates.shapes);
+    candidates.norms = candidates.columns.colwise().squaredNorm();
+    std::vector<Network> sizes{project(Shapes(kNonlinear, 0))};
+    while (static_cast<int>(sizes.size()) <= max_size && centers.rows() > 0) {
+        const bool reached = sizes.back().misfit <= enough;
+        Network next = grow(sizes.back(), candidates, tolerance);
+        if (!(next.cost < sizes.back().cost)) break;
+        sizes.push_back(std::move(next));
+        for (std::size_t m = sizes.size() - 1; m > 1; --m) {
+            Network fewer = prune(sizes[m], tolerance);
+            if (!(fewer.cost < sizes[m - 1].cost)) break;
+            sizes[m - 1] = std::move(fewer);
+        }
+        if (reached) break;
+    }
+    return sizes;
+}
+
+}  // namespace gyrotc

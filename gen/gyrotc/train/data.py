@@ -1,0 +1,186 @@
+"""Training samples: what comes in, what is refused, and how it is gathered for the solvers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyrotc.errors import InputError
+
+__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "scaling_of"]
+
+Floats = NDArray[np.float64]
+
+MIN_TEMPERATURE_SPAN_C = 2.0
+_MIN_HALF_RANGE_C = 1.0
+_MIN_HALF_RANGE_C_PER_MIN = 0.05
+_BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingData:
+    """Samples of one axis, all arrays of shape (n,).
+
+    Attributes:
+        temperature_c: Temperature in force during the sample, C.
+        slope_c_per_min: Temperature rate in force, C/min.
+        bias_dph: Mean measured bias over the sample, deg/h.
+        weight: Relative weight, > 0 (for example the number of rows behind it).
+        run: Index of the run that it belongs to.
+        time_s: Start of the sample on the run's clock, s.
+        duration_s: Length of the sample, s.
+    """
+
+    temperature_c: Floats
+    slope_c_per_min: Floats
+    bias_dph: Floats
+    weight: Floats
+    run: NDArray[np.int64]
+    time_s: Floats
+    duration_s: Floats
+
+    def __len__(self) -> int:
+        return len(self.bias_dph)
+
+    def select(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> TrainingData:
+        """The samples of a mask or of indices."""
+        return TrainingData(**{name: getattr(self, name)[mask] for name in self.__slots__})
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """Normalisation of the inputs and the range that they had in training."""
+
+    center_c: float
+    half_range_c: float
+    half_range_c_per_min: float
+    temperature_c: tuple[float, float]
+    slope_c_per_min: tuple[float, float]
+
+    def normalise(self, temperature_c: Floats, slope_c_per_min: Floats) -> tuple[Floats, Floats]:
+        """(z_T, z_r) of inputs in C and C/min, not clamped."""
+        return (
+            temperature_c - self.center_c
+        ) / self.half_range_c, slope_c_per_min / self.half_range_c_per_min
+
+
+@dataclass(frozen=True, slots=True)
+class Bins:
+    """Samples gathered into cells of the normalised input plane; arrays of shape (bins,)."""
+
+    t: Floats
+    r: Floats
+    count: Floats
+    mean: Floats
+    within: float
+    samples: float
+
+
+def cleaned(data: TrainingData) -> TrainingData:
+    """Checks, sorts by run and time, drops exact duplicates; slopes and temperatures keep their values.
+
+    Raises:
+        InputError: Lengths differ, nothing is there, a value is not finite, a weight or duration is not positive.
+    """
+    columns = {name: np.asarray(getattr(data, name)) for name in data.__slots__}
+    if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
+        raise InputError(
+            "training data", "arrays differ in length", "one value of each kind for every sample"
+        )
+    if len(columns["run"]) == 0:
+        raise InputError("training data", "no samples", "at least one valid sample of a training run")
+    for name, column in columns.items():
+        wrong = ~np.isfinite(column.astype(np.float64))
+        if wrong.any():
+            where = f"training data, {name}, sample {int(np.argmax(wrong))}"
+            raise InputError(where, repr(float(column[np.argmax(wrong)])), "a finite number")
+    for name in ("weight", "duration_s"):
+        if columns[name].min() <= 0.0:
+            raise InputError(f"training data, {name}", repr(float(columns[name].min())), "a number above 0")
+    order = np.lexsort(
+        (
+            columns["bias_dph"],
+            columns["slope_c_per_min"],
+            columns["temperature_c"],
+            columns["time_s"],
+            columns["run"],
+        )
+    )
+    first = np.ones(len(order), dtype=bool)
+    same = np.ones(len(order) - 1, dtype=bool)
+    for name in ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph"):
+        same &= np.diff(columns[name][order]) == 0
+    first[1:] = ~same
+    kept = {
+        name: np.ascontiguousarray(c[order][first], dtype=np.int64 if name == "run" else np.float64)
+        for name, c in columns.items()
+    }
+    return TrainingData(**kept)
+
+
+def scaling_of(data: TrainingData) -> Scaling:
+    """Centre and half range of the samples, with the floors of 1 C and 0.05 C/min."""
+    t0, t1 = float(data.temperature_c.min()), float(data.temperature_c.max())
+    r0, r1 = float(data.slope_c_per_min.min()), float(data.slope_c_per_min.max())
+    return Scaling(
+        center_c=0.5 * (t0 + t1),
+        half_range_c=max(0.5 * (t1 - t0), _MIN_HALF_RANGE_C),
+        half_range_c_per_min=max(-r0, r1, _MIN_HALF_RANGE_C_PER_MIN),
+        temperature_c=(t0, t1),
+        slope_c_per_min=(r0, r1),
+    )
+
+
+def average(data: TrainingData, length_s: float) -> TrainingData:
+    """Weighted means over `length_s` within each run (cells of the run's clock). Samples that long stay as they are.
+
+    Args:
+        data: As `cleaned` returns it.
+        length_s: Length of a mean, s.
+
+    Returns:
+        One sample for each cell that holds any: means of inputs and bias, summed weight and duration.
+    """
+    if float(np.median(data.duration_s)) > 0.5 * length_s:
+        return data
+    starts = np.flatnonzero(np.r_[True, np.diff(data.run) != 0])
+    origin = np.repeat(data.time_s[starts], np.diff(np.r_[starts, len(data)]))
+    cell = np.floor((data.time_s - origin) / length_s + 1e-9)
+    edges = np.flatnonzero(np.r_[True, (np.diff(data.run) != 0) | (np.diff(cell) != 0)])
+    weight = np.add.reduceat(data.weight, edges)
+
+    def mean(x: Floats) -> Floats:
+        return np.asarray(np.add.reduceat(x * data.weight, edges) / weight)
+
+    return replace(
+        data,
+        temperature_c=mean(data.temperature_c),
+        slope_c_per_min=mean(data.slope_c_per_min),
+        bias_dph=mean(data.bias_dph),
+        weight=weight,
+        run=data.run[edges],
+        time_s=data.time_s[edges],
+        duration_s=np.add.reduceat(data.duration_s, edges),
+    )
+
+
+def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:
+    """Gathers samples at normalised inputs into cells of 1/50 of each half range.
+
+    `weight` is in units of one sample: the noise variance of a sample of weight w is σ²/w.
+    """
+    cell_t = np.floor(t * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
+    cell_r = np.floor(r * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
+    _, index = np.unique(cell_t * 1_000_003 + cell_r, return_inverse=True)
+    count = np.bincount(index, weight)
+    mean = np.bincount(index, weight * y) / count
+    return Bins(
+        t=np.bincount(index, weight * t) / count,
+        r=np.bincount(index, weight * r) / count,
+        count=count,
+        mean=mean,
+        within=float(np.dot(weight, (y - mean[index]) ** 2)),
+        samples=float(len(y)),
+    )

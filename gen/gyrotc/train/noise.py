@@ -1,0 +1,66 @@
+"""Noise of a residual: robust floor from first differences, and whether it is white."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from gyrotc.train.data import TrainingData, average
+
+__all__ = ["floor_dph", "not_white"]
+
+Floats = NDArray[np.float64]
+_MAD_TO_SIGMA = 1.4826
+_CLIP = 4.5
+_SIGNIFICANCE = 1e-3
+_LAGS = 10
+
+
+def robust_sigma(x: Floats) -> float:
+    """Standard deviation about 0 of the bulk of x: the median sets a limit of 4.5 σ, the RMS of what is within counts."""
+    if len(x) == 0:
+        return 0.0
+    limit = _CLIP * _MAD_TO_SIGMA * float(np.median(np.abs(x)))
+    inside = x[np.abs(x) <= limit]
+    return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
+
+
+def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
+    """Noise of means over `average_s`, deg/h, from first differences of the residual within runs.
+
+    Slow structure that the map leaves does not count; samples longer than `average_s` are taken as they are.
+    """
+    means = average(replace(data, bias_dph=residual), average_s)
+    differences = np.diff(means.bias_dph)[np.diff(means.run) == 0]
+    if len(differences) == 0:
+        return robust_sigma(means.bias_dph)
+    return robust_sigma(differences) / float(np.sqrt(2.0))
+
+
+def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
+    """Why a residual of samples in order of time is not white noise with zero mean in every run; empty if it may be.
+
+    Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box).
+    """
+    n = len(residual)
+    scaled = residual * np.sqrt(weight)
+    sigma = robust_sigma(scaled)
+    if sigma == 0.0 or n < 4 * _LAGS:
+        return "too few samples to test the residual"
+    runs, index = np.unique(run, return_inverse=True)
+    total = np.bincount(index, weight * residual) / np.sqrt(np.bincount(index, weight))
+    if stats.chi2.sf(float(np.sum((total / sigma) ** 2)), len(runs)) < _SIGNIFICANCE:
+        return "run means of the residual scatter more than its noise allows"
+    clipped = np.clip(scaled / sigma, -_CLIP, _CLIP)
+    power = float(np.sum(clipped**2))
+    statistic = 0.0
+    for lag in range(1, _LAGS + 1):
+        pairs = run[lag:] == run[:-lag]
+        rho = float(np.sum(clipped[lag:][pairs] * clipped[:-lag][pairs])) / power
+        statistic += n * (n + 2) * rho**2 / (n - lag)
+    if stats.chi2.sf(statistic, _LAGS) < _SIGNIFICANCE:
+        return "the residual is correlated in time"
+    return ""
