@@ -44,7 +44,7 @@ class TrainingData:
     def __len__(self) -> int:
         return len(self.bias_dph)
 
-    def select(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> TrainingData:
+    def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> TrainingData:
         """The samples of a mask or of indices."""
         return TrainingData(**{name: getattr(self, name)[mask] for name in self.__slots__})
 
@@ -82,9 +82,10 @@ def cleaned(data: TrainingData) -> TrainingData:
     """Checks, sorts by run and time, drops exact duplicates; slopes and temperatures keep their values.
 
     Raises:
-        InputError: Lengths differ, nothing is there, a value is not finite, a weight or duration is not positive.
+        InputError: Lengths differ, nothing is there, a value is not finite, a weight or duration is not
+            positive.
     """
-    columns = {name: np.asarray(getattr(data, name)) for name in data.__slots__}
+    columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
         raise InputError(
             "training data", "arrays differ in length", "one value of each kind for every sample"
@@ -92,7 +93,7 @@ def cleaned(data: TrainingData) -> TrainingData:
     if len(columns["run"]) == 0:
         raise InputError("training data", "no samples", "at least one valid sample of a training run")
     for name, column in columns.items():
-        wrong = ~np.isfinite(column.astype(np.float64))
+        wrong = ~np.isfinite(column)
         if wrong.any():
             where = f"training data, {name}, sample {int(np.argmax(wrong))}"
             raise InputError(where, repr(float(column[np.argmax(wrong)])), "a finite number")
@@ -113,11 +114,8 @@ def cleaned(data: TrainingData) -> TrainingData:
     for name in ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph"):
         same &= np.diff(columns[name][order]) == 0
     first[1:] = ~same
-    kept = {
-        name: np.ascontiguousarray(c[order][first], dtype=np.int64 if name == "run" else np.float64)
-        for name, c in columns.items()
-    }
-    return TrainingData(**kept)
+    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
+    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
 
 
 def scaling_of(data: TrainingData) -> Scaling:
@@ -134,7 +132,7 @@ def scaling_of(data: TrainingData) -> Scaling:
 
 
 def average(data: TrainingData, length_s: float) -> TrainingData:
-    """Weighted means over `length_s` within each run (cells of the run's clock). Samples that long stay as they are.
+    """Weighted means over `length_s` within each run, in cells of the run's clock; samples that long stay.
 
     Args:
         data: As `cleaned` returns it.
@@ -174,7 +172,7 @@ def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:
     cell_t = np.floor(t * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
     cell_r = np.floor(r * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
     _, index = np.unique(cell_t * 1_000_003 + cell_r, return_inverse=True)
-    count = np.bincount(index, weight)
+    count = np.asarray(np.bincount(index, weight), dtype=np.float64)
     mean = np.bincount(index, weight * y) / count
     return Bins(
         t=np.bincount(index, weight * t) / count,

@@ -159,10 +159,11 @@ def _compress(
 
 
 def _envelope_grid(scaling: Scaling) -> tuple[Floats, Floats]:
-    """Points over the whole envelope: in the gaps between the samples the network shall follow the process, too."""
-    t0, t1 = scaling.normalise(np.array(scaling.temperature_c), np.array(scaling.slope_c_per_min))
-    t, r = np.meshgrid(np.linspace(*t0, _GAP_GRID[0]), np.linspace(*t1, _GAP_GRID[1]))
-    return t.ravel(), r.ravel()
+    """Points over the whole envelope: between the samples, too, the network shall follow the process."""
+    t, r = np.meshgrid(
+        np.linspace(*scaling.temperature_c, _GAP_GRID[0]), np.linspace(*scaling.slope_c_per_min, _GAP_GRID[1])
+    )
+    return scaling.normalise(t.ravel(), r.ravel())
 
 
 def evaluate(network: _core.Network, t: Floats, r: Floats) -> Floats:

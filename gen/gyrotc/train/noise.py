@@ -20,7 +20,7 @@ _LAGS = 10
 
 
 def robust_sigma(x: Floats) -> float:
-    """Standard deviation about 0 of the bulk of x: the median sets a limit of 4.5 σ, the RMS of what is within counts."""
+    """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
     if len(x) == 0:
         return 0.0
     limit = _CLIP * _MAD_TO_SIGMA * float(np.median(np.abs(x)))
@@ -41,7 +41,7 @@ def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
 
 
 def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
-    """Why a residual of samples in order of time is not white noise with zero mean in every run; empty if it may be.
+    """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
 
     Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box).
     """

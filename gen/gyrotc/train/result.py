@@ -20,7 +20,7 @@ class Fit:
 
     Attributes:
         method: Name of the method.
-        networks: Networks as in `model.json` (docs/FORMAT.md, section 1): w0, linear, centers, widths, weights, region.
+        networks: As in `model.json` (docs/FORMAT.md): w0, linear, centers, widths, weights, region.
         scaling: Normalisation of the inputs and their range in training.
         findings: What a user should know, each with id, text and evidence.
         curves: For `training.json`: cost by size, evidence, times.
