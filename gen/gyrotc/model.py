@@ -18,6 +18,7 @@ import math
 import os
 import re
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -276,6 +277,22 @@ class Model(_Frozen):
             share = share + weight
         return np.asarray(np.where(share > 0.0, total / np.where(share > 0.0, share, 1.0), self.fallback_dph))
 
+    def zeroed_at(self, temperature_c: float) -> Model:
+        """The same model with the constant shifted so that the map is 0 at this temperature and slope 0."""
+        offset = float(self.map_dph(temperature_c, 0.0))
+        networks = tuple(n.model_copy(update={"w0": n.w0 - offset}) for n in self.networks)
+        return self.model_copy(update={"networks": networks, "fallback_dph": self.fallback_dph - offset})
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Model:
+        """The model of a JSON object.
+
+        Raises:
+            pydantic.ValidationError: A field is missing, unknown or illegal.
+        """
+        # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
+        return cls.model_validate_json(json.dumps(content))
+
     def to_dict(self) -> dict[str, Any]:
         """The JSON object, in the order of docs/FORMAT.md."""
         return self.model_dump(mode="json", by_alias=True)
@@ -332,8 +349,7 @@ def load_model(path: Path) -> Model:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
         raise InputError(f"{path}, field schema", repr(found), repr(SCHEMA))
     try:
-        # JSON has no tuples: validated in JSON mode, so that lists pass and strings for numbers do not.
-        return Model.model_validate_json(json.dumps(raw))
+        return Model.from_dict(raw)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "(whole)"

@@ -1,0 +1,146 @@
+"""The main job: fit, emit, verify, evaluate, report, all into one folder that appears whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+from .dataset import Dataset, load
+from .emit import emit
+from .errors import InputError
+from .evaluate import evaluate
+from .fitting import FitOptions, fit_dataset
+from .model import Model, write_atomically
+from .report import write_report
+from .verify import verify
+
+__all__ = ["Built", "build", "folder_in_place"]
+
+Progress = Callable[[str], None]
+_VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What `build` made: the JSON objects of its stages, and the checks that failed (none: exit 0)."""
+
+    evaluation: dict[str, Any]
+    verification: dict[str, Any]
+    failures: tuple[str, ...]
+
+
+def build(
+    source: Path,
+    out: Path,
+    options: FitOptions,
+    *,
+    axis: str | None = None,
+    numerics: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> Built:
+    """Recordings in, verified C and a report out.
+
+    `out` is replaced as a whole at the end; until then an older one stays as it was.
+
+    Raises:
+        InputError: Bad recordings or arguments; `out` is untouched.
+        CheckFailed: Every arithmetic is refused; `out` is untouched.
+    """
+    say = progress or (lambda _: None)
+    say("reading")
+    dataset = load(source, axis=axis)
+    with folder_in_place(out) as work:
+        fitted = fit_dataset(dataset, options, progress=say)
+        fitted.model.save(work / "model.json")
+        _write(work / "training.json", fitted.training)
+        say("emitting C")
+        emission = emit(fitted.model, work, numerics=numerics)
+        verification = verify(work, progress=lambda name: say(f"verifying {name}"))
+        _write(work / "verify.json", verification)
+        evaluation = evaluate(
+            work,
+            dataset,
+            average_s=options.average_s,
+            trace=work / "trace",
+            training=fitted.training,
+            progress=lambda file: say(f"replaying {file}"),
+        )
+        _write(work / "evaluate.json", evaluation)
+        _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
+        say("drawing the report")
+        write_report(work)
+    return Built(evaluation, verification, tuple(_failures(evaluation, verification)))
+
+
+def _failures(evaluation: dict[str, Any], verification: dict[str, Any]) -> Iterator[str]:
+    for entry in verification["targets"]:
+        if entry["status"] == "fail":
+            reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
+            yield f"{entry['name']} {entry['numeric']}: {reason}"
+    if evaluation["mismatches"]:
+        yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
+
+
+def _write(path: Path, result: dict[str, Any]) -> None:
+    write_atomically(path, json.dumps(result, indent=1, allow_nan=False) + "\n")
+
+
+def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> dict[str, Any]:
+    """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file())
+    return {
+        "schema": "gyrotc.manifest/1",
+        "gyrotc_version": __version__,
+        "serial": model.serial,
+        "axis": model.axis,
+        "model_hash": model.hash,
+        "refused": refused,
+        "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
+        "meta": dict(dataset.meta),
+        "files": {
+            p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files
+        },
+    }
+
+
+@contextmanager
+def folder_in_place(out: Path) -> Iterator[Path]:
+    """A folder under a temporary name beside `out`; renamed into its place when the block ends well.
+
+    Raises:
+        InputError: `out` exists and is not a result of gyrotc (it would be lost).
+    """
+    if out.exists() and not _replaceable(out):
+        raise InputError(
+            str(out), "exists and was not written by gyrotc", "a new or an earlier result folder"
+        )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(prefix=f".{out.name}.part-", dir=out.parent))
+    try:
+        yield work
+        work.chmod(0o755)
+        if out.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{out.name}.old-", dir=out.parent))
+            out.replace(old / "old")
+            work.replace(out)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            work.replace(out)
+    except BaseException:
+        shutil.rmtree(work, ignore_errors=True)
+        raise
+
+
+def _replaceable(out: Path) -> bool:
+    known = {"model.json", "manifest.json", "c"}
+    return out.is_dir() and (not any(out.iterdir()) or any((out / name).exists() for name in known))

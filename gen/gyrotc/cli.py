@@ -1,0 +1,367 @@
+"""The command `gyrotc`: one subcommand for each stage. The only module that prints or exits."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table as RichTable
+
+from . import __version__
+from .errors import CheckFailed, GyrotcError
+from .model import write_atomically
+
+app = typer.Typer(
+    name="gyrotc",
+    help="From thermal-chamber recordings of a gyro to verified C tables that compensate its bias.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+_OUT = Console()
+_ERR = Console(stderr=True)
+
+DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
+JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the machine-readable result here.")]
+AxisOption = Annotated[
+    str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
+]
+AverageOption = Annotated[
+    float, typer.Option("--average-s", min=0.001, help="Averaging of all RMS figures, s.")
+]
+MethodOption = Annotated[str, typer.Option("--method", help="mrbf (default), mrbf_paper, rbf_ols, ...")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.")]
+CentersOption = Annotated[
+    int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")
+]
+RhoOption = Annotated[
+    float | None, typer.Option("--rho", min=0.0, max=1.0, help="The paper's threshold, eq. (16).")
+]
+BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
+NumericOption = Annotated[
+    str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
+]
+DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """A line on stderr that says what is being done; nothing when stderr is no terminal."""
+    if not _ERR.is_terminal:
+        yield lambda _: None
+        return
+    with _ERR.status("") as status:
+        yield status.update
+
+
+def _write_json(path: Path | None, result: dict[str, Any]) -> None:
+    if path is not None:
+        write_atomically(path, json_text(result))
+
+
+def json_text(result: dict[str, Any]) -> str:
+    return json.dumps(result, indent=1, allow_nan=False) + "\n"
+
+
+def _numerics(text: str | None) -> list[str] | None:
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"gyrotc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def simulate(
+    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
+    out: OutOption,
+    seed: SeedOption = 1,
+    row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
+    raw_hz: Annotated[float | None, typer.Option("--raw-hz", help="Rows at this rate instead.")] = None,
+    pulses: Annotated[bool, typer.Option("--pulses", help="Integer pulses instead of a rate.")] = False,
+    format: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "csv",
+    noise: Annotated[
+        str, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
+    ] = "paper",
+) -> None:
+    """Make a data set from the physical simulation, and truth.json beside it.
+
+    Example: gyrotc simulate paper --seed 1 --out demo-data
+    """
+    from .simulate import simulate as run
+
+    with _progress() as say:
+        run(
+            scenario,
+            seed=seed,
+            out=out,
+            row_s=row_s,
+            raw_hz=raw_hz,
+            pulses=pulses,
+            format=format,  # type: ignore[arg-type]
+            noise=noise,  # type: ignore[arg-type]
+            progress=lambda share: say(f"simulating {share:.0%}"),
+        )
+    _OUT.print(f"{out}: data set of scenario {scenario}, seed {seed}", highlight=False, soft_wrap=True)
+
+
+@app.command()
+def fit(
+    dataset: DatasetArg,
+    out: OutOption,
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    json_file: JsonOption = None,
+) -> None:
+    """Train a model: DIR/model.json and DIR/training.json.
+
+    Example: gyrotc fit recordings --out result
+    """
+    from .dataset import load
+    from .fitting import FitOptions, fit_dataset
+
+    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    with _progress() as say:
+        fitted = fit_dataset(load(dataset, axis=axis), options, progress=say)
+    write_atomically(out / "model.json", fitted.model.to_json())
+    write_atomically(out / "training.json", json_text(fitted.training))
+    _write_json(json_file, fitted.training)
+    _OUT.print(
+        f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+@app.command()
+def emit(
+    model: Annotated[Path, typer.Argument(help="A model.json.")],
+    out: OutOption,
+    numeric: NumericOption = None,
+    zero_at: Annotated[
+        float | None,
+        typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Write the C files of a model into DIR/c.
+
+    Example: gyrotc emit result/model.json --out result
+    """
+    from .emit import emit as run
+    from .model import load_model
+
+    loaded = load_model(model)
+    emission = run(loaded, out, numerics=_numerics(numeric), zero_at=zero_at)
+    target = out / "model.json"
+    if target.resolve() != (model / "model.json" if model.is_dir() else model).resolve():
+        loaded.save(target)
+    result = {
+        "schema": "gyrotc.emit/1",
+        "gyrotc_version": __version__,
+        "serial": loaded.serial,
+        "axis": loaded.axis,
+        "id": loaded.id,
+        "tables": [
+            {"numeric": n, "table_bytes": t.table_bytes, "error_bound_dph": t.error_bound_dph}
+            for n, t in emission.tables.items()
+        ],
+        "refused": emission.refused,
+    }
+    _write_json(json_file, result)
+    for name, reason in emission.refused.items():
+        _ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    _OUT.print(
+        f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+@app.command()
+def verify(
+    folder: DirArg,
+    target: Annotated[
+        list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Compile DIR/c for each target and compare bit for bit with the reference.
+
+    Example: gyrotc verify result --target all
+    """
+    from .verify import verify as run
+
+    with _progress() as say:
+        result = run(folder, targets=target or (), progress=say)
+    write_atomically(folder / "verify.json", json_text(result))
+    _write_json(json_file, result)
+    _OUT.print(verify_table(result))
+    if result["failed"]:
+        raise CheckFailed(f"{result['failed']} of {len(result['targets'])} targets failed")
+
+
+@app.command()
+def evaluate(
+    folder: DirArg,
+    dataset: DatasetArg,
+    numeric: NumericOption = None,
+    trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
+    average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Replay recordings through the compiled C code, compare every step, measure.
+
+    Example: gyrotc evaluate result recordings --trace result/trace
+    """
+    from .dataset import load
+    from .evaluate import evaluate as run
+    from .model import load_model
+
+    axis = load_model(folder / "model.json").axis
+    with _progress() as say:
+        result = run(
+            folder, load(dataset, axis=axis), numeric=numeric, average_s=average_s, trace=trace, progress=say
+        )
+    write_atomically(folder / "evaluate.json", json_text(result))
+    _write_json(json_file, result)
+    _OUT.print(evaluation_table(result))
+    if result["mismatches"]:
+        raise CheckFailed(f"{result['mismatches']} steps differ from the reference")
+
+
+@app.command()
+def build(
+    dataset: DatasetArg,
+    out: OutOption = Path("build"),
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    numeric: NumericOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The main job: check, fit, emit, verify, evaluate, report.
+
+    Example: gyrotc build recordings --out result
+    """
+    from .build import build as run
+    from .fitting import FitOptions
+
+    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    with _progress() as say:
+        result = run(dataset, out, options, axis=axis, numerics=_numerics(numeric), progress=say)
+    _write_json(json_file, result.evaluation)
+    _OUT.print(evaluation_table(result.evaluation))
+    _OUT.print(verify_table(result.verification))
+    for finding in result.evaluation["findings"]:
+        _OUT.print(f"finding {finding['id']}: {finding['text']}", highlight=False, soft_wrap=True)
+    _OUT.print(summary(result.evaluation), highlight=False, soft_wrap=True)
+    _OUT.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+    if result.failures:
+        raise CheckFailed("; ".join(result.failures))
+
+
+@app.command()
+def report(folder: DirArg) -> None:
+    """Write DIR/report.html from DIR/*.json and DIR/trace/*.csv.
+
+    Example: gyrotc report result
+    """
+    from .report import write_report
+
+    with _progress() as say:
+        say("drawing")
+        path = write_report(folder)
+    _OUT.print(f"report: {path}", highlight=False, soft_wrap=True)
+
+
+def _e(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}e}"
+
+
+def evaluation_table(result: dict[str, Any]) -> RichTable:
+    table = RichTable(title=f"{result['serial']}: means over {result['average_s']:g} s, deg/h")
+    for name in ("run", "role", "environment", "RMS before", "RMS after", "std after", "samples"):
+        table.add_column(name, justify="right" if name[:3] in ("RMS", "std", "sam") else "left")
+    for run in result["runs"]:
+        table.add_row(
+            run["file"] + (f"@{run['from_s']:g}" if run.get("from_s") is not None else ""),
+            run["role"], run["environment"] or "", _e(run["before"]["rms_dph"]), _e(run["after"]["rms_dph"]),
+            _e(run["after"]["std_dph"]), str(run["samples"]),
+        )  # fmt: skip
+    for role in ("train", "exam", "left_out"):
+        part = result.get(role)
+        if part:
+            table.add_row(
+                "all", role, "", _e(part["before"]["rms_dph"]), _e(part["after"]["rms_dph"]),
+                _e(part["after"]["std_dph"]), str(part["samples"]), style="bold",
+            )  # fmt: skip
+    return table
+
+
+def verify_table(result: dict[str, Any]) -> RichTable:
+    table = RichTable(title="Bit for bit against the reference")
+    for name in ("target", "arithmetic", "status", "vectors", "mismatches"):
+        table.add_column(name, justify="right" if name in ("vectors", "mismatches") else "left")
+    for entry in result["targets"]:
+        note = f" (package {entry['package']})" if entry["status"] == "missing" else ""
+        table.add_row(
+            entry["name"], entry["numeric"], entry["status"] + note, str(entry.get("vectors", "-")),
+            str(entry.get("mismatches", "-")),
+        )  # fmt: skip
+    return table
+
+
+def summary(result: dict[str, Any]) -> str:
+    """One line that says what was gained; the paper's own figure beside it for the paper's scenario."""
+    part = result.get("exam") or result.get("left_out") or result.get("train")
+    if not part or not part["improvement"]:
+        return "no sample to judge by"
+    text = (
+        f"improvement {part['improvement']:.2f} (paper: 9.8-10.4)"
+        if result.get("exam")
+        else (f"improvement on spans left out {part['improvement']:.2f}")
+    )
+    floor, rms = result["noise_floor_dph"], part["after"]["rms_dph"]
+    if floor:
+        text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result['noise_floor_source']})"
+    return f"{text}; {result['model']['centers']} centers, {result['model']['table_bytes']} bytes of table"
+
+
+def main() -> None:
+    """Entry point: errors become one message on stderr and the exit status of interfaces.md."""
+    try:
+        app(standalone_mode=True)
+    except GyrotcError as error:
+        print(f"gyrotc: {error}", file=sys.stderr)
+        sys.exit(error.exit_status)
+    except BrokenPipeError:
+        sys.exit(0)

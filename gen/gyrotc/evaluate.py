@@ -1,0 +1,244 @@
+"""Replay recordings through the compiled C code, compare every step with the reference, measure.
+
+Needs `DIR/model.json` and `DIR/c/` and a data set; `truth.json` beside simulated recordings gives the
+noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where asked.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from . import __version__
+from .dataset import Dataset, Rows, Run
+from .emit import emitted_tables
+from .errors import CheckFailed, GyrotcError
+from .frontend import missed_before, samples_per_block
+from .metrics import Averages, average, pooled, statistics, time_statistics
+from .model import Model, load_model
+from .quantise import Table
+from .reference import replay
+from .simulate.truth import simulated_floor
+from .toolchain import Target, all_targets, compile_c, run_program
+
+__all__ = ["Replayed", "evaluate"]
+
+Progress = Callable[[str], None]
+_HOST = "host-gcc-O2"
+_TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """One run replayed, every row of the file: correction in force (deg/h), status bits, differing steps."""
+
+    bias_dph: NDArray[np.float64]
+    status: NDArray[np.int64]
+    mismatches: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A run, its averaged samples, and which rows were its own."""
+
+    run: Run
+    averages: Averages
+    mismatches: int
+
+
+def evaluate(
+    folder: Path,
+    dataset: Dataset,
+    *,
+    numeric: str | None = None,
+    average_s: float | None = None,
+    trace: Path | None = None,
+    training: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Evaluates `folder` (model and C) on a data set; the JSON object of `gyrotc evaluate`.
+
+    Args:
+        numeric: Arithmetic to run; default the first emitted one.
+        average_s: Averaging of all RMS figures; default the model's.
+        trace: Folder for one CSV per run.
+        training: The object of `training.json`; without an exam run its figures of spans left out count.
+
+    Raises:
+        InputError: No emitted code of the model, or the data lack a channel it needs.
+        CheckFailed: The C code does not compile.
+    """
+    model = load_model(folder / "model.json")
+    tables = emitted_tables(folder / "c", model)
+    chosen = numeric or next(iter(tables))
+    if chosen not in tables:
+        raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
+    table = tables[chosen]
+    window = average_s or model.average_s
+    parts = []
+    with _program(folder / "c", model, table) as program:
+        for run in dataset.runs:
+            if progress:
+                progress(run.file)
+            parts.append(
+                _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
+            )
+    result = _result(model, dataset, table, parts, average_s=window)
+    if result["exam"] is None and training:
+        result["left_out"] = training.get("left_out")
+    return result
+
+
+@contextmanager
+def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Target, Path]]:
+    """The replay program of a table, compiled for the host."""
+    target = all_targets()[_HOST]
+    if target.missing():
+        raise GyrotcError(f"no C compiler: install {target.package}")
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=False
+    )
+    text = environment.get_template("replay.c.j2").render(
+        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    )
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        source = Path(work) / "replay.c"
+        source.write_text(text, encoding="ascii")
+        program = Path(work) / "replay"
+        sources = [source, c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"]
+        compile_c(target, sources, program, include=c_folder)
+        yield target, program
+
+
+def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path]) -> Replayed:
+    """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
+    missed = missed_before(rows.time_s, run.row_period_s)
+    per_block = samples_per_block(model.block_s, run.row_period_s)
+    names = sorted({t.channel for t in model.terms if t.channel})
+    columns = [rows.temperature_c, *(rows.channels[name] for name in names)]
+    channels = table.encode_inputs(np.stack(columns, axis=1))
+    stream = np.concatenate([missed[:, None].astype(np.uint32), channels], axis=1)
+    head = np.array([per_block, len(stream)], dtype=np.uint32)
+    done = run_program(*program, data=head.tobytes() + stream.astype(np.uint32).tobytes())
+    if done.returncode != 0:
+        raise CheckFailed(f"{run.file}: the replay ended with status {done.returncode} {done.stderr[:200]}")
+    got = np.frombuffer(done.stdout, dtype=np.uint32).reshape(-1, 3)
+    want = replay(table, channels, missed=missed, samples_per_block=per_block)
+    same = (
+        (got[:, 0].astype(np.int32) == want.sample_status)
+        & (got[:, 1].astype(np.int32) == want.status)
+        & (got[:, 2] == want.bits)
+    )
+    return Replayed(
+        bias_dph=table.decode_bias(got[:, 2]),
+        status=got[:, 1].astype(np.int64),
+        mismatches=int(np.count_nonzero(~same)),
+    )
+
+
+def _one_run(
+    run: Run,
+    model: Model,
+    table: Table,
+    program: tuple[Target, Path],
+    *,
+    average_s: float,
+    trace: Path | None,
+    all_runs: Sequence[Run],
+) -> _Part:
+    rows = run.rows()
+    replayed = replay_run(rows, run, model, table, program)
+    span = run.in_span(rows.time_s)
+    scored = span & scored_rows(replayed.status)
+    after = rows.rate_dph - replayed.bias_dph
+    averages = average(
+        rows.time_s[span],
+        rows.temperature_c[span],
+        rows.rate_dph[span],
+        after[span],
+        scored=scored[span],
+        average_s=average_s,
+    )
+    if trace is not None:
+        shared = sum(r.file == run.file for r in all_runs) > 1
+        _write_trace(trace, run, rows, replayed, span, shared=shared)
+    return _Part(run, averages, replayed.mismatches)
+
+
+def scored_rows(status: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Rows that count: all but those of blocks whose correction was held or had fallen back."""
+    return (status & (8 | 16)) == 0
+
+
+def _write_trace(
+    folder: Path, run: Run, rows: Rows, replayed: Replayed, span: NDArray[np.bool_], *, shared: bool
+) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    name = Path(run.file).stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+    columns = (
+        rows.time_s[span],
+        rows.temperature_c[span],
+        rows.rate_dph[span],
+        replayed.bias_dph[span],
+        (rows.rate_dph - replayed.bias_dph)[span],
+        replayed.status[span],
+    )
+    table = pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True)))
+    part = folder / f".{name}.part"
+    pacsv.write_csv(table, part, pacsv.WriteOptions(quoting_style="none"))
+    part.replace(folder / name)
+
+
+def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:
+    run, a = part.run, part.averages
+    entry: dict[str, Any] = {"file": run.file, "role": run.role, "environment": run.environment}
+    if run.from_s is not None or run.to_s is not None:
+        entry |= {"from_s": run.from_s, "to_s": run.to_s}
+    return entry | {
+        "samples": int(a.after_dph.size),
+        "before": statistics(a.before_dph),
+        "after": statistics(a.after_dph) | time_statistics(a, average_s),
+    }
+
+
+def _result(
+    model: Model, dataset: Dataset, table: Table, parts: list[_Part], *, average_s: float
+) -> dict[str, Any]:
+    exam = [p.averages for p in parts if p.run.role == "exam"]
+    train = [p.averages for p in parts if p.run.role == "train"]
+    floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
+    source = "simulated" if floor is not None else model.noise_floor_source
+    return {
+        "schema": "gyrotc.evaluate/1",
+        "gyrotc_version": __version__,
+        "serial": model.serial,
+        "axis": model.axis,
+        "numeric": table.numeric,
+        "block_s": model.block_s,
+        "average_s": average_s,
+        "noise_floor_dph": floor if floor is not None else model.noise_floor_dph,
+        "noise_floor_source": source,
+        "mismatches": sum(p.mismatches for p in parts),
+        "runs": [_run_entry(p, average_s) for p in parts],
+        "train": pooled(train) if train else None,
+        "exam": pooled(exam) if exam else None,
+        "findings": [],
+        "model": {
+            "method": model.method,
+            "centers": model.n_centers,
+            "table_bytes": table.table_bytes,
+            "rom_bytes": None,
+            "ram_bytes": None,
+            "sum_abs_weights_dph": model.sum_abs_weights_dph,
+        },
+    }

@@ -1,0 +1,277 @@
+"""From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
+
+Joins the stages dataset → frontend → train → model; computes nothing of its own beyond the choice of
+block, window and limits, and the refits with spans left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import __version__
+from .dataset import Dataset, Run
+from .errors import InputError
+from .frontend import Blocks, run_blocks
+from .metrics import Averages, pooled
+from .model import Model
+from .spans import Span, training_spans
+from .train import Fit, TrainingData, fit, predict
+
+__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "samples_of"]
+
+Progress = Callable[[str], None]
+_SLOPE_WINDOW_S = 100.0
+_HOLD_S = 300.0
+_MIN_RATE_C_PER_MIN = 30.0
+_MAX_STEP_C = 1.0
+_COVERAGE_CELLS = (32, 12)
+_MIN_SAMPLES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """Options of `gyrotc fit`."""
+
+    method: str = "mrbf"
+    seed: int = 0
+    centers: int | None = None
+    rho: float | None = None
+    block_s: float = 10.0
+    average_s: float = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model, the JSON object of `training.json`, and the residuals of spans left out (None: not done)."""
+
+    model: Model
+    training: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class FrontEnd:
+    """What the front end needs besides the data; becomes part of the model."""
+
+    block_s: float
+    slope_blocks: int
+    max_step_c: float
+    max_rate_c_per_min: float
+    stuck_samples: int = 0
+
+    def blocks(self, run: Run) -> Blocks:
+        return run_blocks(
+            run.rows(),
+            run,
+            block_s=self.block_s,
+            slope_blocks=self.slope_blocks,
+            max_step_c=self.max_step_c,
+            max_rate_c_per_min=self.max_rate_c_per_min,
+            stuck_samples=self.stuck_samples,
+        )
+
+
+def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
+    """Block rounded to whole median row periods (at least one), window of about 100 s, limits of belief."""
+    period = float(np.median([run.row_period_s for run in runs]))
+    rounded = max(1, round(block_s / period)) * period
+    return FrontEnd(
+        block_s=rounded,
+        slope_blocks=int(np.clip(round(_SLOPE_WINDOW_S / rounded), 2, 20)),
+        max_step_c=_MAX_STEP_C,
+        max_rate_c_per_min=_MIN_RATE_C_PER_MIN,
+    )
+
+
+def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
+    """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
+    used = blocks.valid & (blocks.rows > 0) & np.isfinite(blocks.rate_dph)
+    n = int(used.sum())
+    return TrainingData(
+        temperature_c=blocks.temperature_c[used].astype(np.float64),
+        slope_c_per_min=blocks.slope_c[used].astype(np.float64) * (60.0 / block_s),
+        bias_dph=blocks.rate_dph[used],
+        weight=blocks.rows[used].astype(np.float64),
+        run=np.full(n, run, dtype=np.int64),
+        time_s=blocks.start_s[used],
+        duration_s=np.full(n, block_s),
+    )
+
+
+def _joined(parts: Sequence[TrainingData]) -> TrainingData:
+    names = TrainingData.__dataclass_fields__
+    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+def _coverage(data: TrainingData, envelope: dict[str, Any]) -> dict[str, Any]:
+    """Cells of the envelope that hold training samples."""
+    seen, *_ = np.histogram2d(
+        data.slope_c_per_min,
+        data.temperature_c,
+        bins=_COVERAGE_CELLS[::-1],
+        range=(_open(envelope["slope_c_per_min"]), _open(envelope["temperature_c"])),
+    )
+    return {"cells": _COVERAGE_CELLS, "rows": ["".join("1" if n else "0" for n in row) for row in seen]}
+
+
+def _open(span: Sequence[float]) -> tuple[float, float]:
+    """A range of some width, as histogram2d needs one."""
+    return (span[0], span[1]) if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
+
+
+def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
+    """Fits a model to the training runs of a data set.
+
+    Raises:
+        InputError: No training run, or too few usable samples.
+    """
+    runs = [run for run in dataset.runs if run.role == "train"]
+    if not runs:
+        raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
+    say = progress or (lambda _: None)
+    front = front_end(runs, options.block_s)
+    parts = []
+    for k, run in enumerate(runs):
+        say(f"reading {run.file}")
+        parts.append(samples_of(front.blocks(run), front.block_s, k))
+    data = _joined(parts)
+    if data.bias_dph.size < _MIN_SAMPLES:
+        raise InputError(
+            str(dataset.folder),
+            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
+            f"at least {_MIN_SAMPLES}",
+        )
+    say("training")
+    fitted = _fit(data, options)
+    spans = training_spans(runs, data)
+    left_out = _left_out(data, spans, options, say) if spans else None
+    model = _model(dataset, runs, data, fitted, front, options)
+    return Fitted(model, _training(dataset, data, fitted, front, options, spans, left_out))
+
+
+def _fit(data: TrainingData, options: FitOptions) -> Fit:
+    return fit(
+        data,
+        method=options.method,
+        seed=options.seed,
+        centers=options.centers,
+        rho=options.rho,
+        average_s=options.average_s,
+    )
+
+
+def _left_out(
+    data: TrainingData, spans: Sequence[Span], options: FitOptions, say: Progress
+) -> list[Averages]:
+    """Each span left out in turn with its guard gap: residuals of a fit that has not seen it."""
+    results = []
+    for k, span in enumerate(spans):
+        say(f"leaving out span {k + 1} of {len(spans)}")
+        inside = span.contains(data.run, data.time_s)
+        near = span.contains(data.run, data.time_s, guard=True)
+        if inside.sum() == 0 or (~near).sum() < _MIN_SAMPLES:
+            continue
+        rest = _fit(data.select(~near), options)
+        held = data.select(inside)
+        residual = held.bias_dph - predict(rest, held.temperature_c, held.slope_c_per_min)
+        results.append(_averaged(held, residual, options.average_s))
+    return results
+
+
+def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: float) -> Averages:
+    """Weighted means over `average_s` of block samples of one run."""
+    number = np.floor((data.time_s - data.time_s[0]) / average_s + 1e-9).astype(np.int64)
+    weight = np.bincount(number, weights=data.weight)
+    full = weight >= 0.5 * np.max(weight)
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.bincount(number, weights=values * data.weight)
+        return np.asarray((total / np.where(weight > 0, weight, 1.0))[full])
+
+    return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
+
+
+def _model(
+    dataset: Dataset,
+    runs: Sequence[Run],
+    data: TrainingData,
+    fitted: Fit,
+    front: FrontEnd,
+    options: FitOptions,
+) -> Model:
+    started = [run.started for run in runs if run.started is not None]
+    meta = dict(dataset.meta)
+    if dataset.description:
+        meta["description"] = dataset.description
+    if started and "calibrated_on" not in meta:
+        meta["calibrated_on"] = max(started).date().isoformat()
+    meta["environments"] = sorted({run.environment for run in runs if run.environment})
+    if dataset.warnings:
+        meta["warnings"] = list(dataset.warnings)
+    return Model.from_dict(
+        {
+            "schema": "gyrotc.model/1",
+            "serial": dataset.serial,
+            "axis": dataset.axis,
+            "method": fitted.method,
+            "block_s": front.block_s,
+            "slope_blocks": front.slope_blocks,
+            "scale": fitted.scale,
+            "envelope": fitted.envelope,
+            "coverage": _coverage(data, fitted.envelope),
+            "networks": [dict(n) for n in fitted.networks],
+            "fallback_dph": fitted.fallback_dph,
+            "hold_blocks": max(1, round(_HOLD_S / front.block_s)),
+            "stuck_samples": front.stuck_samples,
+            "max_step_c": front.max_step_c,
+            "max_rate_c_per_min": front.max_rate_c_per_min,
+            "noise_floor_dph": fitted.noise_floor_dph,
+            "noise_floor_source": "estimated",
+            "average_s": options.average_s,
+            "data": [_data_file(run) for run in dataset.runs],
+            "seed": options.seed,
+            "meta": meta,
+        }
+    )
+
+
+def _data_file(run: Run) -> dict[str, Any]:
+    span = None if run.from_s is None and run.to_s is None else (run.from_s, run.to_s)
+    return {"file": run.file, "sha256": run.sha256, "span": span, "role": run.role}
+
+
+def _training(
+    dataset: Dataset,
+    data: TrainingData,
+    fitted: Fit,
+    front: FrontEnd,
+    options: FitOptions,
+    spans: Sequence[Span],
+    left_out: list[Averages] | None,
+) -> dict[str, Any]:
+    return {
+        "schema": "gyrotc.fit/1",
+        "gyrotc_version": __version__,
+        "serial": dataset.serial,
+        "axis": dataset.axis,
+        "method": fitted.method,
+        "seed": options.seed,
+        "samples": int(data.bias_dph.size),
+        "block_s": front.block_s,
+        "average_s": options.average_s,
+        "centers": fitted.n_centers,
+        "table_bytes": fitted.table_bytes,
+        "sum_abs_weights_dph": fitted.sum_abs_weights,
+        "predicted_rms_ratio": fitted.predicted_rms_ratio,
+        "prediction_withheld": fitted.withheld,
+        "noise_floor_dph": fitted.noise_floor_dph,
+        "spans": [span.to_dict() for span in spans],
+        "left_out": pooled(left_out) if left_out else None,
+        "left_out_spans": [pooled([a]) for a in left_out or []],
+        "findings": [dict(f) for f in fitted.findings],
+        "curves": dict(fitted.curves),
+    }

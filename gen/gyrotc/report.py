@@ -1,0 +1,122 @@
+"""`report.html`: one self-contained page from DIR/*.json and DIR/trace/*.csv. Computes nothing new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import pyarrow.csv as pacsv
+
+from .errors import InputError
+from .metrics import Averages, average
+from .model import Model, load_model, write_atomically
+from .plots import bias_over_time, curve_by_size, map_with_centers
+
+__all__ = ["write_report"]
+
+
+def write_report(folder: Path) -> Path:
+    """Writes `folder/report.html` from what stands in the folder; returns its path.
+
+    Raises:
+        InputError: `model.json` or `evaluate.json` is missing or broken.
+    """
+    model = load_model(folder / "model.json")
+    evaluation = _read(folder / "evaluate.json")
+    training = _read(folder / "training.json", optional=True)
+    verification = _read(folder / "verify.json", optional=True)
+    manifest = _read(folder / "manifest.json", optional=True)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
+    )
+    environment.filters.update(sci=_sci, number=_number)
+    text = environment.get_template("report.html.j2").render(
+        model=model,
+        evaluation=evaluation,
+        training=training,
+        verification=verification,
+        manifest=manifest,
+        judged=_judged(evaluation),
+        pictures=_pictures(folder, model, evaluation, training),
+    )
+    path = folder / "report.html"
+    write_atomically(path, text)
+    return path
+
+
+def _read(path: Path, *, optional: bool = False) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        if optional:
+            return {}
+        raise InputError(str(path), "is missing", "the result of gyrotc build or evaluate") from None
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), f"cannot be read ({error})", "a JSON result") from error
+    if not isinstance(content, dict):
+        raise InputError(str(path), "is not a JSON object", "a JSON result")
+    return content
+
+
+def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
+    """What the model is judged by: exam runs, else spans left out, else the training runs themselves."""
+    for key, text in (
+        ("exam", "exam runs, never seen in training"),
+        ("left_out", "spans left out of training in turn"),
+        ("train", "the training runs themselves"),
+    ):
+        if evaluation.get(key):
+            return text, evaluation[key]
+    return "nothing", None
+
+
+def _pictures(
+    folder: Path, model: Model, evaluation: dict[str, Any], training: dict[str, Any]
+) -> dict[str, str | None]:
+    runs = []
+    for run in evaluation["runs"]:
+        averages = _trace(folder / "trace", run, float(evaluation["average_s"]))
+        if averages is not None and averages.time_s.size:
+            runs.append((run.get("environment") or run["file"], run["role"], averages))
+    return {
+        "bias": bias_over_time(runs) if runs else None,
+        "map": map_with_centers(model),
+        "curve": curve_by_size(training) if training else None,
+    }
+
+
+def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | None:
+    stem = Path(run["file"]).stem
+    names = (f"{stem}@{run.get('from_s') or 0.0:g}.csv", f"{stem}.csv")
+    path = next((folder / n for n in names if (folder / n).is_file()), None)
+    if path is None:
+        return None
+    table = pacsv.read_csv(path)
+    column = {name: table[name].to_numpy().astype(np.float64) for name in table.column_names}
+    return average(
+        column["time_s"],
+        column["temperature_c"],
+        column["rate_dph"],
+        column["compensated_dph"],
+        scored=np.ones(table.num_rows, dtype=bool),
+        average_s=average_s,
+    )
+
+
+def _sci(value: float | None, digits: int = 2) -> str:
+    """A number with its power of ten, as the trade writes it: 7.00e-04 → 7.00·10⁻⁴."""
+    if value is None:
+        return "–"
+    if value == 0.0:
+        return "0"
+    if 0.01 <= abs(value) < 1e5:
+        return f"{value:.{digits + 1}g}" if abs(value) < 1e3 else f"{value:,.0f}"
+    mantissa, exponent = f"{value:.{digits}e}".split("e")
+    return f"{mantissa}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
