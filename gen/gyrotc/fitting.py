@@ -27,7 +27,7 @@ __all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "samples_of"]
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0
 _HOLD_S = 300.0
-_MIN_RATE_C_PER_MIN = 30.0
+_MAX_RATE_C_PER_MIN = 30.0
 _MAX_STEP_C = 1.0
 _COVERAGE_CELLS = (32, 12)
 _MIN_SAMPLES = 8
@@ -61,6 +61,7 @@ class FrontEnd:
     slope_blocks: int
     max_step_c: float
     max_rate_c_per_min: float
+    hold_blocks: int
     stuck_samples: int = 0
 
     def blocks(self, run: Run) -> Blocks:
@@ -72,6 +73,7 @@ class FrontEnd:
             max_step_c=self.max_step_c,
             max_rate_c_per_min=self.max_rate_c_per_min,
             stuck_samples=self.stuck_samples,
+            hold_blocks=self.hold_blocks,
         )
 
 
@@ -83,13 +85,14 @@ def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
         block_s=rounded,
         slope_blocks=int(np.clip(round(_SLOPE_WINDOW_S / rounded), 2, 20)),
         max_step_c=_MAX_STEP_C,
-        max_rate_c_per_min=_MIN_RATE_C_PER_MIN,
+        max_rate_c_per_min=_MAX_RATE_C_PER_MIN,
+        hold_blocks=max(1, round(_HOLD_S / rounded)),
     )
 
 
 def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
-    used = blocks.valid & (blocks.rows > 0) & np.isfinite(blocks.rate_dph)
+    used = blocks.valid & (blocks.rows > 0) & np.isfinite(blocks.temperature_c)
     n = int(used.sum())
     return TrainingData(
         temperature_c=blocks.temperature_c[used].astype(np.float64),
@@ -225,7 +228,7 @@ def _model(
             "coverage": _coverage(data, fitted.envelope),
             "networks": [dict(n) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
-            "hold_blocks": max(1, round(_HOLD_S / front.block_s)),
+            "hold_blocks": front.hold_blocks,
             "stuck_samples": front.stuck_samples,
             "max_step_c": front.max_step_c,
             "max_rate_c_per_min": front.max_rate_c_per_min,

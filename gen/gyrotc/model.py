@@ -225,12 +225,13 @@ class Model(_Frozen):
         return max(math.fsum(abs(w) for w in n.weights) for n in self.networks)
 
     def normalise(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64]:
-        """Inputs as the network sees them, shape (n, 2), clamped to the envelope."""
+        """Inputs as the network sees them, shape (..., 2), clamped to the envelope."""
         e = self.envelope
         t = np.clip(np.asarray(temperature_c, dtype=np.float64), *e.temperature_c)
         r = np.clip(np.asarray(slope_c_per_min, dtype=np.float64), *e.slope_c_per_min)
         center, half = self.scale.temperature_c
-        return np.stack([(t - center) / half, r / self.scale.slope_c_per_min], axis=-1)
+        z = np.broadcast_arrays((t - center) / half, r / self.scale.slope_c_per_min)
+        return np.stack(z, axis=-1)
 
     def map_dph(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64]:
         """Static map without terms in float64, deg/h; inputs C and C/min, clamped to the envelope."""

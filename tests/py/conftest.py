@@ -1,0 +1,81 @@
+"""Fixtures shared by the tests: a small model, a simulated data set, a built result."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+GOLDEN = Path(__file__).resolve().parent / "golden"
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """The installed command, as a user types it."""
+    program = Path(sys.executable).with_name("gyrotc")
+    environment = os.environ | {"COLUMNS": "200", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(
+        [str(program), *map(str, args)], capture_output=True, text=True, check=False, cwd=cwd, env=environment
+    )
+
+
+@pytest.fixture(scope="session")
+def gyrotc() -> Command:
+    return run_gyrotc
+
+
+@pytest.fixture
+def model_dict() -> dict[str, Any]:
+    """A small hand-made model: two centers over 100 C and ±1 C/min."""
+    return {
+        "schema": "gyrotc.model/1",
+        "serial": "RLG-0042",
+        "axis": None,
+        "method": "mrbf",
+        "block_s": 10.0,
+        "slope_blocks": 10,
+        "scale": {"temperature_c": [10.0, 50.0], "slope_c_per_min": 1.0},
+        "envelope": {"temperature_c": [-40.0, 60.0], "slope_c_per_min": [-1.0, 1.0]},
+        "coverage": {"cells": [4, 2], "rows": ["1111", "1011"]},
+        "networks": [
+            {
+                "w0": 0.007,
+                "linear": [0.0003, -0.0001],
+                "centers": [[-20.0, 0.2], [30.0, -0.4]],
+                "widths": [[0.5, 1.0], [0.8, None]],
+                "weights": [0.001, -0.0005],
+                "region": None,
+            }
+        ],
+        "terms": [],
+        "fallback_dph": 0.007,
+        "hold_blocks": 30,
+        "stuck_samples": 0,
+        "max_step_c": 1.0,
+        "max_rate_c_per_min": 30.0,
+        "noise_floor_dph": 0.0007,
+        "noise_floor_source": "estimated",
+        "average_s": 100.0,
+        "uncertainty_dph": None,
+        "data": [{"file": "run-01.csv", "sha256": "0" * 64, "span": None, "role": "train"}],
+        "seed": 0,
+        "meta": {"calibrated_on": "2026-03-01", "operator": "M. Curie"},
+    }
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `data` (the simulated paper scenario) and `result` (what build made of it)."""
+    folder = tmp_path_factory.mktemp("demo")
+    made = run_gyrotc("simulate", "paper", "--seed", "1", "--out", folder / "data")
+    assert made.returncode == 0, made.stderr
+    built = run_gyrotc("build", folder / "data", "--out", folder / "result")
+    assert built.returncode == 0, built.stderr
+    return folder

@@ -1,0 +1,57 @@
+"""Data flows one way: a module imports from stages to its left, never from its right."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
+
+# From left to right. A stage is a module or a package of gyrotc.
+ORDER = (
+    "errors _core terms dataset spans noisefloor simulate frontend metrics model table train estimator fitting quantise reference "
+    "amalgamate vectors emit toolchain verify findings evaluate compare check diagnose plots report build cli"
+).split()
+
+
+def _stage(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def _imported(path: Path) -> set[str]:
+    """Stages that a module imports, relative or absolute, at any depth of its functions."""
+    found: set[str] = set()
+    depth = len(path.relative_to(PACKAGE).parts)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            if node.level == depth:
+                names = [module.split(".")[0]] if module else [alias.name for alias in node.names]
+            elif node.level == 0 and module.split(".")[0] == "gyrotc":
+                names = module.split(".")[1:2] or [alias.name for alias in node.names]
+            else:
+                names = []
+            found.update(names)
+        elif isinstance(node, ast.Import):
+            found.update(a.name.split(".")[1] for a in node.names if a.name.startswith("gyrotc."))
+    return {name for name in found if not name.startswith("__")}
+
+
+MODULES = sorted(p for p in PACKAGE.rglob("*.py") if p.name != "__init__.py" or p.parent != PACKAGE)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_point_left(path: Path) -> None:
+    stage = _stage(path)
+    assert stage in ORDER, f"{stage} has no place in the house; give it one in ORDER"
+    for other in _imported(path) - {stage}:
+        assert other in ORDER, f"{path.name} imports {other}, which has no place in ORDER"
+        assert ORDER.index(other) < ORDER.index(stage), f"{stage} must not import {other}"
+
+
+def test_the_reader_of_imports_sees_a_wrong_one(tmp_path: Path) -> None:
+    """The check itself can fail: cli is seen as an import of any module that names it."""
+    assert "model" in _imported(PACKAGE / "emit.py")
+    assert "errors" in _imported(PACKAGE / "model.py")

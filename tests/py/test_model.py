@@ -1,0 +1,156 @@
+"""The model file: what is written reads back equal, and whatever was tampered with is refused by name."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gyrotc.errors import InputError
+from gyrotc.model import Model, load_model, table_id
+
+
+def _set(content: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    changed = copy.deepcopy(content)
+    *parents, last = path.split(".")
+    node: Any = changed
+    for part in parents:
+        node = node[int(part)] if part.isdigit() else node[part]
+    if isinstance(node, list):
+        node[int(last)] = value
+    else:
+        node[last] = value
+    return changed
+
+
+def test_a_saved_model_reads_back_equal_with_the_same_hash(
+    model_dict: dict[str, Any], tmp_path: Path
+) -> None:
+    model = Model.from_dict(model_dict)
+    model.save(tmp_path / "model.json")
+    again = load_model(tmp_path / "model.json")
+    assert again == model
+    assert again.hash == model.hash
+    assert (tmp_path / "model.json").read_text().endswith("}\n")
+    assert list(json.loads(model.to_json())) == list(model_dict)
+
+
+def test_map_is_the_paper_s_equation(model_dict: dict[str, Any]) -> None:
+    """Eq. (1), (2) written out with math.exp for one point."""
+    z_t, z_r = (5.0 - 10.0) / 50.0, 0.3
+    expected = 0.007 + 0.0003 * z_t - 0.0001 * z_r
+    expected += 0.001 * math.exp(-(((z_t - (-30.0 / 50.0)) / 0.5) ** 2) - ((z_r - 0.2) / 1.0) ** 2)
+    expected += -0.0005 * math.exp(-(((z_t - 20.0 / 50.0) / 0.8) ** 2))
+    assert Model.from_dict(model_dict).map_dph(5.0, 0.3) == pytest.approx(expected, rel=1e-14)
+
+
+def test_inputs_outside_the_envelope_give_the_value_at_its_edge(model_dict: dict[str, Any]) -> None:
+    model = Model.from_dict(model_dict)
+    assert model.map_dph(500.0, -9.0) == model.map_dph(60.0, -1.0)
+
+
+def test_zeroed_at_gives_zero_there_and_shifts_nothing_else(model_dict: dict[str, Any]) -> None:
+    model = Model.from_dict(model_dict)
+    zeroed = model.zeroed_at(20.0)
+    assert abs(float(zeroed.map_dph(20.0, 0.0))) < 1e-17
+    t = np.linspace(-40, 60, 7)
+    shift = zeroed.map_dph(t, 0.1) - model.map_dph(t, 0.1)
+    assert np.ptp(shift) < 1e-16
+    assert zeroed.fallback_dph - model.fallback_dph == pytest.approx(shift[0])
+
+
+def test_a_bank_is_continuous_over_the_overlap_of_its_regions(model_dict: dict[str, Any]) -> None:
+    low, high = copy.deepcopy(model_dict["networks"][0]), copy.deepcopy(model_dict["networks"][0])
+    low["region"] = {"temperature_c": [-40.0, 15.0], "slope_c_per_min": [-1.0, 1.0]}
+    high |= {"w0": 0.009, "region": {"temperature_c": [5.0, 60.0], "slope_c_per_min": [-1.0, 1.0]}}
+    model = Model.from_dict(model_dict | {"networks": [low, high]})
+    t = np.linspace(-40, 60, 20001)
+    assert np.abs(np.diff(model.map_dph(t, np.zeros_like(t)))).max() < 2e-5
+    assert model.map_dph(60.0, 0.0) - model.map_dph(-40.0, 0.0) > 0.001
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("schema", "gyrotc.model/2"),
+        ("serial", "../../etc/passwd"),
+        ("serial", "x" * 65),
+        ("serial", "int main(void){}"),
+        ("axis", "w"),
+        ("block_s", 0.0),
+        ("block_s", "10"),
+        ("slope_blocks", 21),
+        ("slope_blocks", 2.5),
+        ("envelope.temperature_c", [60.0, -40.0]),
+        ("envelope.temperature_c", [-40.0]),
+        ("networks", []),
+        ("networks.0.w0", "0.007"),
+        ("networks.0.w0", True),
+        ("networks.0.weights", [0.001]),
+        ("networks.0.centers.0", [1e6, 0.0]),
+        ("networks.0.widths.0", [0.0, 1.0]),
+        ("coverage.rows", ["1111"]),
+        ("coverage.rows", ["1111", "10x1"]),
+        ("terms", [{"id": "cavity_lag", "parameters": {"tau_s": -1.0}}]),
+        ("terms", [{"id": "cavity_lag", "parameters": {"width_c": 1.0}}]),
+        ("terms", [{"id": "made_up", "parameters": {}}]),
+        ("data.0.sha256", "abc"),
+        ("unknown_field", 1),
+    ],
+)
+def test_tampered_fields_are_refused_by_name(
+    model_dict: dict[str, Any], tmp_path: Path, path: str, value: Any
+) -> None:
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps(_set(model_dict, path, value)))
+    with pytest.raises(InputError) as caught:
+        load_model(file)
+    assert str(file) in str(caught.value)
+    assert path.split(".")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "not json", "[1, 2]", "{", '{"schema": "gyrotc.model/1", "serial": NaN}', "\x00\x01", "[" * 100000],
+    ids=["empty", "text", "list", "cut", "nan", "binary", "deep"],
+)
+def test_files_that_are_no_model_are_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "model.json"
+    file.write_text(text)
+    with pytest.raises(InputError):
+        load_model(file)
+
+
+def test_infinite_numbers_and_absurd_sizes_are_refused(model_dict: dict[str, Any], tmp_path: Path) -> None:
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps(model_dict).replace("0.007", "1e999", 1))
+    with pytest.raises(InputError):
+        load_model(file)
+    network = model_dict["networks"][0]
+    network |= {"centers": [[0.0, 0.0]] * 513, "widths": [[1.0, 1.0]] * 513, "weights": [0.0] * 513}
+    file.write_text(json.dumps(model_dict))
+    with pytest.raises(InputError, match="networks"):
+        load_model(file)
+    file.write_text(" " * (4 * 2**20 + 1))
+    with pytest.raises(InputError, match="4 MiB"):
+        load_model(file)
+
+
+def test_ids_follow_the_serial_and_never_collide_where_information_is_lost() -> None:
+    assert table_id("RLG-0042", None) == "rlg_0042"
+    assert table_id("RLG-0042", "x") == "rlg_0042_x"
+    assert table_id("a.b", None) != table_id("a_b", None)
+    assert len(table_id("s" * 64, "z")) == 27
+    assert table_id("s" * 64, "z") != table_id("s" * 63, "z")
+
+
+def test_symbols_keep_c_names_within_31_characters(model_dict: dict[str, Any]) -> None:
+    for serial in ("A", "RLG-0042", "s" * 23, "s" * 24, "s" * 64, "a.b.c"):
+        for axis in (None, "x"):
+            model = Model.from_dict(model_dict | {"serial": serial, "axis": axis})
+            assert len(f"gtc_{model.symbol}_f32") <= 31
