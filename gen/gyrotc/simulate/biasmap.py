@@ -1,10 +1,12 @@
 """The static bias of the simulated cavity: a smooth function of its temperature and of how fast that changes.
 
-    bias(T, r) = low + (high − low) · normalised[ s(T) + r/√(1 + (r/r0)²) · (a + b atan((T − T1)/w1)) + c (√(1 + (r/r1)²) − 1) ]
+    shape(T, r) = s(T) + r/√(1 + (r/r0)²) · (a + b atan((T − T1)/w1)) + c (√(1 + (r/r1)²) − 1)
+    bias = offset + scale · shape
 
-s(T) is a cubic spline through random knots plus a rational well (losses around a working point) plus an arctangent
-(alignment that goes over from one state to another). The second part is a gas flow that saturates and whose effect
-depends on T; the third is even in r. None of it is a Gaussian: the map shares no family with the model that is fitted.
+s(T) is a cubic spline through random knots plus a rational well (losses around a working point) plus an
+arctangent (alignment that goes over from one state to another). The second part is a gas flow that saturates
+and whose effect depends on T; the third is even in r. None of it is a Gaussian: the map shares no family of
+functions with the model that is fitted.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ R_LIMIT_C_PER_MIN = 2.5
 
 @dataclass(frozen=True, slots=True)
 class BiasMap:
-    """One gyro's static map; `parameters` hold everything that was drawn (they go into truth.json)."""
+    """One gyro's static map; `parameters` are those of the shape."""
 
     parameters: dict[str, Any]
     scale_dph: float
@@ -37,6 +39,10 @@ class BiasMap:
         """Bias in deg/h at cavity temperatures (C) and their rates of change (C/min), broadcast."""
         shape = _shape(self.parameters, self._spline, cavity_c, slope_c_per_min)
         return np.asarray(self.offset_dph + self.scale_dph * shape)
+
+    def described(self) -> dict[str, Any]:
+        """Everything that was drawn, for truth.json."""
+        return {"offset_dph": self.offset_dph, "scale_dph": self.scale_dph, **self.parameters}
 
 
 def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: Array, slope: Array) -> Array:
@@ -50,7 +56,7 @@ def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: Array, slope: Array
 
 
 def draw(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
-    """One gyro: a map whose values over the operating range lie in `range_dph` (deg/h) and reach both ends."""
+    """One gyro: a map whose values over the operating range reach from end to end of `range_dph`, deg/h."""
     knots_c = np.linspace(*T_RANGE_C, 6)
     values = rng.normal(0.0, 0.35, len(knots_c))
     sign = rng.choice([-1.0, 1.0])

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from datetime import datetime, timedelta
+import math
+from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from . import biasmap
-from . import scenario as scenarios
-from .biasmap import BiasMap
+from .biasmap import BiasMap, draw
+from .instrument import Record, record
 from .noise import CELL_S
-from .recording import Record, Rows, record, rows
-from .scenario import NoiseLevels, Scenario
+from .recording import RowLength, rows
+from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
 from .truth import SCHEMA
 from .write import Format, RunFile, complete_folder, dataset_toml
 
-__all__ = ["NOISE", "simulate"]
+__all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate"]
+
+Noise = Literal["paper", "class"]
 
 NOISE: dict[str, NoiseLevels] = {
-    # 7e-4 deg/h of 100-s means, as Ding et al. 2014 report after compensation
+    # 7e-4 deg/h of 100-s means, what Ding et al. 2014 report after compensation
     "paper": NoiseLevels(arw_deg_per_sqrt_h=7e-4 * (100.0 / 3600.0) ** 0.5),
     # a dithered unit of the 0.008 deg/h class: 0.012 deg/h of 100-s means
     "class": NoiseLevels(
@@ -34,7 +37,14 @@ NOISE: dict[str, NoiseLevels] = {
         quantum_arcsec=0.5,
     ),
 }
-_AVERAGES_S = (10.0, 50.0, 100.0, 200.0)
+"""Levels that stand where a scenario gives none."""
+
+_DECLARED = (
+    "arw_deg_per_sqrt_h",
+    "bias_instability_dph",
+    "rate_random_walk_dph_per_sqrt_h",
+    "quantum_arcsec",
+)
 _DEFAULT_PULSE_ARCSEC = 0.01
 _PULSES_PER_QUANTUM = 16
 
@@ -48,12 +58,12 @@ def simulate(
     raw_hz: float | None = None,
     pulses: bool = False,
     format: Format = "csv",
-    noise: Literal["paper", "class"] = "paper",
+    noise: Noise = "paper",
     progress: Callable[[float], None] | None = None,
 ) -> None:
     """Simulates a campaign and writes it as a data set with its truth beside it.
 
-    The same scenario, seed and options give the same files; other row lengths show the same physics and noise.
+    Scenario, seed and options fix every byte of the files; other row lengths show the same physics and noise.
 
     Args:
         scenario: Name of a scenario that comes with gyrotc, or a TOML file.
@@ -63,55 +73,62 @@ def simulate(
         raw_hz: Rows a second instead of `row_s`.
         pulses: Integer pulses instead of rates.
         format: Of the run files.
-        noise: Levels: the paper's, or typical ones of the class; a scenario's own levels replace both.
+        noise: Levels where the scenario gives none: the paper's, or typical ones of the class.
         progress: Called with the share that is done, 0 ... 1.
 
     Raises:
         InputError: scenario, seed, row length or folder cannot be.
     """
-    name, plan = scenarios.read(scenario)
-    if seed < 0:
-        raise InputError("seed", str(seed), "0 or more")
-    length = _rows(row_s, raw_hz)
-    levels = plan.noise or NOISE[noise]
-    seeds = np.random.SeedSequence(seed)
-    gyro_seeds, run_seeds = seeds.spawn(2)
-    bias_map = biasmap.draw(np.random.default_rng(gyro_seeds), plan.gyro.bias_dph)
-    weight = _pulse_weight(levels) if pulses else None
-    planned = _planned(plan)
-    tell = progress or (lambda share: None)
-    entries: list[dict[str, Any]] = []
-    truths: list[dict[str, Any]] = []
+    name, plan = read(scenario)
+    length = RowLength.of(row_s, raw_hz)
+    plan = _with_noise(plan, noise)
+    weight = _pulse_weight(plan.noise) if pulses else None
+    runs = _planned(plan)
+    report = progress or (lambda share: None)
+    truths = []
     with complete_folder(Path(out)) as folder:
         (folder / "truth").mkdir()
-        for index, (entry, child) in enumerate(zip(planned, run_seeds.spawn(len(planned)), strict=True)):
-            made = record(plan, plan.profile[entry["environment"]], bias_map, levels, child)
-            entry["file"] = f"run-{index + 1:02d}.{format}"
-            entry["power_on_s"] = made.power_on_s
-            file = RunFile(folder / entry["file"], format, length.row_s, weight)
-            total = len(made.reading_c) * length.per_cell / length.cells
-            for chunk in rows(made, length):
-                file.write(chunk)
-                tell((index + (chunk.time_s[-1] / length.row_s + 1) / total) / len(planned))
-            file.close()
-            entries.append({"file": entry.pop("file"), **entry})
-            truths.append(_truth_of_run(folder, entries[-1]["file"], made, length, weight))
-        _write_texts(folder, name, plan, seed, levels, weight, entries, truths, bias_map)
-    tell(1.0)
+        for index, made in enumerate(campaign(plan, seed)):
+            file = f"run-{index + 1:02d}.{format}"
+            runs[index] = {"file": file, **runs[index], "power_on_s": made.power_on_s}
+            for share in _write_run(folder / file, format, made, length, weight):
+                report((index + share) / len(runs))
+            truths.append(_truth_of_run(folder, file, made, length, weight))
+        _write_texts(folder, name, plan, seed, weight, runs, truths)
+    report(1.0)
 
 
-def _rows(row_s: float, raw_hz: float | None) -> Rows:
-    where, expected = (
-        "row length",
-        "a whole number of seconds, or a whole number of rows a second up to 10000",
-    )
-    per_cell = (raw_hz if raw_hz is not None else 1.0 / row_s if row_s > 0.0 else 0.0) * CELL_S
-    if per_cell > 0.0:
-        cells = 1.0 / per_cell
-        for value, made in ((cells, Rows(round(cells), 1)), (per_cell, Rows(1, round(per_cell)))):
-            if 1 <= round(value) <= 10_000 and abs(value - round(value)) < 1e-9 * value:
-                return made
-    raise InputError(where, f"{raw_hz} Hz" if raw_hz is not None else f"{row_s} s", expected)
+def campaign(plan: Scenario, seed: int) -> Iterator[Record]:
+    """The runs of a scenario, one after the other.
+
+    Raises:
+        InputError: the seed is negative.
+    """
+    bias_map = gyro_map(plan, seed)
+    runs = _planned(plan)
+    first = min(run["started"] for run in runs)
+    for run, child in zip(runs, _seeds(seed)[1].spawn(len(runs)), strict=True):
+        day = (run["started"] - first) / timedelta(days=1)
+        yield record(plan, plan.profile[run["environment"]], bias_map, day, child)
+
+
+def gyro_map(plan: Scenario, seed: int) -> BiasMap:
+    """The static map of the gyro that a seed draws; the same in every scenario of the same bias range."""
+    return draw(np.random.default_rng(_seeds(seed)[0]), plan.gyro.bias_dph)
+
+
+def _seeds(seed: int) -> list[np.random.SeedSequence]:
+    if seed < 0:
+        raise InputError("seed", str(seed), "0 or more")
+    return np.random.SeedSequence(seed).spawn(2)
+
+
+def _with_noise(plan: Scenario, noise: Noise) -> Scenario:
+    """The scenario with the chosen levels wherever it does not give its own."""
+    if noise not in NOISE:
+        raise InputError("noise", str(noise), ", ".join(NOISE))
+    own = {key: getattr(plan.noise, key) for key in plan.noise.model_fields_set}
+    return plan.model_copy(update={"noise": NOISE[noise].model_copy(update=own)})
 
 
 def _pulse_weight(levels: NoiseLevels) -> float:
@@ -120,35 +137,45 @@ def _pulse_weight(levels: NoiseLevels) -> float:
 
 
 def _planned(plan: Scenario) -> list[dict[str, Any]]:
-    runs: list[dict[str, Any]] = []
-    for run_set in plan.set:
-        for index, name in enumerate(run_set.profiles):
-            started: datetime = run_set.started + timedelta(hours=index * run_set.every_h)
-            runs.append({"role": run_set.role, "environment": name, "started": started.isoformat()})
-    return runs
+    return [
+        {
+            "role": run_set.role,
+            "environment": name,
+            "started": run_set.started + timedelta(hours=index * run_set.every_h),
+        }
+        for run_set in plan.set
+        for index, name in enumerate(run_set.profiles)
+    ]
+
+
+def _write_run(
+    path: Path, format: Format, made: Record, length: RowLength, weight: float | None
+) -> Iterator[float]:
+    """Writes the rows of a run; yields the share that is done."""
+    file = RunFile(path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=list(made.channels))
+    total_s = CELL_S * len(made.reading_c)
+    for chunk in rows(made, length):
+        file.write(chunk)
+        yield float(chunk.time_s[-1] + length.row_s) / total_s
+    file.close()
 
 
 def _truth_of_run(
-    folder: Path, file: str, made: Record, length: Rows, weight: float | None
+    folder: Path, file: str, made: Record, length: RowLength, weight: float | None
 ) -> dict[str, Any]:
-    """Writes the noise of a run (mean of each row, or of each second where rows are shorter) and describes it."""
-    step = length.cells
-    edges = made.angle_arcsec[::step]
+    """Writes the noise of a run (mean of each row, or of each second where rows are shorter)."""
+    step_s = length.cells * CELL_S
+    edges = made.angle_arcsec[:: length.cells]
     if weight is not None:
         edges = weight * np.floor(edges / weight)
-    step_s = step * CELL_S
-    noise = (np.diff(edges) - np.diff(made.true_arcsec[::step])) / step_s
+    noise = (np.diff(edges) - np.diff(made.true_arcsec[:: length.cells])) / step_s
     path = f"truth/{Path(file).stem}.noise.npy"
     np.save(folder / path, noise.astype(np.float32))
-    rms = {
-        f"{average:g}": _rms(noise, round(average / step_s)) for average in _AVERAGES_S if average >= step_s
-    }
-    return {"file": file, "noise": path, "noise_step_s": step_s, "noise_rms_dph": rms}
+    return {"file": file, "noise": path, "noise_step_s": step_s, "bias_dph": _extent(made.bias_dph)}
 
 
-def _rms(noise: np.ndarray[Any, np.dtype[np.float64]], count: int) -> float:
-    means = noise[: len(noise) - len(noise) % count].reshape(-1, count).mean(axis=1)
-    return float(np.sqrt(np.mean(means**2)))
+def _extent(values: NDArray[np.float64]) -> list[float]:
+    return [float(values.min()), float(values.max())]
 
 
 def _write_texts(
@@ -156,11 +183,9 @@ def _write_texts(
     name: str,
     plan: Scenario,
     seed: int,
-    levels: NoiseLevels,
     weight: float | None,
-    entries: list[dict[str, Any]],
+    runs: list[dict[str, Any]],
     truths: list[dict[str, Any]],
-    bias_map: BiasMap,
 ) -> None:
     head: dict[str, Any] = {
         "schema": 1,
@@ -170,17 +195,26 @@ def _write_texts(
     }
     if weight is not None:
         head["pulse_weight_arcsec"] = weight
-    declared = {key: value for key, value in levels.model_dump().items() if value}
-    tables = {"meta": {"simulated": True}, "noise": declared}
-    (folder / "dataset.toml").write_text(dataset_toml(head, tables, entries), "utf-8")
+    levels = plan.noise.model_dump()
+    tables = {
+        "meta": {"simulated": True},
+        "noise": {key: levels[key] for key in _DECLARED if levels[key]},
+    }
+    (folder / "dataset.toml").write_text(dataset_toml(head, tables, runs), "utf-8")
     truth = {
         "schema": SCHEMA,
         "scenario": name,
         "seed": seed,
-        "noise": levels.model_dump(),
-        "map": {"scale_dph": bias_map.scale_dph, "offset_dph": bias_map.offset_dph, **bias_map.parameters},
-        "plan": plan.model_dump(mode="json", exclude={"profile", "set"}),
-        "causes": [],
+        "noise": levels,
+        "map": gyro_map(plan, seed).described(),
+        "causes": [
+            {"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause
+        ],
+        "plan": plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
         "runs": truths,
     }
     (folder / TRUTH_FILE).write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
+
+
+def _finite(values: dict[str, float]) -> dict[str, float | None]:
+    return {key: value if math.isfinite(value) else None for key, value in values.items()}

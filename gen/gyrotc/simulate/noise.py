@@ -1,11 +1,13 @@
-"""Noise of the measured rate, in the terms of IEEE Std 647 (annex C): angle random walk, bias instability, rate random walk.
+"""Noise of the measured rate in the terms of IEEE Std 647 (annex C), and what real records have besides.
 
-Everything is made once a second (a cell), whatever the rows are; finer rows divide a cell's angle by a bridge. So the
-same seed gives the same angle at every full second for every row length. 1 deg/h is 1 arcsec/s.
+Everything is made once a second (a cell), whatever the rows are; finer rows divide a cell's angle by a
+bridge. So the same seed gives the same angle at every full second for every row length. 1 deg/h is 1
+arcsec/s.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,20 +17,62 @@ from scipy.signal import lfilter
 if TYPE_CHECKING:
     from .scenario import NoiseLevels
 
-__all__ = ["angle_arcsec", "bridge_arcsec", "flicker_dph", "quantised", "walk_dph", "white_sigma_arcsec"]
+__all__ = ["CELL_S", "CellNoise", "bridge_arcsec", "cell_noise", "quantised", "white_sigma_arcsec"]
 
 Array = NDArray[np.float64]
 
 CELL_S = 1.0
 _SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
+_REFERENCE_C = 20.0
 
 
-def white_sigma_arcsec(arw_deg_per_sqrt_h: float) -> float:
-    """Standard deviation of the angle that a random walk gathers in one cell, arcsec."""
-    return float(arw_deg_per_sqrt_h * 3600.0 * np.sqrt(CELL_S / 3600.0))
+@dataclass(frozen=True, slots=True)
+class CellNoise:
+    """Noise of one run, without quantisation.
+
+    Attributes:
+        angle_arcsec: Angle gathered in each cell, shape (cells,).
+        white_arcsec: Standard deviation of its white part, shape (cells,).
+    """
+
+    angle_arcsec: Array
+    white_arcsec: Array
 
 
-def flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: float) -> Array:
+def white_sigma_arcsec(levels: NoiseLevels, temperature_c: Array, slope_c_per_min: Array) -> Array:
+    """Standard deviation of the angle that the random walk gathers in a cell, arcsec, one for each cell.
+
+    Grows by a share for each C below or above 20 C (by its sign) and for each C/min of heating or cooling.
+    """
+    growth = (
+        1.0
+        + levels.arw_growth_per_c * (temperature_c - _REFERENCE_C)
+        + levels.arw_growth_per_c_per_min * np.abs(slope_c_per_min)
+    )
+    return np.asarray(levels.arw_deg_per_sqrt_h * 3600.0 * np.sqrt(CELL_S / 3600.0) * np.maximum(growth, 0.1))
+
+
+def cell_noise(
+    seeds: np.random.SeedSequence, levels: NoiseLevels, temperature_c: Array, slope_c_per_min: Array
+) -> CellNoise:
+    """Noise of a run whose gyro has these temperatures (C) and rates (C/min), one for each cell."""
+    cells = len(temperature_c)
+    white, flicker, walk, kicks = (np.random.default_rng(child) for child in seeds.spawn(4))
+    sigma = white_sigma_arcsec(levels, temperature_c, slope_c_per_min)
+    angle = sigma * white.standard_normal(cells)
+    if levels.bias_instability_dph:
+        angle += CELL_S * _flicker_dph(flicker, cells, levels.bias_instability_dph)
+    if levels.rate_random_walk_dph_per_sqrt_h:
+        step = levels.rate_random_walk_dph_per_sqrt_h * np.sqrt(CELL_S / 3600.0)
+        angle += CELL_S * np.cumsum(walk.normal(0.0, step, cells))
+    if levels.outliers_per_h:
+        hit = kicks.random(cells) < levels.outliers_per_h * CELL_S / 3600.0
+        size = kicks.uniform(0.5, 1.5, cells) * kicks.choice([-1.0, 1.0], cells)
+        angle += np.where(hit, levels.outlier_arcsec * size, 0.0)
+    return CellNoise(angle, sigma)
+
+
+def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: float) -> Array:
     """Flicker noise with spectral density B²/(2π f) (two-sided), a sum of Markov processes, shape (cells,).
 
     Correlation times from a cell to ten times the record, evenly in their logarithm; the variance of each is
@@ -38,37 +82,22 @@ def flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: floa
     sigma = bias_instability_dph * np.sqrt(np.log(_SPREAD) / np.pi)
     total = np.zeros(cells)
     for index in range(count):
-        decay = np.exp(-1.0 / _SPREAD**index)
+        decay = float(np.exp(-(_SPREAD**-index)))
         start = rng.normal(0.0, sigma)
         steps = rng.normal(0.0, sigma * np.sqrt(1.0 - decay**2), cells)
         total += lfilter([1.0], [1.0, -decay], steps, zi=[decay * start])[0]
     return total
 
 
-def walk_dph(rng: np.random.Generator, cells: int, k_dph_per_sqrt_h: float) -> Array:
-    """Rate random walk that starts at 0, shape (cells,), deg/h."""
-    return np.cumsum(rng.normal(0.0, k_dph_per_sqrt_h * np.sqrt(CELL_S / 3600.0), cells))
+def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: Array) -> Array:
+    """How the white angle departs, at a cell's inner edges, from growing evenly, shape (cells, parts − 1).
 
-
-def angle_arcsec(seeds: np.random.SeedSequence, levels: NoiseLevels, cells: int) -> Array:
-    """Angle of all noise (without quantisation) gathered in each cell, arcsec, shape (cells,)."""
-    white, flicker, walk = (np.random.default_rng(child) for child in seeds.spawn(3))
-    total = white_sigma_arcsec(levels.arw_deg_per_sqrt_h) * white.standard_normal(cells)
-    if levels.bias_instability_dph:
-        total += CELL_S * flicker_dph(flicker, cells, levels.bias_instability_dph)
-    if levels.rate_random_walk_dph_per_sqrt_h:
-        total += CELL_S * walk_dph(walk, cells, levels.rate_random_walk_dph_per_sqrt_h)
-    return total
-
-
-def bridge_arcsec(rng: np.random.Generator, cells: int, parts: int, sigma_arcsec: float) -> Array:
-    """How the white angle of a cell departs, at the inner edges, from growing evenly, shape (cells, parts − 1).
-
-    A Brownian bridge: with the even growth added it is a random walk with `sigma_arcsec` for a whole cell.
+    A Brownian bridge: with the even growth added it is a random walk with `white_arcsec` for a whole cell.
     """
-    steps = rng.standard_normal((cells, parts), dtype=np.float32)
+    steps = rng.standard_normal((len(white_arcsec), parts), dtype=np.float32)
     steps -= steps.mean(axis=1, keepdims=True)
-    return np.cumsum(steps[:, :-1], axis=1, dtype=np.float64) * (sigma_arcsec / np.sqrt(parts))
+    walk = np.cumsum(steps[:, :-1], axis=1, dtype=np.float64)
+    return np.asarray(walk * (white_arcsec[:, None] / np.sqrt(parts)))
 
 
 def quantised(angle_arcsec: Array, quantum_arcsec: float, phase: Array) -> Array:
@@ -77,4 +106,4 @@ def quantised(angle_arcsec: Array, quantum_arcsec: float, phase: Array) -> Array
     `phase`: dither at the readings, quanta, uniform over 0 ... 1. The error is uniform over one quantum and
     independent from reading to reading: IEEE's Q = quantum/√12.
     """
-    return quantum_arcsec * (np.floor(angle_arcsec / quantum_arcsec + phase) - phase + 0.5)
+    return np.asarray(quantum_arcsec * (np.floor(angle_arcsec / quantum_arcsec + phase) - phase + 0.5))

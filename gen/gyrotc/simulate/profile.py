@@ -1,7 +1,6 @@
 """Chamber programmes: holds, ramps, steps, staircases, triangles, nested loops and repeats.
 
-A profile's steps are turned into the corners of a piecewise linear programme (time in s, temperature in C). A step
-change is a corner without duration; `sample` then gives the mean of both sides at that instant.
+A profile's steps are turned into the corners of a piecewise linear programme (time in s, temperature in C).
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class Ramp(_Strict):
 
 
 class Jump(_Strict):
-    """Command another temperature at once; the chamber follows as fast as it can."""
+    """Go to another temperature as fast as the chamber can."""
 
     step_to_c: Celsius
 
@@ -115,18 +114,18 @@ def _ramp(start_c: float, end_c: float, c_per_min: float) -> _Leg:
     return 60.0 * abs(end_c - start_c) / c_per_min, end_c
 
 
-def _legs(step: Any, now_c: float) -> Iterator[_Leg]:
-    """The legs of one step that starts at `now_c`."""
+def _legs(step: Any, now_c: float, fastest: float) -> Iterator[_Leg]:
+    """The legs of one step that starts at `now_c`; the chamber can do `fastest` C/min."""
     if isinstance(step, Hold):
         yield 60.0 * step.hold_min, now_c
     elif isinstance(step, Jump):
-        yield 0.0, step.step_to_c
+        yield _ramp(now_c, step.step_to_c, fastest)
     elif isinstance(step, Repeat):
-        yield from _repeat(step, now_c)
+        yield from _repeat(step, now_c, fastest)
     else:
         hold_s = 60.0 * step.hold_min if isinstance(step, Staircase) else 0.0
         for target_c in _targets(step, now_c):
-            yield _ramp(now_c, target_c, step.c_per_min)
+            yield _ramp(now_c, target_c, min(step.c_per_min, fastest))
             if hold_s:
                 yield hold_s, target_c
             now_c = target_c
@@ -146,33 +145,33 @@ def _targets(step: Ramp | Staircase | Triangle | Nested, now_c: float) -> list[f
     return [*around, step.nested_c]
 
 
-def _repeat(step: Repeat, now_c: float) -> Iterator[_Leg]:
+def _repeat(step: Repeat, now_c: float, fastest: float) -> Iterator[_Leg]:
     done = 0
     while step.times is None or done < step.times:
-        before = 0.0
+        passed_s = 0.0
         for inner in step.repeat:
-            for duration_s, end_c in _legs(inner, now_c):
-                before += duration_s
+            for duration_s, end_c in _legs(inner, now_c, fastest):
+                passed_s += duration_s
                 yield duration_s, end_c
                 now_c = end_c
         done += 1
-        if before == 0.0:  # nothing but jumps: would never end
+        if passed_s == 0.0:  # a ramp to where it is: would never end
             return
 
 
 def corners(
-    steps: Sequence[Any], start_c: float, until_s: float
+    steps: Sequence[Any], start_c: float, until_s: float, fastest_c_per_min: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners of a programme that starts at `start_c` at time 0 and reaches to `until_s` at least.
 
-    After the last step the programme stays where it is.
+    No ramp is faster than `fastest_c_per_min`; after the last step the programme stays where it is.
 
     Returns:
-        Times (s, ascending, a jump twice) and temperatures (C), same length.
+        Times (s, ascending) and temperatures (C), same length.
     """
     times, temperatures = [0.0], [start_c]
     for step in steps:
-        for duration_s, end_c in _legs(step, temperatures[-1]):
+        for duration_s, end_c in _legs(step, temperatures[-1], fastest_c_per_min):
             times.append(times[-1] + duration_s)
             temperatures.append(end_c)
             if times[-1] >= until_s:

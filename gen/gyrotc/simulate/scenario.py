@@ -1,20 +1,21 @@
 """Scenario files: what is simulated, in TOML, checked before anything is computed.
 
-A scenario names a gyro (thermal network, range of its bias), a chamber, the sensor, profiles (one chamber programme
-each) and sets (which profiles are run, when, and in which role). docs/simulation.md describes every key.
+A scenario names a gyro (thermal network, range of its bias), a chamber, the sensor, profiles (one chamber
+programme each), sets (which profiles are run, when, and in which role) and causes of the catalogue.
+docs/simulation.md describes every key.
 """
 
 from __future__ import annotations
 
 import sys
 from datetime import datetime
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..errors import InputError
+from ..terms import CATALOGUE
 from .profile import Step
 
 if sys.version_info >= (3, 11):
@@ -22,10 +23,14 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Chamber", "NoiseLevels", "Profile", "RunSet", "Scenario", "Sensor", "names", "read"]
+__all__ = ["Cause", "Chamber", "Channel", "NoiseLevels", "Profile", "Scenario", "names", "read"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+
+_FOLDER = Path(__file__).parent.parent / "scenarios"
+_OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}
 
 
 class _Strict(BaseModel):
@@ -36,7 +41,11 @@ class Chamber(_Strict):
     """The chamber's air and how well it follows its programme."""
 
     lag_s: Positive = 120.0
+    damping: Annotated[float, Field(ge=0.2, le=2.0)] = 0.7
+    ripple_c: NonNegative = 0.2
+    ripple_s: Positive = 180.0
     setpoint_sigma_c: NonNegative = 0.1
+    max_c_per_min: Positive = 10.0
 
 
 class Node(_Strict):
@@ -49,16 +58,17 @@ class Node(_Strict):
 
 
 def _default_nodes() -> dict[str, Node]:
-    """Case, glass block and cavity (bore surface, mirrors, gas): self-heating 8 K, cavity 20 s behind the block."""
+    """Self-heating 8 K at the block; cavity walls and mirrors 20 s behind it, the gas 30 K above them."""
     return {
         "case": Node(heat_capacity_j_per_k=1500.0, power_w=14.75, to_air_w_per_k=2.5, to={"block": 1.0}),
         "block": Node(heat_capacity_j_per_k=800.0, to={"cavity": 3.0}),
-        "cavity": Node(heat_capacity_j_per_k=60.0, power_w=1.5),
+        "cavity": Node(heat_capacity_j_per_k=60.0, to={"gas": 0.05}),
+        "gas": Node(heat_capacity_j_per_k=0.5, power_w=1.5),
     }
 
 
 class Gyro(_Strict):
-    """The instrument: its serial (`{seed}` is filled in), the range of its bias and its thermal network."""
+    """The instrument: serial (`{seed}` is filled in), range of its bias, thermal network."""
 
     serial: Annotated[str, Field(pattern=r"^[A-Za-z0-9._{}-]{1,56}$")] = "SIM-{seed}"
     bias_dph: tuple[float, float] = (5.8e-3, 8.5e-3)
@@ -75,9 +85,17 @@ class Gyro(_Strict):
                 raise ValueError(f"node {name} conducts to {sorted(unknown)}, which are no nodes")
         if self.cavity_node not in known:
             raise ValueError(f"cavity_node {self.cavity_node!r} is no node")
-        if not any(node.to_air_w_per_k > 0.0 for node in self.node.values()):
-            raise ValueError("no node conducts to the air")
+        if lonely := known - self._joined():
+            raise ValueError(f"no heat goes from {sorted(lonely)} to the air")
         return self
+
+    def _joined(self) -> set[str]:
+        """Nodes from which a chain of conductances leads to the air."""
+        joined = {name for name, node in self.node.items() if node.to_air_w_per_k > 0.0}
+        links = [(name, other) for name, node in self.node.items() for other in node.to]
+        for _ in self.node:
+            joined |= {a for a, b in links if b in joined} | {b for a, b in links if a in joined}
+        return joined
 
 
 class Sensor(_Strict):
@@ -90,16 +108,63 @@ class Sensor(_Strict):
 
 
 class NoiseLevels(_Strict):
-    """Noise of the rate in the terms of IEEE Std 647, annex C."""
+    """Noise of the rate; the first four in the terms of IEEE Std 647, annex C."""
 
     arw_deg_per_sqrt_h: NonNegative = 0.0
     bias_instability_dph: NonNegative = 0.0
     rate_random_walk_dph_per_sqrt_h: NonNegative = 0.0
     quantum_arcsec: NonNegative = 0.0
+    arw_growth_per_c: float = 0.0
+    arw_growth_per_c_per_min: NonNegative = 0.0
+    outliers_per_h: NonNegative = 0.0
+    outlier_arcsec: NonNegative = 0.2
+
+
+class Channel(_Strict):
+    """A recorded auxiliary channel."""
+
+    name: Name
+    level: float = 0.0
+    per_air_c: float = 0.0
+    wander_sigma: NonNegative = 0.0
+    wander_tau_s: Positive = 1800.0
+    steps_per_h: NonNegative = 0.0
+    step_sigma: NonNegative = 0.0
+    noise: NonNegative = 0.0
+
+
+class Cause(BaseModel):
+    """A cause of the catalogue that acts: its id, its parameters, the channel where it needs one."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    id: str
+    channel: str | None = None
+    __pydantic_extra__: dict[str, float] = Field(init=False)
+
+    @model_validator(mode="after")
+    def _check(self) -> Cause:
+        if self.id not in CATALOGUE:
+            raise ValueError(f"no cause {self.id!r}; there are {', '.join(CATALOGUE)}")
+        term = CATALOGUE[self.id]
+        known = {parameter.name: parameter for parameter in term.parameters}
+        if unknown := set(self.__pydantic_extra__) - set(known):
+            raise ValueError(f"{self.id} has no {sorted(unknown)}; it has {', '.join(known)}")
+        needed = {name for name, parameter in known.items() if parameter.default is None}
+        if missing := needed - set(self.__pydantic_extra__):
+            raise ValueError(f"{self.id} needs {sorted(missing)}")
+        if term.needs.channel != (self.channel is not None):
+            raise ValueError(f"{self.id} {'needs a' if term.needs.channel else 'has no'} channel")
+        return self
+
+    def values(self) -> dict[str, float]:
+        """All parameters, defaults filled in."""
+        defaults = {p.name: p.default for p in CATALOGUE[self.id].parameters if p.default is not None}
+        return {**defaults, **self.__pydantic_extra__}
 
 
 class Profile(_Strict):
-    """One chamber programme, when power comes on in it and what of it is recorded (minutes from its start)."""
+    """One chamber programme, when power comes on in it and what of it is recorded (min from its start)."""
 
     start_c: float
     power_on_min: NonNegative = 0.0
@@ -124,7 +189,9 @@ class Scenario(_Strict):
     gyro: Gyro = Field(default_factory=Gyro)
     chamber: Chamber = Field(default_factory=Chamber)
     sensor: Sensor = Field(default_factory=Sensor)
-    noise: NoiseLevels | None = None
+    noise: NoiseLevels = Field(default_factory=NoiseLevels)
+    channel: list[Channel] = []
+    cause: list[Cause] = []
     profile: Annotated[dict[str, Profile], Field(min_length=1)]
     set: Annotated[list[RunSet], Field(min_length=1)]
 
@@ -135,17 +202,24 @@ class Scenario(_Strict):
                 raise ValueError(f"set {index + 1} runs {unknown}, which are no profiles")
         if self.sensor.node not in self.gyro.node:
             raise ValueError(f"sensor.node {self.sensor.node!r} is no node of the gyro")
+        channels = [channel.name for channel in self.channel]
+        if len(set(channels)) < len(channels) or _OWN_COLUMNS & set(channels):
+            raise ValueError(f"channel names {channels} repeat, or are columns of every recording")
+        for cause in self.cause:
+            if cause.channel is not None and cause.channel not in channels:
+                raise ValueError(f"{cause.id} follows {cause.channel!r}, which is no channel")
         return self
 
 
 def names() -> list[str]:
     """Names of the scenarios that come with gyrotc."""
-    folder = resources.files(__package__).joinpath("..", "scenarios")
-    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
 def read(scenario: str | Path) -> tuple[str, Scenario]:
     """A scenario by name, or from a file.
+
+    `extends = "name"` in it takes another one as the ground: its tables are merged, all else is replaced.
 
     Returns:
         Its name (file stem) and the checked scenario.
@@ -153,26 +227,41 @@ def read(scenario: str | Path) -> tuple[str, Scenario]:
     Raises:
         InputError: no such scenario or file, no TOML, or a key or value that cannot be.
     """
-    where, text = _text(scenario)
+    where = _place(scenario)
     try:
-        content: dict[str, Any] = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(where, str(error), "TOML") from error
-    try:
-        return Path(where).stem, Scenario.model_validate(content)
+        return where.stem, Scenario.model_validate(_content(where, ()))
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{where}, {field}" if field else where, first["msg"]) from error
+        reason = str(first["msg"]).removeprefix("Value error, ")
+        raise InputError(f"{where}, {field}" if field else str(where), reason) from error
 
 
-def _text(scenario: str | Path) -> tuple[str, str]:
-    path = Path(scenario)
-    packaged = resources.files(__package__).joinpath("..", "scenarios", f"{scenario}.toml")
-    if isinstance(scenario, str) and path.suffix == "" and packaged.is_file():
-        return f"{scenario}.toml", packaged.read_text("utf-8")
+def _place(scenario: str | Path) -> Path:
+    packaged = _FOLDER / f"{scenario}.toml"
+    return packaged if str(scenario) in names() else Path(scenario)
+
+
+def _content(where: Path, below: tuple[Path, ...]) -> dict[str, Any]:
     try:
-        return str(path), path.read_text("utf-8")
+        content: dict[str, Any] = tomllib.loads(where.read_text("utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(str(where), str(error), "TOML") from error
     except (OSError, UnicodeDecodeError) as error:
-        known = ", ".join(names())
-        raise InputError(str(scenario), "no such scenario", f"a TOML file or one of: {known}") from error
+        expected = f"a TOML file or one of: {', '.join(names())}"
+        raise InputError(str(where), "no such scenario", expected) from error
+    if "extends" not in content:
+        return content
+    ground = _place(str(content.pop("extends")))
+    if ground in below:
+        raise InputError(str(where), f"extends {ground.stem}, which extends it")
+    return _merged(_content(ground, (*below, where)), content)
+
+
+def _merged(ground: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Tables merged key by key; anything else replaced."""
+    merged = dict(ground)
+    for key, value in over.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged

@@ -2,9 +2,9 @@
 
     C_i dT_i/dt = G_i,air (T_air − T_i) + Σ_j G_ij (T_j − T_i) + P_i(t)
 
-The network is linear and symmetric, so it is solved in its own modes: each one is a first-order recursion whose
-coefficients are exact (matrix exponential) for an air temperature that is linear between two grid points and a power
-that is constant there.
+The network is linear and symmetric, so it is solved in its own modes: each one is a first-order recursion
+whose coefficients are exact (matrix exponential) for an air temperature that is linear between two grid
+points and a power that is constant there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-__all__ = ["Network", "first_order"]
+__all__ = ["Network"]
 
 Array = NDArray[np.float64]
 
@@ -38,68 +38,46 @@ class Network:
     between: Array
     power: Array
 
-    def modes(self) -> tuple[Array, Array, Array]:
-        """Rates (1/s, positive), modes from nodes and nodes from modes: T = out · m, dm/dt = −λ m + into · q/C.
-
-        `into` acts on heat flows in W.
-        """
-        root = np.sqrt(self.capacity)
-        laplacian = np.diag(self.to_air + self.between.sum(axis=1)) - self.between
-        rates, vectors = np.linalg.eigh(laplacian / np.outer(root, root))
-        return rates, vectors.T / root, vectors / root[:, None]
+    def laplacian(self) -> Array:
+        """L in C dT/dt = −L T + G_air T_air + P, W/K, shape (n, n)."""
+        return np.asarray(np.diag(self.to_air + self.between.sum(axis=1)) - self.between)
 
     def steady(self, air_c: float, on: bool) -> Array:
-        """Temperatures (C, shape (n,)) after a long time at `air_c`."""
-        laplacian = np.diag(self.to_air + self.between.sum(axis=1)) - self.between
+        """Temperatures after a long time at `air_c`, C, shape (n,)."""
         heat = self.to_air * air_c + (self.power if on else 0.0)
-        return np.asarray(np.linalg.solve(laplacian, heat))
-
-    def heat_flow(self, nodes_c: Array, air_c: Array, on: Array) -> Array:
-        """Net heat into every node, W: shape (n, time) like `nodes_c`; `air_c`, `on` of shape (time,)."""
-        exchange = self.between @ nodes_c - (self.to_air + self.between.sum(axis=1))[:, None] * nodes_c
-        return np.asarray(exchange + np.outer(self.to_air, air_c) + np.outer(self.power, on))
+        return np.asarray(np.linalg.solve(self.laplacian(), heat))
 
     def respond(self, air_c: Array, on: Array, dt_s: float) -> Array:
         """Temperatures of all nodes over time, from the steady state at the first air temperature, power off.
 
         Args:
             air_c: Air temperature at the grid points, C, shape (time,); linear between them.
-            on: 1.0 where power is on during the interval that starts at a grid point, else 0.0, shape (time,).
+            on: 1.0 where power is on in the interval that starts at a grid point, else 0.0, shape (time,).
             dt_s: Grid, s.
 
         Returns:
             C, shape (n, time).
         """
-        rates, into, out = self.modes()
+        root = np.sqrt(self.capacity)
+        rates, vectors = np.linalg.eigh(self.laplacian() / np.outer(root, root))
+        into, out = vectors.T / root, vectors / root[:, None]  # heat into modes, modes into temperatures
         start = into @ (self.capacity * self.steady(float(air_c[0]), on=False))
-        air_gain = into @ self.to_air
-        power_gain = into @ self.power
-        modes = np.empty((len(rates), len(air_c)))
-        for index, rate in enumerate(rates):
-            drive = air_gain[index] * air_c
-            constant = power_gain[index] * on
-            modes[index] = _mode(float(rate), dt_s, drive, constant, float(start[index]))
-        return out @ modes
+        heat = np.outer(into @ self.to_air, air_c)
+        electrical = np.outer(into @ self.power, on)
+        modes = [
+            _mode(float(rates[i]) * dt_s, heat[i] / rates[i], electrical[i] / rates[i], float(start[i]))
+            for i in range(len(rates))
+        ]
+        return np.asarray(out @ np.array(modes))
 
 
-def _mode(rate: float, dt_s: float, drive: Array, constant: Array, start: float) -> Array:
-    """dm/dt = −rate · m + drive (linear between points) + constant (held), exactly on the grid."""
-    x = rate * dt_s
-    decay = np.exp(-x)
-    held = -np.expm1(-x) / rate  # ∫ exp(−rate s) ds
-    late = (1.0 - -np.expm1(-x) / x) / rate  # weight of the interval's end point
-    forced = late * drive[1:] + (held - late) * drive[:-1] + held * constant[:-1]
-    rest, _ = lfilter([1.0], [1.0, -decay], forced, zi=[decay * start])
-    return np.concatenate(([start], rest))
+def _mode(step: float, sloped: Array, held: Array, start: float) -> Array:
+    """dm/dt = sloped + held − m, time in units of the mode's time constant, on a grid of `step`.
 
-
-def first_order(tau_s: float, dt_s: float, driven: Array, start: float | None = None) -> Array:
-    """tau dz/dt = driven − z on a grid, exact for an input that is linear between the points.
-
-    Starts at `start` (default: the first input). `tau_s` = 0 gives the input itself.
+    `sloped` is linear between the points, `held` constant after each.
     """
-    if tau_s == 0.0:
-        return driven.copy()
-    rate = 1.0 / tau_s
-    first = float(driven[0]) if start is None else start
-    return _mode(rate, dt_s, rate * driven, np.zeros_like(driven), first)
+    lost = -float(np.expm1(-step))
+    late = 1.0 - lost / step  # weight of an interval's end point
+    forced = late * sloped[1:] + (lost - late) * sloped[:-1] + lost * held[:-1]
+    rest = lfilter([1.0], [1.0, lost - 1.0], forced, zi=[(1.0 - lost) * start])[0]
+    return np.concatenate(([start], rest))

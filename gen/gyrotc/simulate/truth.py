@@ -6,6 +6,7 @@ Only `evaluate` and tests open it; nothing that fits or diagnoses may.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["SCHEMA", "Truth", "read_truth"]
+__all__ = ["FILE", "SCHEMA", "Truth", "read_truth", "simulated_floor"]
 
 SCHEMA = "gyrotc.truth/1"
 FILE = "truth.json"
@@ -37,8 +38,8 @@ class Truth:
         """Noise really added to one run.
 
         Returns:
-            The step in s (step k covers from k · step_s to (k + 1) · step_s on the file's clock) and the mean noise
-            of every step, deg/h.
+            Step in s (step k begins at k · step_s on the file's clock), and the mean noise of every step,
+            deg/h.
 
         Raises:
             InputError: no such run, or its noise is missing.
@@ -52,15 +53,26 @@ class Truth:
         except (OSError, ValueError) as error:
             raise InputError(str(path), "cannot be read", "the noise of a simulated run") from error
 
-    def mean_noise_dph(
-        self, file: str, from_s: NDArray[np.float64], to_s: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Mean noise really added between each pair of times on the file's clock, deg/h; steps are divided evenly."""
+    def mean_noise_dph(self, file: str, average_s: float) -> NDArray[np.float64]:
+        """Means over `average_s` (rounded to whole steps, at least one) of the noise of one run, deg/h."""
         step_s, noise = self.noise_dph(file)
-        angle = np.concatenate(([0.0], np.cumsum(noise * step_s)))
-        edge_s = step_s * np.arange(len(angle))
-        gathered = np.interp(to_s, edge_s, angle) - np.interp(from_s, edge_s, angle)
-        return np.asarray(gathered / (to_s - from_s))
+        count = max(1, round(average_s / step_s))
+        return np.asarray(noise[: len(noise) - len(noise) % count].reshape(-1, count).mean(axis=1))
+
+
+def simulated_floor(folder: Path, files: Sequence[str], average_s: float) -> float | None:
+    """RMS of the noise that was really added to `files`, pooled over means of `average_s`, deg/h.
+
+    None for recordings, and where there are no files.
+
+    Raises:
+        InputError: the truth beside the data set cannot be read.
+    """
+    truth = read_truth(folder)
+    if truth is None or not files:
+        return None
+    noise = np.concatenate([truth.mean_noise_dph(file, average_s) for file in files])
+    return float(np.sqrt(np.mean(noise**2)))
 
 
 def read_truth(folder: Path) -> Truth | None:

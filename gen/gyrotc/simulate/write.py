@@ -1,12 +1,13 @@
-"""Writes a simulated data set: run files in chunks, `dataset.toml`, `truth.json`; the folder appears complete or not at all."""
+"""Writes simulated runs in chunks and `dataset.toml`, into a folder that appears complete or not at all."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -24,8 +25,7 @@ __all__ = ["Format", "RunFile", "complete_folder", "dataset_toml"]
 
 Format = Literal["csv", "parquet"]
 _RATE_DECIMALS = 9
-_TEMPERATURE_DECIMALS = 6
-_TIME_DECIMALS = 6
+_DECIMALS = 6
 
 
 class _Writer(Protocol):
@@ -35,7 +35,7 @@ class _Writer(Protocol):
 
 @contextmanager
 def complete_folder(out: Path) -> Iterator[Path]:
-    """A temporary folder beside `out` that takes its name at the end; on an error nothing is left and `out` is as before.
+    """A temporary folder beside `out` that takes its name at the end; after an error `out` is as before.
 
     Raises:
         InputError: `out` holds something that `simulate` did not make.
@@ -58,19 +58,32 @@ def complete_folder(out: Path) -> Iterator[Path]:
 
 
 class RunFile:
-    """One run on disk, written chunk by chunk: rates, or pulses (counts since the last row; the first row starts the clock)."""
+    """One run on disk, written chunk by chunk.
 
-    def __init__(self, path: Path, format: Format, row_s: float, pulse_weight_arcsec: float | None) -> None:
+    Rates are stamped with the start of their row. Pulses are counts since the last row, stamped with the end
+    of theirs; a first row starts the clock.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        format: Format,
+        *,
+        row_s: float,
+        pulse_weight_arcsec: float | None,
+        channels: Sequence[str] = (),
+    ) -> None:
         self._row_s = row_s
         self._weight = pulse_weight_arcsec
-        value = pa.field("rate_dph", pa.float64()) if self._weight is None else pa.field("pulses", pa.int64())
-        self._schema = pa.schema([("time_s", pa.float64()), ("temperature_c", pa.float64()), value])
         self._started = False
+        value = ("rate_dph", pa.float64()) if pulse_weight_arcsec is None else ("pulses", pa.int64())
+        floats = [(name, pa.float64()) for name in channels]
+        self._schema = pa.schema([("time_s", pa.float64()), ("temperature_c", pa.float64()), value, *floats])
         self._writer: _Writer
         if format == "csv":
             path.write_text(",".join(self._schema.names) + "\n", "utf-8")
-            plain = pyarrow.csv.WriteOptions(include_header=False, quoting_style="none")
             self._sink = path.open("ab")
+            plain = pyarrow.csv.WriteOptions(include_header=False, quoting_style="none")
             self._writer = pyarrow.csv.CSVWriter(self._sink, self._schema, write_options=plain)
         else:
             self._sink = path.open("wb")
@@ -78,22 +91,26 @@ class RunFile:
 
     def write(self, chunk: Chunk) -> None:
         """Appends rows."""
-        time_s = np.round(chunk.time_s, _TIME_DECIMALS)
-        temperature = np.round(chunk.temperature_c, _TEMPERATURE_DECIMALS)
+        columns = [chunk.temperature_c, *chunk.channels.values()]
+        rounded = [np.round(column, _DECIMALS) for column in columns]
+        time_s: NDArray[Any] = chunk.time_s
         value: NDArray[Any]
         if self._weight is None:
             value = np.round(np.diff(chunk.edge_arcsec) / self._row_s, _RATE_DECIMALS)
         else:
             value = np.diff(np.floor(chunk.edge_arcsec / self._weight).astype(np.int64))
-            time_s = np.round(chunk.time_s + self._row_s, _TIME_DECIMALS)
+            time_s = time_s + self._row_s
             if not self._started:
                 time_s, value = np.append(0.0, time_s), np.append(0, value)
-                temperature = np.append(temperature[0], temperature)
+                rounded = [np.append(column[0], column) for column in rounded]
         self._started = True
-        self._writer.write_table(pa.Table.from_arrays([time_s, temperature, value], schema=self._schema))
+        arrays = [np.round(time_s, _DECIMALS), rounded[0], value, *rounded[1:]]
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
 
-    def close(self) -> None:
-        """Ends the file."""
+    def __enter__(self) -> RunFile:
+        return self
+
+    def __exit__(self, *error: object) -> None:
         self._writer.close()
         self._sink.close()
 
@@ -109,4 +126,8 @@ def dataset_toml(head: dict[str, Any], tables: dict[str, dict[str, Any]], runs: 
 
 
 def _pairs(table: dict[str, Any]) -> list[str]:
-    return [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()]
+    return [f"{key} = {_value(value)}" for key, value in table.items()]
+
+
+def _value(value: Any) -> str:
+    return value.isoformat() if isinstance(value, datetime) else json.dumps(value, ensure_ascii=False)

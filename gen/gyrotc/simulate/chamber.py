@@ -1,0 +1,40 @@
+"""The thermal chamber: how its air follows the programme.
+
+A second-order closed loop, T'' + 2ζω T' + ω² T = ω² programme, whose lag behind a ramp is 2ζ/ω. With ζ < 1 it
+overshoots at every corner, by exp(−πζ/√(1−ζ²)) of a step. On top comes the slow wave of a controller that
+switches its heater, and an error of the setpoint that stays for a run. Jumps are as fast as the chamber can.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter, lfiltic
+
+if TYPE_CHECKING:
+    from .scenario import Chamber
+
+__all__ = ["air"]
+
+Array = NDArray[np.float64]
+
+
+def air(chamber: Chamber, programme_c: Array, dt_s: float, rng: np.random.Generator) -> Array:
+    """Air temperature for a programme on a grid of `dt_s`, C; starts settled on its first value."""
+    offset = rng.normal(0.0, chamber.setpoint_sigma_c)
+    phase = rng.uniform(0.0, 2.0 * np.pi)
+    settled = _follow(chamber, programme_c - programme_c[0], dt_s)
+    time_s = dt_s * np.arange(len(programme_c))
+    ripple = chamber.ripple_c * np.sin(2.0 * np.pi * time_s / chamber.ripple_s + phase)
+    return np.asarray(programme_c[0] + settled + offset + ripple)
+
+
+def _follow(chamber: Chamber, departure_c: Array, dt_s: float) -> Array:
+    """The loop's answer to a programme that starts at 0, exact for one that is linear between the points."""
+    omega = 2.0 * chamber.damping / chamber.lag_s
+    plant = ([omega**2], [1.0, 2.0 * chamber.damping * omega, omega**2])
+    numerator, denominator, _ = cont2discrete(plant, dt_s, method="foh")
+    rest = lfiltic(numerator.ravel(), denominator, y=[0.0, 0.0], x=[0.0, 0.0])
+    return np.asarray(lfilter(numerator.ravel(), denominator, departure_c, zi=rest)[0])

@@ -1,0 +1,199 @@
+"""One simulated run once a second: chamber, thermal nodes, causes, bias, sensor, noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..terms import CATALOGUE, Scene
+from ..terms.operators import first_order
+from . import chamber, channels, noise, profile, thermal
+from .biasmap import BiasMap
+from .noise import CELL_S
+from .scenario import Cause, Gyro, Profile, Scenario
+
+__all__ = ["Record", "record", "thermal_network"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What one run is made of, once a second.
+
+    Attributes:
+        reading_c: Temperature readings, one at the start of every cell, C, shape (cells,).
+        channels: Readings of the auxiliary channels, the same.
+        air_c: Air in the chamber at the cells' edges, C, shape (cells + 1,).
+        cavity_c: Temperature that the bias acts on, the same.
+        bias_dph: Bias at the cells' edges, deg/h, shape (cells + 1,).
+        true_arcsec: Its angle since the start of the record, shape (cells + 1,).
+        rough_arcsec: Angle of bias and noise, shape (cells + 1,).
+        angle_arcsec: The same as it is read: quantised, if the gyro has a quantum.
+        white_arcsec: Standard deviation of the white noise in each cell, shape (cells,).
+        quantum_arcsec: 0: none.
+        power_on_s: Power-on on the record's clock, s.
+        seeds: For what is finer than a cell.
+    """
+
+    reading_c: Array
+    channels: dict[str, Array]
+    air_c: Array
+    cavity_c: Array
+    bias_dph: Array
+    true_arcsec: Array
+    rough_arcsec: Array
+    angle_arcsec: Array
+    white_arcsec: Array
+    quantum_arcsec: float
+    power_on_s: float
+    seeds: np.random.SeedSequence
+
+
+def record(
+    scenario: Scenario, run: Profile, bias_map: BiasMap, day: float, seeds: np.random.SeedSequence
+) -> Record:
+    """Simulates one run of a profile, `day` days after the first one.
+
+    What is drawn for the chamber, the sensor, the noise and each cause has its own seed: switching one of
+    them on changes nothing else.
+    """
+    world, sensing, noisy, fine, causal = seeds.spawn(5)
+    first, cells = _cells(run.record_from_min), _cells(run.record_min)
+    inside = slice(first, first + cells + 1)
+    air_c, scene, true_channels = _scene(scenario, run, first + cells + 1, day, world)
+    scene, bias = _bias(scenario, scene, true_channels, bias_map, causal)
+    sensor_seeds, channel_seeds = sensing.spawn(2)
+    reading = _readings(scenario, scene.sensed_c, np.random.default_rng(sensor_seeds))
+    readings = _channel_readings(scenario, true_channels, channel_seeds)
+    cavity = scene.cavity_c[inside]
+    slope = 60.0 * np.diff(cavity) / CELL_S
+    rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], slope)
+    true = _integral(bias[inside])
+    gathered = true + np.concatenate(([0.0], np.cumsum(rough.angle_arcsec)))
+    return Record(
+        reading_c=reading[inside][:-1],
+        channels={name: values[inside][:-1] for name, values in readings.items()},
+        air_c=air_c[inside],
+        cavity_c=cavity,
+        bias_dph=bias[inside],
+        true_arcsec=true,
+        rough_arcsec=gathered,
+        angle_arcsec=_read_angle(gathered, scenario.noise.quantum_arcsec, noisy),
+        white_arcsec=rough.white_arcsec,
+        quantum_arcsec=scenario.noise.quantum_arcsec,
+        power_on_s=CELL_S * (_cells(run.power_on_min) - first),
+        seeds=fine,
+    )
+
+
+def thermal_network(gyro: Gyro) -> thermal.Network:
+    """The network that a scenario describes."""
+    names = tuple(gyro.node)
+    between = np.zeros((len(names), len(names)))
+    for name, node in gyro.node.items():
+        for other, conductance in node.to.items():
+            pair = names.index(name), names.index(other)
+            between[pair] += conductance
+            between[pair[::-1]] += conductance
+    nodes = list(gyro.node.values())
+    return thermal.Network(
+        names=names,
+        capacity=np.array([node.heat_capacity_j_per_k for node in nodes]),
+        to_air=np.array([node.to_air_w_per_k for node in nodes]),
+        between=between,
+        power=np.array([node.power_w for node in nodes]),
+    )
+
+
+def _cells(minutes: float) -> int:
+    return round(60.0 * minutes / CELL_S)
+
+
+def _integral(bias_dph: Array) -> Array:
+    steps = 0.5 * CELL_S * (bias_dph[1:] + bias_dph[:-1])
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def _read_angle(angle: Array, quantum_arcsec: float, seeds: np.random.SeedSequence) -> Array:
+    if not quantum_arcsec:
+        return angle
+    phase = np.random.default_rng(seeds.spawn(1)[0]).random(len(angle))
+    return noise.quantised(angle, quantum_arcsec, phase)
+
+
+def _scene(
+    scenario: Scenario, run: Profile, points: int, day: float, seeds: np.random.SeedSequence
+) -> tuple[Array, Scene, dict[str, Array]]:
+    """Air, nodes and channels from the start of the programme on."""
+    chamber_seeds, channel_seeds = seeds.spawn(2)
+    time_s: Array = CELL_S * np.arange(points, dtype=np.float64)
+    limit = scenario.chamber.max_c_per_min
+    programme = profile.corners(run.steps, run.start_c, float(time_s[-1]), limit)
+    programmed = profile.sample(programme, time_s)
+    air_c = chamber.air(scenario.chamber, programmed, CELL_S, np.random.default_rng(chamber_seeds))
+    on_s = time_s - CELL_S * _cells(run.power_on_min)
+    network = thermal_network(scenario.gyro)
+    nodes_c = network.respond(air_c, (on_s >= 0.0).astype(np.float64), CELL_S)
+    node_c = nodes_c[network.names.index(scenario.sensor.node)]
+    true_channels = {
+        channel.name: channels.true_values(channel, air_c, CELL_S, np.random.default_rng(child))
+        for channel, child in zip(scenario.channel, channel_seeds.spawn(len(scenario.channel)), strict=True)
+    }
+    scene = Scene(
+        time_s=time_s,
+        on_s=on_s,
+        node_c=node_c,
+        cavity_c=nodes_c[network.names.index(scenario.gyro.cavity_node)],
+        sensed_c=first_order(scenario.sensor.lag_s, time_s, node_c),
+        channel=None,
+        day=day,
+    )
+    return air_c, scene, true_channels
+
+
+def _bias(
+    scenario: Scenario,
+    scene: Scene,
+    true_channels: dict[str, Array],
+    bias_map: BiasMap,
+    seeds: np.random.SeedSequence,
+) -> tuple[Scene, Array]:
+    """The scene with what the causes make of it, and the bias in deg/h."""
+    causes = [(CATALOGUE[cause.id], cause) for cause in scenario.cause]
+    for term, cause in causes:
+        if term.cavity is not None:
+            scene = replace(scene, cavity_c=term.cavity(scene, cause.values()))
+        if term.record is not None:
+            scene = replace(scene, sensed_c=term.record(scene, cause.values()))
+    slope = 60.0 * np.gradient(scene.cavity_c, CELL_S)
+    bias = bias_map(scene.cavity_c, slope)
+    for (term, cause), child in zip(causes, seeds.spawn(len(causes)), strict=True):
+        if term.bias is not None:
+            seen = _with_channel(scene, cause, true_channels)
+            bias = bias + term.bias(seen, cause.values(), np.random.default_rng(child))
+    return scene, bias
+
+
+def _with_channel(scene: Scene, cause: Cause, true_channels: dict[str, Array]) -> Scene:
+    return scene if cause.channel is None else replace(scene, channel=true_channels[cause.channel])
+
+
+def _readings(scenario: Scenario, sensed_c: Array, rng: np.random.Generator) -> Array:
+    sensor = scenario.sensor
+    reading = sensed_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
+    if not sensor.resolution_c:
+        return np.asarray(reading)
+    return np.asarray(sensor.resolution_c * np.round(reading / sensor.resolution_c))
+
+
+def _channel_readings(
+    scenario: Scenario, true_channels: dict[str, Array], seeds: np.random.SeedSequence
+) -> dict[str, Array]:
+    children = seeds.spawn(len(scenario.channel))
+    return {
+        channel.name: channels.readings(channel, true_channels[channel.name], np.random.default_rng(child))
+        for channel, child in zip(scenario.channel, children, strict=True)
+    }

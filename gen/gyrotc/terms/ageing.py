@@ -1,0 +1,54 @@
+"""Ageing between the runs: helium loss, wear of the electrodes, creep. Never extrapolated by a table.
+
+bias += slope · d0 log(1 + day/d0): a straight line for a large d0 (the default), and the same amount for
+every log unit of time, slope · d0, for a small one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+
+__all__ = ["TERM"]
+
+_STRAIGHT = math.inf
+
+
+def _passed(day: float, d0_day: float) -> float:
+    return day if math.isinf(d0_day) else d0_day * math.log1p(day / d0_day)
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    amount = values["slope_dph_per_day"] * _passed(scene.day, values["d0_day"])
+    return np.full(len(scene.time_s), amount)
+
+
+def _features(history: History, values: Values) -> Features:
+    """Nothing is known of a run without a date."""
+    dated = history.day is not None
+    amount = _passed(history.day, values.get("d0_day", _STRAIGHT)) if history.day is not None else 0.0
+    return Features(np.full((len(history.time_s), 1), amount), np.full(len(history.time_s), dated))
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"slope_dph_per_day": float(weights[0])}
+
+
+TERM = Term(
+    id="ageing",
+    family="between_runs",
+    kind="add",
+    equation="bias += slope d0 log(1 + day/d0)",
+    source="long-term bias drift; d0 large: linear",
+    parameters=(
+        Parameter("d0_day", "day", 0.1, _STRAIGHT, default=_STRAIGHT),
+        Parameter("slope_dph_per_day", "deg/h/day", 1e-7, 1e-2, linear=True, signed=True),
+    ),
+    needs=Needs(runs=3, dates=3),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)

@@ -1,0 +1,175 @@
+"""What a cause of the catalogue is: equation in the simulation, features for diagnosis, reference.
+
+A term stands in one module of this package and in one C file of the same name; the modules hold
+
+- `cavity`, `bias`, `record`: how the cause acts on a simulated instrument (`Scene`), at the simulation's own
+  rate;
+- `features`: what a fit needs, from a measured record (`History`) at its native rate, before any averaging;
+- `reference`: the recursion that the target runs, one step for each block (docs/FORMAT.md, section 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Features", "History", "Kind", "Needs", "Parameter", "Recursion", "Scene", "Term", "Values"]
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+Kind = Literal["input", "add", "random", "static", "record"]
+"""How a cause enters a model.
+
+input: the map sees another temperature; add: columns are added to the map; random: one draw for each run;
+static: more of the map itself; record: the recorded temperature is not the true one.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of a cause.
+
+    Attributes:
+        name: As in docs/FORMAT.md and in scenario files.
+        unit: Its unit.
+        low, high: Plausible range (prior), of the magnitude where `signed`.
+        linear: The effect is proportional to it; `features` does not take it.
+        signed: Both signs occur.
+        logarithmic: A grid over it is even in its logarithm (else in the value).
+        default: Value where a scenario gives none; None if it must.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    linear: bool = False
+    signed: bool = False
+    logarithmic: bool = True
+    default: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What recordings must offer before a cause can be tested."""
+
+    runs: int = 1
+    dates: int = 0
+    power_on: bool = False
+    channel: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """One measured run as a feature sees it, at its native rate.
+
+    Attributes:
+        time_s: Times of the rows, s, ascending, shape (n,).
+        temperature_c: Recorded temperature, C, shape (n,).
+        on_s: Time since power-on, s, shape (n,); None if unknown.
+        channel: The auxiliary channel that is asked about, shape (n,), else None.
+        run: Number of the run among `runs`.
+        runs: How many runs there are.
+        day: Days since the first dated run; None without a date.
+    """
+
+    time_s: Array
+    temperature_c: Array
+    on_s: Array | None = None
+    channel: Array | None = None
+    run: int = 0
+    runs: int = 1
+    day: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """Columns of one run, shape (n, k), and the rows where they are known: enough of the past was seen.
+
+    For kind "input" the columns are the temperature that the map should see (C) and its rate (C/min).
+    """
+
+    columns: Array
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One simulated run, on the simulation's grid, from the start of the chamber programme.
+
+    Attributes:
+        time_s: s, shape (n,).
+        on_s: Time since power-on, s; negative before.
+        node_c: True temperature where the sensor sits, C.
+        cavity_c: Temperature that the bias acts on, C.
+        sensed_c: What the sensor would show without noise, C.
+        channel: The auxiliary channel that the cause names, else None.
+        day: Days since the first run.
+    """
+
+    time_s: Array
+    on_s: Array
+    node_c: Array
+    cavity_c: Array
+    sensed_c: Array
+    channel: Array | None
+    day: float
+
+
+class Recursion(Protocol):
+    """A term on the target: started by the first valid sample, stepped by every block mean.
+
+    `dtype` chooses the arithmetic (np.float64, np.float32); one operation at a time in either.
+    """
+
+    def start(self, value: float) -> None:
+        """First valid sample (temperature in C, or the channel's unit)."""
+
+    def step(self, mean: float) -> None:
+        """Mean of a block that ends."""
+
+    def value(self) -> float:
+        """What is added to the map's bias now, deg/h."""
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A cause of the catalogue. A hook that a cause does not have is None.
+
+    Attributes:
+        id, family: As in docs/FORMAT.md and in the results of `diagnose`.
+        kind: How it enters a model.
+        equation: In plain text.
+        source: Where the mechanism is described.
+        parameters: In the order of docs/FORMAT.md; the linear ones come last.
+        needs: What recordings must offer.
+        cavity: Simulation: temperature that the bias acts on instead of `scene.cavity_c`, C.
+        bias: Simulation: what it adds to the bias, deg/h; may draw from the generator (once for each run).
+        record: Simulation: what the sensor shows instead of `scene.sensed_c`, C.
+        features: Columns for given nonlinear parameters.
+        amplitudes: Linear parameters from the fitted weights of the columns.
+        reference: Recursion on the target for all parameters, block length in s and number type.
+    """
+
+    id: str
+    family: str
+    kind: Kind
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    needs: Needs = Needs()
+    cavity: Callable[[Scene, Values], Array] | None = None
+    bias: Callable[[Scene, Values, np.random.Generator], Array] | None = None
+    record: Callable[[Scene, Values], Array] | None = None
+    features: Callable[[History, Values], Features] | None = None
+    amplitudes: Callable[[Array], dict[str, float]] | None = None
+    reference: Callable[[Values, float, type[np.floating]], Recursion] | None = None
+
+    def nonlinear(self) -> tuple[Parameter, ...]:
+        """Parameters that `features` takes."""
+        return tuple(parameter for parameter in self.parameters if not parameter.linear)

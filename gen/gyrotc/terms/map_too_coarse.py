@@ -1,0 +1,38 @@
+"""Static structure finer than the map: looks like memory, is none; mended by more centers, not by a term."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .base import Array, Features, History, Parameter, Scene, Term, Values
+
+__all__ = ["TERM"]
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    return np.asarray(
+        values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"])
+    )
+
+
+def _features(history: History, values: Values) -> Features:
+    """Hat functions of T, `width_c` apart over −60 ... 100 C: any shape of that fineness is in their span."""
+    nodes = np.arange(-60.0, 100.0, values["width_c"])
+    distance = np.abs(history.temperature_c[:, None] - nodes) / values["width_c"]
+    return Features(np.maximum(0.0, 1.0 - distance), np.ones(len(history.time_s), dtype=bool))
+
+
+TERM = Term(
+    id="map_too_coarse",
+    family="static_map",
+    kind="static",
+    equation="bias += amplitude tanh((T - at)/width)",
+    source="a steep place in the static map",
+    parameters=(
+        Parameter("width_c", "C", 2.0, 10.0, default=3.0),
+        Parameter("at_c", "C", -40.0, 70.0, logarithmic=False, default=20.0),
+        Parameter("amplitude_dph", "deg/h", 1e-5, 1e-2, linear=True, signed=True),
+    ),
+    bias=_bias,
+    features=_features,
+)

@@ -1,0 +1,69 @@
+"""Operators with memory that the terms share: first-order lag, play, delay. Vectorised over a record."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+__all__ = ["delayed", "first_order", "play"]
+
+Array = NDArray[np.float64]
+
+_UNIFORM = 1e-6  # largest departure of a row period from their mean that still counts as even, relative
+
+
+def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
+    """tau dz/dt = driven − z, exact for an input linear between the samples; starts at rest on the first one.
+
+    Args:
+        tau_s: Time constant, s; 0 gives the input itself.
+        time_s: Ascending times, s, shape (n,).
+        driven: Input, shape (n,).
+
+    Returns:
+        z, shape (n,).
+    """
+    if tau_s == 0.0 or len(driven) < 2:
+        return driven.copy()
+    x = np.diff(time_s) / tau_s
+    lost = -np.expm1(-x)
+    late = 1.0 - lost / x  # weight of an interval's end point
+    forced = late * driven[1:] + (lost - late) * driven[:-1]
+    rest: Array
+    if np.ptp(x) <= _UNIFORM * float(x.mean()):
+        decay = 1.0 - float(lost.mean())
+        rest = lfilter([1.0], [1.0, -decay], forced, zi=[decay * driven[0]])[0]
+        return np.concatenate((driven[:1], rest))
+    return _affine_scan(np.concatenate(([0.0], 1.0 - lost)), np.concatenate((driven[:1], forced)))
+
+
+def _affine_scan(factor: Array, offset: Array) -> Array:
+    """z_k = factor_k z_(k−1) + offset_k for all k: affine maps composed over distances 1, 2, 4, ..."""
+    step = 1
+    while step < len(factor):
+        offset = np.concatenate((offset[:step], offset[step:] + factor[step:] * offset[:-step]))
+        factor = np.concatenate((factor[:step], factor[step:] * factor[:-step]))
+        step *= 2
+    return offset
+
+
+def play(width_c: float, temperature_c: Array, start_c: float | None = None) -> Array:
+    """Play (backlash) operator z ← max(T − w, min(T + w, z)), from z = T or `start_c`, shape (n,).
+
+    A step clamps z to T ± w. Clamps composed are a clamp again, so they are composed over 1, 2, 4, ... steps.
+    """
+    low, high = temperature_c - width_c, temperature_c + width_c
+    step = 1
+    while step < len(low):
+        after_low, after_high = low[step:], high[step:]
+        low = np.concatenate((low[:step], np.clip(low[:-step], after_low, after_high)))
+        high = np.concatenate((high[:step], np.clip(high[:-step], after_low, after_high)))
+        step *= 2
+    first = float(temperature_c[0]) if start_c is None else start_c
+    return np.asarray(np.clip(first, low, high))
+
+
+def delayed(shift_s: float, time_s: Array, values: Array) -> Array:
+    """values(t − shift), linear between samples; beyond the record its first and last value."""
+    return np.interp(time_s - shift_s, time_s, values)

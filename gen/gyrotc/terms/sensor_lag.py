@@ -1,0 +1,28 @@
+"""The sensor lags the cavity: a negative control.
+
+If tau dT_s/dt = T − T_s then T = T_s + tau dT_s/dt exactly, so f(T) is again a static function of (T_s,
+dT_s/dt):
+a static map absorbs it and nothing in its residual can show it. There is nothing to fit and no reference.
+"""
+
+from __future__ import annotations
+
+from .base import Array, Parameter, Scene, Term, Values
+from .operators import first_order
+
+__all__ = ["TERM"]
+
+
+def _record(scene: Scene, values: Values) -> Array:
+    return first_order(values["tau_s"], scene.time_s, scene.sensed_c)
+
+
+TERM = Term(
+    id="sensor_lag",
+    family="control",
+    kind="record",
+    equation="tau dT_s/dt = T - T_s; f(T) = f(T_s + tau dT_s/dt)",
+    source="identity; a static map of (T_s, dT_s/dt) absorbs it",
+    parameters=(Parameter("tau_s", "s", 10.0, 1000.0),),
+    record=_record,
+)

@@ -1,0 +1,38 @@
+"""Turn-on offset: every power-on draws another constant. An uncertainty, or re-zeroed at rest; in no map."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+
+__all__ = ["TERM"]
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    return np.full(len(scene.time_s), rng.normal(0.0, values["std_dph"]))
+
+
+def _features(history: History, values: Values) -> Features:
+    """One column for each run, 1 in its own: weights of one common variance (a random effect), not free."""
+    columns = np.zeros((len(history.time_s), history.runs))
+    columns[:, history.run] = 1.0
+    return Features(columns, np.ones(len(history.time_s), dtype=bool))
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"std_dph": float(np.sqrt(np.mean(weights**2)))}
+
+
+TERM = Term(
+    id="turn_on_offset",
+    family="between_runs",
+    kind="random",
+    equation="bias += o_run, o_run normal with standard deviation std",
+    source="run-to-run bias repeatability, IEEE Std 647",
+    parameters=(Parameter("std_dph", "deg/h", 1e-5, 1e-1, linear=True),),
+    needs=Needs(runs=3),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)
