@@ -152,12 +152,12 @@ def _write_run(
     path: Path, format: Format, made: Record, length: RowLength, weight: float | None
 ) -> Iterator[float]:
     """Writes the rows of a run; yields the share that is done."""
-    file = RunFile(path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=list(made.channels))
     total_s = CELL_S * len(made.reading_c)
-    for chunk in rows(made, length):
-        file.write(chunk)
-        yield float(chunk.time_s[-1] + length.row_s) / total_s
-    file.close()
+    columns = list(made.channels)
+    with RunFile(path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=columns) as file:
+        for chunk in rows(made, length):
+            file.write(chunk)
+            yield float(chunk.time_s[-1] + length.row_s) / total_s
 
 
 def _truth_of_run(

@@ -30,11 +30,10 @@ def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
     lost = -np.expm1(-x)
     late = 1.0 - lost / x  # weight of an interval's end point
     forced = late * driven[1:] + (lost - late) * driven[:-1]
-    rest: Array
     if np.ptp(x) <= _UNIFORM * float(x.mean()):
         decay = 1.0 - float(lost.mean())
         rest = lfilter([1.0], [1.0, -decay], forced, zi=[decay * driven[0]])[0]
-        return np.concatenate((driven[:1], rest))
+        return np.asarray(np.concatenate((driven[:1], rest)))
     return _affine_scan(np.concatenate(([0.0], 1.0 - lost)), np.concatenate((driven[:1], forced)))
 
 
