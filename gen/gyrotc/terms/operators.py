@@ -25,7 +25,7 @@ def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
         z, shape (n,).
     """
     if tau_s == 0.0 or len(driven) < 2:
-        return driven.copy()
+        return np.array(driven)
     x = np.diff(time_s) / tau_s
     lost = -np.expm1(-x)
     late = 1.0 - lost / x  # weight of an interval's end point
