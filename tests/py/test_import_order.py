@@ -10,10 +10,38 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 
 # From left to right. A stage is a module or a package of gyrotc.
-ORDER = (
-    "errors _core terms dataset spans noisefloor simulate frontend metrics model table train estimator fitting quantise reference "
-    "amalgamate vectors emit toolchain verify findings evaluate compare check diagnose plots report build cli"
-).split()
+ORDER = [
+    "errors",
+    "_core",
+    "terms",
+    "dataset",
+    "spans",
+    "noisefloor",
+    "simulate",
+    "frontend",
+    "metrics",
+    "model",
+    "table",
+    "train",
+    "estimator",
+    "fitting",
+    "quantise",
+    "reference",
+    "amalgamate",
+    "vectors",
+    "emit",
+    "toolchain",
+    "verify",
+    "findings",
+    "evaluate",
+    "compare",
+    "check",
+    "diagnose",
+    "plots",
+    "report",
+    "build",
+    "cli",
+]
 
 
 def _stage(path: Path) -> str:

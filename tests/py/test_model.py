@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from gyrotc.errors import InputError
 from gyrotc.model import Model, load_model, table_id
 
@@ -111,7 +110,7 @@ def test_tampered_fields_are_refused_by_name(
     with pytest.raises(InputError) as caught:
         load_model(file)
     assert str(file) in str(caught.value)
-    assert path.split(".")[0] in str(caught.value)
+    assert path.split(".", maxsplit=1)[0] in str(caught.value)
 
 
 @pytest.mark.parametrize(
