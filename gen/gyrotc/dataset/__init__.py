@@ -1,0 +1,21 @@
+"""Recordings on disk become a `Dataset`: files, units, spans. Nothing after this stage opens a recording.
+
+`load` reads a folder and refuses what is wrong, `axes_of` says what `--axis` may choose, `survey` goes on
+after a problem and tells all of them. What a folder may hold is written in docs/recordings.md.
+"""
+
+from .load import axes_of, load, survey
+from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run
+
+__all__ = [
+    "Applied",
+    "Dataset",
+    "DeclaredNoise",
+    "EarthRate",
+    "Exclusion",
+    "Rows",
+    "Run",
+    "axes_of",
+    "load",
+    "survey",
+]

@@ -1,0 +1,223 @@
+"""CSV recordings: fast reading by pyarrow, and a slow look at a file that cannot be read, to say why.
+
+Read are UTF-8 text with or without byte order mark, LF or CRLF, quotes and spaces around cells, empty lines,
+a last line without end. A last line that was torn off in the middle (a recording that still grows, a logger
+that lost power) is left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import re
+from array import array
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+
+from ..errors import InputError
+from .records import Floats
+from .values import Fault
+
+__all__ = ["CsvFile"]
+
+_BLOCK_BYTES = 2**22
+_LONGEST_LINE = 2**20
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
+
+
+class CsvFile:
+    """One CSV file, as long as it was when it was opened.
+
+    Args:
+        name: Name in messages.
+        path: Where it is.
+
+    Attributes:
+        names: Column names.
+        sha256: Of the bytes that are read.
+        torn: The unfinished last line that is left out, empty if there is none.
+
+    Raises:
+        InputError: It cannot be read, is no text, is empty or has no header.
+    """
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name = name
+        self.path = path
+        try:
+            self._size = path.stat().st_size
+            with path.open("rb") as file:
+                head = file.readline(_LONGEST_LINE)
+            self.names = _header(name, head)
+            self._size, self.torn = _without_torn_line(path, self._size, len(head), len(self.names))
+            self.sha256 = self._hash()
+        except OSError as error:
+            raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
+
+    def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
+        """Columns as float64; None if pyarrow cannot make numbers of them: `scan` says why.
+
+        Raises:
+            InputError: The file has been changed since it was opened.
+        """
+        if self.path.stat().st_size < self._size:
+            raise InputError(self.name, "was changed while it was being read", "a recording that stays")
+        unique = [f"{index} {name}" for index, name in enumerate(self.names)]
+        try:
+            with _Prefix(self.path, self._size) as prefix:
+                table = pacsv.read_csv(
+                    prefix,
+                    pacsv.ReadOptions(
+                        use_threads=False, block_size=_BLOCK_BYTES, skip_rows=1, column_names=unique
+                    ),
+                    convert_options=pacsv.ConvertOptions(
+                        column_types=dict.fromkeys(unique, pa.float64()),
+                        include_columns=[unique[self.names.index(name)] for name in columns],
+                    ),
+                )
+        except pa.ArrowInvalid:
+            return None
+        if any(column.null_count for column in table.columns):
+            return None
+        return {name: column.to_numpy() for name, column in zip(columns, table.columns, strict=True)}
+
+    def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
+        """Reads line by line what can be read.
+
+        Returns:
+            Columns of the rows that are whole (NaN where a cell is no number), their line numbers, and the
+            faults; `Fault.row` is a line number here.
+        """
+        cells: list[array[float]] = [array("d") for _ in self.names]
+        lines = array("q")
+        seen = _Faults()
+        for number, line in self._lines():
+            row = [cell.strip().strip('"').strip() for cell in line.split(",")]
+            if "\x00" in line:
+                seen.add(number, "", "NUL byte", "a NUL byte (binary or damaged)", "text")
+            elif len(row) != len(self.names):
+                found = f"{len(row)} cells" if len(row) != 1 else "1 cell"
+                seen.add(number, "", "ragged", found, f"{len(self.names)} as in the header")
+            else:
+                lines.append(number)
+                for name, column, cell in zip(self.names, cells, row, strict=True):
+                    column.append(seen.number(number, name, cell))
+        columns = {name: np.array(column) for name, column in zip(self.names, cells, strict=True)}
+        return columns, list(lines), seen.faults()
+
+    def place(self, row: int) -> int:
+        """Line number of a row (0 is the first one below the header)."""
+        for index, (number, _) in enumerate(self._lines()):
+            if index == row:
+                return number
+        raise IndexError(row)
+
+    def _lines(self) -> Iterator[tuple[int, str]]:
+        """Lines below the header that are not empty, with their numbers."""
+        with _Prefix(self.path, self._size) as prefix:
+            text = io.TextIOWrapper(io.BufferedReader(prefix), encoding="utf-8", errors="replace")
+            for number, line in enumerate(text, start=1):
+                if number > 1 and line.rstrip("\r\n"):
+                    yield number, line.rstrip("\r\n")
+
+    def _hash(self) -> str:
+        digest = hashlib.sha256()
+        with _Prefix(self.path, self._size) as prefix:
+            while block := prefix.read(_BLOCK_BYTES):
+                digest.update(block)
+        return digest.hexdigest()
+
+
+class _Faults:
+    """Faults of cells, the first of each kind in each column, with their number."""
+
+    def __init__(self) -> None:
+        self._seen: dict[tuple[str, str], list[int]] = {}
+        self._text: dict[tuple[str, str], tuple[str, str]] = {}
+
+    def add(self, line: int, column: str, kind: str, found: str, expected: str) -> None:
+        first = self._seen.setdefault((column, kind), [line, 0])
+        first[1] += 1
+        self._text.setdefault((column, kind), (found, expected))
+
+    def number(self, line: int, column: str, cell: str) -> float:
+        """The number in a cell; NaN and a fault if there is none."""
+        if _NUMBER.fullmatch(cell):
+            return float(cell)
+        if not cell:
+            self.add(line, column, "empty", "an empty cell", "a number")
+        else:
+            self.add(line, column, "text", repr(cell[:40]), "a number with a decimal point")
+        return float("nan")
+
+    def faults(self) -> list[Fault]:
+        return [
+            Fault(line, column, count, *self._text[column, kind])
+            for (column, kind), (line, count) in self._seen.items()
+        ]
+
+
+class _Prefix(io.RawIOBase):
+    """The first `size` bytes of a file."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._file = path.open("rb", buffering=0)
+        self._left = size
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        count = self._file.readinto(memoryview(buffer)[: self._left])
+        self._left -= count
+        return count
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def _header(name: str, head: bytes) -> tuple[str, ...]:
+    where = f"{name}, line 1"
+    if not head:
+        raise InputError(name, "is empty", "a header and rows")
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(name, "UTF-16 text", "UTF-8 text")
+    if b"\x00" in head or len(head) == _LONGEST_LINE:
+        raise InputError(name, "binary data", "CSV text with a header")
+    try:
+        text = head.decode("utf-8-sig").rstrip("\r\n")
+    except UnicodeDecodeError:
+        raise InputError(where, "bytes that are no UTF-8", "CSV text in UTF-8") from None
+    if "," not in text:
+        for mark, what in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in text:
+                expected = "commas between columns and points in decimals"
+                raise InputError(where, f"{what} between columns", expected)
+    names = tuple(cell.strip() for cell in next(csv.reader([text]), []))
+    if not names or all(_NUMBER.fullmatch(cell) for cell in names):
+        raise InputError(where, "no header" if names else "an empty line", "the names of the columns")
+    return names
+
+
+def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[int, str]:
+    """Size without a torn last line (no line end, and cells missing or a number cut), and that line."""
+    start = max(head, size - _LONGEST_LINE)
+    with path.open("rb") as file:
+        file.seek(start)
+        tail = file.read(size - start)
+    at = max(tail.rfind(b"\n"), tail.rfind(b"\r")) + 1
+    line = tail[at:].decode("utf-8", "replace")
+    cells = [cell.strip() for cell in line.split(",")]
+    whole = len(cells) == columns and _NUMBER.fullmatch(cells[-1])
+    cut = _NUMBER.fullmatch(cells[-1]) or _TORN_NUMBER.fullmatch(cells[-1])
+    numbers = cut and all(_NUMBER.fullmatch(cell) for cell in cells[:-1])
+    if not line or whole or not numbers or len(cells) > columns:
+        return size, ""
+    return start + at, line

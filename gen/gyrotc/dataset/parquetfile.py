@@ -1,0 +1,89 @@
+"""Parquet recordings, read row group by row group."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from .records import Floats
+
+__all__ = ["ParquetFile"]
+
+_BATCH_ROWS = 2**18
+_BLOCK_BYTES = 2**22
+
+
+class ParquetFile:
+    """One Parquet file.
+
+    Args:
+        name: Name in messages.
+        path: Where it is.
+
+    Attributes:
+        names: Column names.
+        sha256: Of the file.
+
+    Raises:
+        InputError: It cannot be read, is no Parquet, or has a column that holds no numbers.
+    """
+
+    torn = ""  # a Parquet file is whole or cannot be opened
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name = name
+        self.path = path
+        try:
+            with pq.ParquetFile(path) as file:
+                schema = file.schema_arrow
+                self._n_rows = file.metadata.num_rows
+            self.sha256 = self._hash()
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(
+                name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
+            ) from error
+        self.names = tuple(schema.names)
+        for field in schema:
+            if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
+                raise InputError(f"{name}, column {field.name}", f"holds {field.type}", "numbers")
+
+    def read(self, columns: Sequence[str]) -> dict[str, Floats]:
+        """Columns as float64, NaN where a value is missing.
+
+        Raises:
+            InputError: The file is damaged.
+        """
+        read = {column: np.empty(self._n_rows) for column in columns}
+        at = 0
+        try:
+            with pq.ParquetFile(self.path) as file:
+                for batch in file.iter_batches(_BATCH_ROWS, columns=list(columns), use_threads=False):
+                    for name, values in zip(batch.schema.names, batch.columns, strict=True):
+                        filled = pc.fill_null(values.cast(pa.float64(), safe=False), float("nan"))
+                        read[name][at : at + len(batch)] = filled.to_numpy(zero_copy_only=False)
+                    at += len(batch)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise InputError(self.name, f"is damaged ({_short(error)})", "a whole Parquet file") from error
+        return read
+
+    def place(self, row: int) -> int:
+        """Number of a row, from 1."""
+        return row + 1
+
+    def _hash(self) -> str:
+        digest = hashlib.sha256()
+        with self.path.open("rb") as file:
+            while block := file.read(_BLOCK_BYTES):
+                digest.update(block)
+        return digest.hexdigest()
+
+
+def _short(error: Exception) -> str:
+    return " ".join(str(error).split())[:120]

@@ -1,0 +1,158 @@
+"""One file: opened, its columns understood, its numbers checked; read again as often as it is needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .columns import Layout, arrange
+from .csvfile import CsvFile
+from .parquetfile import ParquetFile
+from .problems import Problems
+from .records import Applied, EarthRate, Floats, Rows
+from .schema import Columns
+from .values import MIN_ROWS, RATE_DPH, Fault, faults
+
+__all__ = ["Reader", "Recording", "open_recording"]
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A file whose numbers are in order.
+
+    Attributes:
+        file: The file.
+        layout: Its columns.
+        time_s: Its times, s.
+        row_period_s: Median row period, s.
+    """
+
+    file: CsvFile | ParquetFile
+    layout: Layout
+    time_s: Floats
+    row_period_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reader:
+    """Reads the rows of one axis of a file.
+
+    Attributes:
+        pulse_weight_arcsec: Angle of one pulse, arcsec; used where pulses were counted.
+        earth: Earth's rate to take off.
+        applied: Correction to add back.
+    """
+
+    file: CsvFile | ParquetFile
+    layout: Layout
+    axis: str | None
+    channels: tuple[str, ...]
+    pulse_weight_arcsec: float | None
+    earth: EarthRate | None
+    applied: Applied | None
+    row_period_s: float
+
+    def __call__(self) -> Rows:
+        """All rows.
+
+        Raises:
+            InputError: The file has been changed since it was checked.
+        """
+        layout = self.layout
+        value = layout.value_of(self.axis)
+        columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
+        if columns is None:
+            raise InputError(self.file.name, "was changed while it was being read", "a recording that stays")
+        time, rate = columns[layout.time], columns[value]
+        if layout.pulses:
+            rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
+        if self.earth is not None:
+            rate = rate - self.earth.rate_dph
+        channels = {name: columns[name] for name in self.channels}
+        rows = Rows(time, columns[layout.temperature], rate, channels)
+        if self.applied is not None:
+            rate = rate + self.applied.correction_dph(rows, self.row_period_s)
+            rows = Rows(time, rows.temperature_c, rate, channels)
+        return rows
+
+
+def rate_of_pulses(time_s: Floats, pulses: Floats, weight_arcsec: float) -> Floats:
+    """Mean rate since the last row, deg/h (1 arcsec/s = 1 deg/h); NaN in the first row."""
+    rate = np.full(len(time_s), np.nan)
+    rate[1:] = pulses[1:] * weight_arcsec / np.diff(time_s)
+    return rate
+
+
+def open_recording(
+    name: str, path: Path, columns: Columns, pulse_weight_arcsec: float | None, problems: Problems
+) -> Recording | None:
+    """Opens and checks one file; None (and problems) if it is not in order."""
+    before = len(problems)
+    try:
+        if path.is_dir() or not path.exists():
+            raise InputError(
+                name, "is a folder" if path.is_dir() else "does not exist", "a file of the data set"
+            )
+        file = ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
+        layout = arrange(name, file.names, columns, problems)
+        if layout is None:
+            return None
+        if layout.pulses and pulse_weight_arcsec is None:
+            raise InputError(f"{name}, column pulses", "no weight", "pulse_weight_arcsec in dataset.toml")
+        time = _checked(file, layout, pulse_weight_arcsec, problems)
+    except InputError as error:
+        problems.add(error)
+        return None
+    if len(problems) > before:
+        return None
+    return Recording(file, layout, time, float(np.median(np.diff(time))))
+
+
+def _checked(
+    file: CsvFile | ParquetFile, layout: Layout, pulse_weight_arcsec: float | None, problems: Problems
+) -> Floats:
+    """Reads all columns and checks them; the times."""
+    values = file.read(file.names)
+    lines = None
+    if values is None and isinstance(file, CsvFile):
+        values, lines, found = file.scan()
+        for fault in found:
+            problems.add(_problem(file, fault, fault.row))
+        keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
+        values = {name: column[keep] for name, column in values.items()}
+        lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
+    assert values is not None
+    time = values[layout.time]
+    for fault in faults(values, layout):
+        problems.add(_problem(file, fault, lines[fault.row] if lines else file.place(fault.row)))
+    if layout.pulses and len(time) > 1:
+        _check_pulse_rate(
+            file, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0), problems
+        )
+    if len(time) < MIN_ROWS:
+        problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
+    return time
+
+
+def _check_pulse_rate(file: CsvFile | ParquetFile, rate: Floats, problems: Problems) -> None:
+    wrong = np.abs(rate) > RATE_DPH[1]
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        found = f"counts that make {rate[first]:.10g} deg/h"
+        problems.add(
+            _problem(
+                file,
+                Fault(first, "pulses", int(wrong.sum()), found, f"at most {RATE_DPH[1]:g} deg/h"),
+                file.place(first),
+            )
+        )
+
+
+def _problem(file: CsvFile | ParquetFile, fault: Fault, place: int) -> InputError:
+    unit = "line" if isinstance(file, CsvFile) else "row"
+    where = f"{file.name}, {unit} {place}" + (f", column {fault.column}" if fault.column else "")
+    more = f" (and {fault.rows - 1} more {unit}s)" if fault.rows > 1 else ""
+    return InputError(where, fault.found + more, fault.expected)

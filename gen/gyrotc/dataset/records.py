@@ -1,0 +1,166 @@
+"""What a data set is in memory: a description with its runs; rows are read only when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Applied", "Dataset", "DeclaredNoise", "EarthRate", "Exclusion", "Floats", "Role", "Rows", "Run"]
+
+Floats = NDArray[np.float64]
+Role = Literal["train", "exam"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Rows of one recording: float64 arrays of one length, not to be written to.
+
+    Attributes:
+        time_s: Seconds on the file's clock, strictly increasing.
+        temperature_c: Temperature, C.
+        rate_dph: Measured rate of the chosen axis, deg/h, without Earth's rate where that is computed; NaN in
+            the first row of counted pulses.
+        channels: Auxiliary channels by column name, in their own units.
+    """
+
+    time_s: Floats
+    temperature_c: Floats
+    rate_dph: Floats
+    channels: dict[str, Floats]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """A stretch from_s <= t < to_s of the file's clock that belongs to no run, and why."""
+
+    from_s: float
+    to_s: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EarthRate:
+    """Earth's rate along the sensitive axis, taken off every row, and its standard uncertainty, deg/h."""
+
+    rate_dph: float
+    sigma_dph: float
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """The model that was subtracted while recording.
+
+    Attributes:
+        hash: Hash of that model.
+        correction_dph: Gives the correction in force at every row (deg/h) from rows and median period.
+    """
+
+    hash: str
+    correction_dph: Callable[[Rows, float], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredNoise:
+    """What noise the unit is declared to have; None where nothing is said."""
+
+    arw_deg_per_sqrt_h: float | None = None
+    bias_instability_dph: float | None = None
+    rate_random_walk_dph_per_sqrt_h: float | None = None
+    quantum_arcsec: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run: a recording or a span of one.
+
+    Attributes:
+        file: Name as in the data set.
+        path: Where it lies.
+        sha256: Of the bytes that were read, hexadecimal.
+        role: What the run is for.
+        environment: Free text.
+        started: Start of the recording, with time zone; None if not stated.
+        power_on_s: Power-on on this run's clock, s; None if unknown.
+        from_s: Start of the span on the file's clock, s; None: the file's first row.
+        to_s: End of the span (exclusive), s; None: beyond the file's last row.
+        exclude: Stretches within it that do not count.
+        row_period_s: Median row period of the file, s.
+        n_rows: Rows of the file.
+        earth: Earth's rate that is taken off, None where there is nothing to take off.
+        reader: Reads the whole file; `rows` is the way to call it.
+    """
+
+    file: str
+    path: Path
+    sha256: str
+    role: Role
+    environment: str
+    started: datetime | None
+    power_on_s: float | None
+    from_s: float | None
+    to_s: float | None
+    exclude: tuple[Exclusion, ...]
+    row_period_s: float
+    n_rows: int
+    earth: EarthRate | None
+    reader: Callable[[], Rows] | None = field(repr=False, compare=False)
+
+    def rows(self) -> Rows:
+        """All rows of the file, also those outside the span: the front end runs from the first row on.
+
+        Raises:
+            InputError: The file has been changed since it was first read.
+        """
+        assert self.reader is not None
+        return self.reader()
+
+    def in_span(self, time_s: Floats) -> NDArray[np.bool_]:
+        """Which times (s on the file's clock) belong to the run: from_s <= t < to_s and not excluded."""
+        inside = np.ones(np.shape(time_s), dtype=bool)
+        if self.from_s is not None:
+            inside &= time_s >= self.from_s
+        if self.to_s is not None:
+            inside &= time_s < self.to_s
+        for gap in self.exclude:
+            inside &= (time_s < gap.from_s) | (time_s >= gap.to_s)
+        return inside
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset:
+    """A folder of recordings of one axis of one serial.
+
+    Attributes:
+        folder: Where it lies.
+        serial: Serial of the gyro.
+        axis: Chosen axis, None where the recordings have one rate.
+        description: Free text.
+        earth_rate: As stated: "removed", "none" or "compute"; None if not stated.
+        noise: Declared noise, None if not declared.
+        applied_table: Hash of the model that was subtracted while recording, None: none.
+        meta: Free facts, JSON types only.
+        runs: In the order of the description.
+        channels: Auxiliary channels that every run has.
+        warnings: What a user should know of what was done to the data.
+    """
+
+    folder: Path
+    serial: str
+    axis: str | None
+    description: str
+    earth_rate: str | None
+    noise: DeclaredNoise | None
+    applied_table: str | None
+    meta: dict[str, Any]
+    runs: tuple[Run, ...]
+    channels: tuple[str, ...]
+    warnings: tuple[str, ...]

@@ -1,0 +1,82 @@
+"""What the numbers of a recording must fulfil: finite, time going on, within what a gyro can show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .columns import Layout
+from .records import Floats
+
+__all__ = ["MIN_ROWS", "Fault", "faults"]
+
+MIN_ROWS = 10
+TEMPERATURE_C = (-90.0, 200.0)
+RATE_DPH = (-7.5e6, 7.5e6)
+_TIME_S = (-1e10, 1e10)
+_KELVIN = (183.15, 473.15)  # the plausible range, had it been given in kelvin
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault of a column: first row that has it, how many rows have it, what was found and expected."""
+
+    row: int
+    column: str
+    rows: int
+    found: str
+    expected: str
+
+
+def faults(columns: Mapping[str, Floats], layout: Layout) -> Iterator[Fault]:
+    """Faults of the numbers of one file, at most one for each column and kind."""
+    good_time = True
+    for name, values in columns.items():
+        wrong = ~np.isfinite(values)
+        if wrong.any():
+            good_time = good_time and name != layout.time
+            yield _fault(name, wrong, values, "a finite number")
+    time = columns[layout.time]
+    if good_time:
+        yield from _order(layout.time, time)
+    yield from _within(layout.time, time, _TIME_S, "s")
+    yield from _temperature(layout.temperature, columns[layout.temperature])
+    if layout.pulses:
+        pulses = columns[layout.value]
+        wrong = np.isfinite(pulses) & (pulses != np.round(pulses))
+        if wrong.any():
+            yield _fault(layout.value, wrong, pulses, "whole counts since the last row")
+    else:
+        for name in layout.axes.values() or (layout.value,):
+            yield from _within(name, columns[name], RATE_DPH, "deg/h")
+
+
+def _order(name: str, time: Floats) -> Iterator[Fault]:
+    step = np.diff(time)
+    for wrong, what in ((step == 0.0, "repeated"), (step < 0.0, "going back")):
+        if wrong.any():
+            first = int(np.argmax(wrong)) + 1
+            found = f"{what}: {time[first]:.10g} s after {time[first - 1]:.10g} s"
+            yield Fault(first, name, int(wrong.sum()), found, "times that strictly increase")
+
+
+def _temperature(name: str, values: Floats) -> Iterator[Fault]:
+    for fault in _within(name, values, TEMPERATURE_C, "C"):
+        wrong = values > TEMPERATURE_C[1]
+        kelvin = bool(np.all((values[wrong] >= _KELVIN[0]) & (values[wrong] <= _KELVIN[1])) and wrong.any())
+        hint = "; kelvin?" if kelvin else ""
+        yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
+
+
+def _within(name: str, values: Floats, limits: tuple[float, float], unit: str) -> Iterator[Fault]:
+    wrong = np.isfinite(values) & ((values < limits[0]) | (values > limits[1]))
+    if wrong.any():
+        yield _fault(name, wrong, values, f"{limits[0]:g} ... {limits[1]:g} {unit}")
+
+
+def _fault(name: str, wrong: NDArray[np.bool_], values: Floats, expected: str) -> Fault:
+    first = int(np.argmax(wrong))
+    return Fault(first, name, int(wrong.sum()), f"{values[first]:.10g}", expected)
