@@ -69,7 +69,8 @@ typedef struct {
     uint_least32_t valid;          /* valid ones among them */
     uint_least32_t gap;            /* samples since the last believed one */
     uint_least32_t suspects;       /* suspect samples in a row that agree */
-    uint_least32_t repeats;        /* identical samples in a row */
+    uint_least32_t received;       /* last finite sample, its bits */
+    uint_least32_t repeats;        /* samples before it that were identical */
     uint_least32_t held_blocks;    /* invalid blocks in a row */
     uint_least32_t filled;         /* blocks in the window since the last restart */
     uint_least32_t window_valid;   /* one bit a block, newest lowest */
@@ -77,7 +78,6 @@ typedef struct {
     float step_per_sample;         /* C */
     float last;                    /* last believed sample, C */
     float candidate;               /* last suspect sample, C */
-    float received;                /* last finite sample, C */
     float base;                    /* first valid sample of the block, C */
     float sum;                     /* of differences from base, C */
     float mean;                    /* last valid block mean, C */
@@ -96,6 +96,7 @@ typedef struct {
     uint_least32_t valid;
     uint_least32_t gap;
     uint_least32_t suspects;
+    uint_least32_t received;
     uint_least32_t repeats;
     uint_least32_t held_blocks;
     uint_least32_t filled;
@@ -104,7 +105,6 @@ typedef struct {
     int_least32_t step_per_sample; /* 2^-16 C */
     int_least32_t last;
     int_least32_t candidate;
-    int_least32_t received;
     int_least32_t base;
     int_least32_t mean;
     int_least32_t bias;            /* 2^-bias_frac_bits deg/h */

@@ -1,0 +1,35 @@
+"""Front end: what the target makes of its temperature samples, mirrored operation by operation.
+
+Stage 2 of the house (recordings → **samples** → model → tables → C → proof). docs/numerics.md,
+section 1, is the text that this package and libc/gtc_front.inl both follow, to the bit:
+`numbers` holds the operations of each arithmetic, `believe` decides which samples are believed,
+`follow` makes block means, slopes and the sequence of corrections, `training` turns a recording
+into training samples.
+"""
+
+from __future__ import annotations
+
+from .believe import BELIEVED, HELD, RESTART, believe
+from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow
+from .numbers import F32, Arithmetic
+from .training import Blocks, missed_before, run_blocks, samples_per_block
+
+__all__ = [
+    "BELIEVED",
+    "F32",
+    "FALLBACK",
+    "HELD",
+    "KEEP",
+    "MAP",
+    "RESTART",
+    "Arithmetic",
+    "Blocks",
+    "Settings",
+    "Steps",
+    "believe",
+    "expand_missed",
+    "follow",
+    "missed_before",
+    "run_blocks",
+    "samples_per_block",
+]

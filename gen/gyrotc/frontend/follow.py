@@ -1,0 +1,197 @@
+"""From samples to the sequence of corrections: blocks, slopes, holds, restarts, fallback.
+
+docs/numerics.md, section 1, for a whole history at once: blocks are columns of arrays, and every
+float32 operation is the one that the target does, in its order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .believe import HELD, RESTART, believe
+from .numbers import Arithmetic, Numbers
+
+__all__ = ["FALLBACK", "KEEP", "MAP", "Settings", "Steps", "expand_missed", "follow"]
+
+MAP, KEEP, FALLBACK = 0, 1, 2
+_WARMING = 1  # GTC_WARMING
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Members of the table that the front end uses, as numbers of the arithmetic."""
+
+    samples_per_block: int
+    slope_blocks: int
+    hold_blocks: int
+    stuck_samples: int
+    max_step: Any
+    max_slope: Any  # per block
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The corrections of a history, in the order in which they come into force.
+
+    `believed[i]`: sample i was believed. For correction k: it is in force from sample `at[k]` on (at the
+    same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
+    before it stays, held) or FALLBACK; `remarks`: GTC_WARMING or 0. Where `kind` is not MAP, temperature,
+    slope and remarks are those of the last map. Before the first one the correction is
+    0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete; its missing end counts
+    as not valid).
+    """
+
+    believed: NDArray[np.bool_]
+    at: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    temperature: Numbers
+    slope: Numbers
+    remarks: NDArray[np.int32]
+    valid: NDArray[np.bool_]
+    mean: Numbers
+
+    def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Index of the correction in force at each sample; -1 before the first."""
+        return np.asarray(np.searchsorted(self.at, samples, side="right") - 1)
+
+
+def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
+    """Counts of missing samples as `gtc_<n>_missed` shortens them: by whole blocks."""
+    n = settings.samples_per_block
+    most = settings.hold_blocks + settings.slope_blocks + 2
+    blocks = missed // n
+    return np.asarray(np.where(blocks > most, missed - (blocks - most) * n, missed))
+
+
+def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
+    """Follows samples x, shape (n,), from the start of a state on."""
+    step = arithmetic.step_per_sample(settings.max_slope, settings.samples_per_block)
+    verdict = believe(
+        arithmetic, x, max_step=settings.max_step, step=step, stuck_samples=settings.stuck_samples
+    )
+    valid, mean = _block_means(arithmetic, x, verdict, settings.samples_per_block)
+    restarts, fallback = _restarts(verdict, valid, settings)
+    # A block closes when the next sample arrives.
+    n_closed = max(0, x.size - 1) // settings.samples_per_block
+    closings = _closings(arithmetic, valid[:n_closed], mean, fallback, restarts, settings)
+    starts = _Corrections(
+        at=restarts,
+        kind=np.zeros(restarts.size, dtype=np.int8),
+        temperature=x[restarts],
+        slope=np.zeros_like(x[restarts]),
+        remarks=np.full(restarts.size, _WARMING, dtype=np.int32),
+    )
+    # Stable: a block closes before the sample that opens the next one is judged.
+    order = np.argsort(np.concatenate([closings.at, starts.at]), kind="stable")
+    kind = np.concatenate([closings.kind, starts.kind])[order]
+    made = order[np.maximum.accumulate(np.where(kind == MAP, np.arange(kind.size), 0))]
+    return Steps(
+        believed=verdict != HELD,
+        at=np.concatenate([closings.at, starts.at])[order],
+        kind=kind,
+        temperature=np.concatenate([closings.temperature, starts.temperature])[made],
+        slope=np.concatenate([closings.slope, starts.slope])[made],
+        remarks=np.concatenate([closings.remarks, starts.remarks])[made],
+        valid=valid,
+        mean=mean,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Corrections:
+    at: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    temperature: Numbers
+    slope: Numbers
+    remarks: NDArray[np.int32]
+
+
+def _block_means(
+    arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
+) -> tuple[NDArray[np.bool_], Numbers]:
+    """Which blocks are valid, and their means (0 where no sample was believed)."""
+    blocks = -(-x.size // n)
+    padded = np.zeros(blocks * n, dtype=x.dtype)
+    padded[: x.size] = np.where(verdict != HELD, x, 0)
+    used = np.zeros(blocks * n, dtype=np.bool_)
+    used[: x.size] = verdict != HELD
+    for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
+        used[i - i % n : i] = False
+    values, there = padded.reshape(blocks, n), used.reshape(blocks, n)
+    count = np.count_nonzero(there, axis=1)
+    base = values[np.arange(blocks), np.argmax(there, axis=1)]
+    d = np.where(there, arithmetic.diff(values, base[:, None]), values.dtype.type(0))
+    mean = arithmetic.mean(base, arithmetic.running_sum(d), np.maximum(count, 1))
+    return 2 * count >= n, mean
+
+
+def _restarts(
+    verdict: NDArray[np.int8], valid: NDArray[np.bool_], settings: Settings
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Samples at which the front end restarts; blocks after which the fallback is in force."""
+    n = settings.samples_per_block
+    fallback = np.zeros(valid.size, dtype=np.bool_)
+    restarts = np.flatnonzero(verdict == RESTART)
+    if restarts.size == 0:
+        return restarts, fallback
+    restarted = set((restarts // n).tolist())
+    invalid = np.flatnonzero(~valid)
+    after_fallback: list[int] = []
+    held, previous, fell = 0, -2, False
+    for block in invalid[invalid >= restarts[0] // n].tolist():
+        if block != previous + 1:
+            held, fell = 0, False
+        first = int(np.argmax(verdict[block * n : (block + 1) * n] != HELD)) + block * n
+        believes = verdict[first] != HELD
+        if fell and believes:
+            after_fallback.append(first)
+        if believes and (fell or block in restarted):
+            held = 0
+        held += 1
+        fell = held > settings.hold_blocks
+        fallback[block] = fell
+        previous = block
+        if fell and block + 1 < valid.size and valid[block + 1]:
+            opens = (block + 1) * n
+            after_fallback.append(opens + int(np.argmax(verdict[opens : opens + n] != HELD)))
+    return np.union1d(restarts, np.array(after_fallback, dtype=np.int64)), fallback
+
+
+def _closings(
+    arithmetic: Arithmetic,
+    valid: NDArray[np.bool_],
+    mean: Numbers,
+    fallback: NDArray[np.bool_],
+    restarts: NDArray[np.int64],
+    settings: Settings,
+) -> _Corrections:
+    """The corrections made by blocks that close, from the block of the first restart on."""
+    n, window = settings.samples_per_block, settings.slope_blocks
+    first = int(restarts[0]) // n if restarts.size else valid.size
+    blocks = np.arange(first, valid.size)
+    latest = (restarts // n)[np.searchsorted(restarts, (blocks + 1) * n) - 1]
+    good = valid[blocks]
+    full = good & (blocks - latest + 1 >= window)
+    slope = np.zeros_like(mean[blocks])
+    used = [valid[blocks[full] - (window - 1) + k] for k in range(window)]
+    enough = np.zeros(int(full.sum()), dtype=np.int64)
+    for there in used:
+        enough = enough + there
+    d = [arithmetic.diff(mean[blocks[full] - (window - 1) + k], mean[blocks[full]]) for k in range(window)]
+    steep = arithmetic.slope(d, list(range(window)), used)
+    sure = enough >= max(2, (window + 1) // 2)
+    slope[full] = np.where(sure, steep, slope.dtype.type(0))
+    warming = ~full
+    warming[full] = ~sure
+    kind = np.where(good, MAP, np.where(fallback[blocks], FALLBACK, KEEP)).astype(np.int8)
+    return _Corrections(
+        at=(blocks + 1) * n,
+        kind=kind,
+        temperature=mean[blocks],
+        slope=slope,
+        remarks=np.where(good & warming, _WARMING, 0).astype(np.int32),
+    )

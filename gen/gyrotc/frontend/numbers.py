@@ -1,0 +1,106 @@
+"""The operations of the front end in each arithmetic (libc/gtc_num_<n>.h is the other side).
+
+Element by element only: `np.sum`, `@` and the like may add in any order and are not used.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["F32", "Arithmetic"]
+
+Numbers = NDArray[Any]
+
+
+class Arithmetic(Protocol):
+    """Operations on temperatures; arrays broadcast, and every result is rounded as on the target."""
+
+    plausible: tuple[Any, Any]
+
+    def numbers(self, x: ArrayLike) -> Numbers:
+        """Values of the arithmetic's type."""
+
+    def missing(self, n: int) -> Numbers:
+        """n samples that did not arrive."""
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]: ...
+
+    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any: ...
+
+    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
+        """|a - b| <= max_step + samples * step."""
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        """Last of the running sums along axis 1, added from left to right."""
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers: ...
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers: ...
+
+    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
+        """Least-squares slope of differences d at abscissae k where `used`; 0 where under two are."""
+
+
+class _F32:
+    plausible = (np.float32(-90.0), np.float32(200.0))
+
+    def numbers(self, x: ArrayLike) -> Numbers:
+        return np.asarray(x, dtype=np.float32)
+
+    def missing(self, n: int) -> Numbers:
+        return np.full(n, np.nan, dtype=np.float32)
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+        return ~np.isfinite(x)
+
+    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any:
+        return np.float32(max_slope) / np.float32(samples_per_block)
+
+    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
+        limit = np.float32(samples) * step
+        limit = max_step + limit
+        return np.abs(a - b) <= limit
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        # accumulate is sequential by definition: r[i] = r[i-1] + d[i]
+        return np.asarray(np.add.accumulate(d, axis=1, dtype=np.float32)[:, -1])
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers:
+        return np.asarray(a - b)
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+        quotient = total / n.astype(np.float32)
+        return np.asarray(base + quotient)
+
+    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
+        sum_d = np.zeros_like(d[0])
+        sum_kd = np.zeros_like(d[0])
+        for one, abscissa, there in zip(d, k, used, strict=True):
+            product = np.float32(abscissa) * one
+            sum_d = np.where(there, sum_d + one, sum_d)
+            sum_kd = np.where(there, sum_kd + product, sum_kd)
+        n, sum_k, sum_kk = moments(k, used)
+        den = n * sum_kk - sum_k * sum_k
+        first = n.astype(np.float32) * sum_kd
+        second = sum_k.astype(np.float32) * sum_d
+        num = first - second
+        return np.asarray(num / np.where(den > 0, den, 1).astype(np.float32))
+
+
+def moments(
+    k: list[int], used: list[NDArray[np.bool_]]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """n, Σk, Σk² over the abscissae in use."""
+    zero = np.zeros(used[0].shape, dtype=np.int64)
+    n, sum_k, sum_kk = zero, zero, zero
+    for abscissa, there in zip(k, used, strict=True):
+        n = n + there
+        sum_k = sum_k + abscissa * there
+        sum_kk = sum_kk + abscissa * abscissa * there
+    return n, sum_k, sum_kk
+
+
+F32: Arithmetic = _F32()

@@ -1,0 +1,142 @@
+"""Training samples of a recording: the front end that the target will have, run over its rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .follow import FALLBACK, KEEP, Settings, Steps, expand_missed, follow
+from .numbers import F32, Numbers
+
+if TYPE_CHECKING:
+    from ..dataset import Rows, Run
+
+__all__ = ["Blocks", "missed_before", "run_blocks", "samples_per_block"]
+
+_GAP = 1.5  # median row periods
+_MAX_MISSED = 2**32 - 1
+_HELD, _FALLBACK = 8, 16  # as in gtc.h
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """What the front end makes of one run: one entry per block, from the first row of the file on.
+
+    A training sample is a block with `rows > 0` that is `valid`: input (`temperature_c`, `slope_c`), answer
+    `rate_dph`, weight `rows`.
+    """
+
+    start_s: NDArray[np.float64]
+    valid: NDArray[np.bool_]  # the block itself has enough believed samples
+    temperature_c: NDArray[np.float32]  # input in force during the block (NaN before the first sample)
+    slope_c: NDArray[np.float32]  # input in force, C per block
+    mean_c: NDArray[np.float32]  # mean of the block itself (0 where it has no believed sample)
+    status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
+    rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
+    rows: NDArray[np.int64]  # number of these rows
+
+
+def samples_per_block(block_s: float, row_period_s: float) -> int:
+    """Rows per block, at least 1."""
+    return max(1, round(block_s / row_period_s))
+
+
+def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
+    """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
+    gaps = np.diff(time_s, prepend=time_s[:1]) / row_period_s
+    missed = np.where(gaps > _GAP, np.rint(gaps) - 1.0, 0.0)
+    return np.asarray(np.minimum(missed, _MAX_MISSED).astype(np.int64))
+
+
+def run_blocks(
+    rows: Rows,
+    run: Run,
+    *,
+    block_s: float,
+    slope_blocks: int,
+    max_step_c: float,
+    max_rate_c_per_min: float,
+    stuck_samples: int = 0,
+    hold_blocks: int = 30,
+) -> Blocks:
+    """Runs the float32 front end over a recording.
+
+    Args:
+        rows: All rows of the run's file.
+        run: Gives row period and span.
+        block_s: Length of a block, s.
+        slope_blocks: Window of dT/dt, blocks.
+        max_step_c: Believable change between two samples, C, besides ...
+        max_rate_c_per_min: ... this rate times the time since the last believed one.
+        stuck_samples: Identical samples that are believed; 0: any number.
+        hold_blocks: Invalid blocks in a row that are bridged before the fallback.
+    """
+    settings = Settings(
+        samples_per_block=samples_per_block(block_s, run.row_period_s),
+        slope_blocks=slope_blocks,
+        hold_blocks=hold_blocks,
+        stuck_samples=stuck_samples,
+        max_step=np.float32(max_step_c),
+        max_slope=np.float32(max_rate_c_per_min * block_s / 60.0),
+    )
+    missed = expand_missed(missed_before(rows.time_s, run.row_period_s), settings)
+    position = np.arange(missed.size) + np.cumsum(missed)
+    samples = _with_missing(F32.numbers(rows.temperature_c), position)
+    steps = follow(F32, samples, settings)
+    n = settings.samples_per_block
+    n_blocks = steps.valid.size
+    temperature, slope, status = _in_force(steps, samples.size, n)
+    rate, count = _mean_rate(rows, run, position // n, n_blocks)
+    return Blocks(
+        start_s=np.interp(np.arange(n_blocks) * n, position, rows.time_s) if n_blocks else np.empty(0),
+        valid=steps.valid,
+        temperature_c=temperature,
+        slope_c=slope,
+        mean_c=steps.mean,
+        status=status,
+        rate_dph=rate,
+        rows=count,
+    )
+
+
+def _with_missing(x: Numbers, position: NDArray[np.int64]) -> Numbers:
+    """Samples at their positions, missing ones between them."""
+    if x.size == 0:
+        return x
+    samples = F32.missing(int(position[-1]) + 1)
+    samples[position] = x
+    return samples
+
+
+def _in_force(
+    steps: Steps, n_samples: int, n: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Input and status in force during each block: those at its last sample."""
+    last = np.minimum(np.arange(1, steps.valid.size + 1) * n, n_samples) - 1
+    k = steps.in_force(last)
+    started = k >= 0
+    source = k[started]
+    temperature = np.full(k.size, np.nan, dtype=np.float32)
+    slope = np.zeros(k.size, dtype=np.float32)
+    status = np.full(k.size, _HELD, dtype=np.int32)
+    temperature[started] = steps.temperature[source]
+    slope[started] = steps.slope[source]
+    kind = steps.kind[source]
+    kept = steps.remarks[source] | np.where(kind == KEEP, _HELD, 0)
+    status[started] = np.where(kind == FALLBACK, _HELD | _FALLBACK, kept)
+    return temperature, slope, status
+
+
+def _mean_rate(
+    rows: Rows, run: Run, block: NDArray[np.int64], n_blocks: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Mean measured rate and number of rows in the span, for each block."""
+    counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
+    count = np.bincount(block[counted], minlength=n_blocks)
+    total = np.bincount(block[counted], weights=rows.rate_dph[counted], minlength=n_blocks)
+    with np.errstate(invalid="ignore"):
+        mean = total / count
+    return mean, count.astype(np.int64)

@@ -1,0 +1,44 @@
+"""Round a model to a table, and say what the rounding costs.
+
+Stage 5 of the house (… → model → **tables** → C → proof). After it only 32-bit words exist. The bound
+that a table carries covers arithmetic, rounded parameters and rounded inputs against the model in
+float64; extension terms are not part of it. A format that would cost more than 1 % of the noise floor
+is refused, with the reason.
+"""
+
+from __future__ import annotations
+
+from ..errors import CheckFailed, InputError
+from ..model import Model
+from ..table import Numeric, Table
+from . import f32
+from .probes import with_probes
+
+__all__ = ["NUMERICS", "Table", "quantise"]
+
+#: Arithmetics that the runtime has, the default first.
+NUMERICS: tuple[Numeric, ...] = ("f32",)
+
+_SHARE_OF_FLOOR = 0.01
+_MAKERS = {"f32": f32.table_of}
+
+
+def quantise(model: Model, numeric: str) -> Table:
+    """Table of a model in one arithmetic, with its known answers.
+
+    Raises:
+        InputError: An unknown arithmetic.
+        CheckFailed: The format would cost more than 1 % of the model's noise floor, or cannot hold it.
+    """
+    if numeric not in _MAKERS:
+        raise InputError("--numeric", repr(numeric), " or ".join(NUMERICS))
+    table = with_probes(model, _MAKERS[numeric](model))
+    floor = model.noise_floor_dph
+    if floor is not None and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
+        worst = max(table.bound_parts_dph, key=lambda part: table.bound_parts_dph[part])
+        raise CheckFailed(
+            f"{numeric}: rounding could cost {table.error_bound_dph:.2e} deg/h, more than 1 % of the noise "
+            f"floor of {floor:.2e} deg/h (most of it: {worst}, {table.bound_parts_dph[worst]:.2e}; sum of "
+            f"|weights| {model.sum_abs_weights_dph:.3g} deg/h)"
+        )
+    return table

@@ -1,0 +1,142 @@
+"""Float32 tables: parameters rounded to float32, centers to multiples of 2^-20, and the error bound.
+
+The bound follows docs/numerics.md, section 4: every rounding of one evaluation, its largest effect on
+the bias, summed over all Gaussians.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CheckFailed
+from ..model import Model, Network
+from ..table import Table, Words, f32_words
+from .common import STEEPEST, max_slope_c, shared
+
+__all__ = ["table_of"]
+
+_UNIT = 2.0**-24  # largest relative error of one rounding
+_GRID = 2.0**-20  # centers lie on it
+_INPUT_GRID = 2.0**-21  # largest error of a normalised input by its rounding to the grid
+_GAIN = 8.0 * math.sqrt(math.log2(math.e))  # u = 64 log2(e) d²/δ²
+_POLYNOMIAL = 8.5e-9  # of 2^(-f/64), relative
+_TINY = 2.0**-80  # smaller weights could make subnormal products
+_MAX_ABS_Z = 8.0
+
+
+def table_of(model: Model) -> Table:
+    """The table, without known answers.
+
+    Raises:
+        CheckFailed: The model needs what the float32 runtime does not have.
+    """
+    if len(model.networks) > 1 or model.terms:
+        raise CheckFailed("f32: this version has no model banks and no extension terms")
+    per_block = model.block_s / 60.0
+    center, half = model.scale.temperature_c
+    scale = f32_words([center, 1.0 / half, 1.0 / (model.scale.slope_c_per_min * per_block)])
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    envelope = f32_words([t0, t1, r0 * per_block, r1 * per_block])
+    _check_range(scale, envelope)
+    network = model.networks[0]
+    centers = _centers(network, scale, per_block)
+    head = np.concatenate([np.array([len(network.weights)], np.uint32), _head(network), envelope])
+    parts = _bound(network, scale, envelope, centers)
+    return Table(
+        numeric="f32",
+        **shared(model),
+        bias_frac_bits=0,
+        max_step=_word(model.max_step_c),
+        max_slope=_word(max_slope_c(model)),
+        fallback=_word(model.fallback_dph),
+        scale=tuple(scale.tolist()),
+        envelope=tuple(envelope.tolist()),
+        networks=head,
+        centers=centers.view(np.uint32).reshape(-1),
+        terms=np.zeros(0, dtype=np.uint32),
+        sigma=f32_words(model.uncertainty_dph.rows if model.uncertainty_dph else []),
+        probes=np.zeros(0, dtype=np.uint32),
+        error_bound_dph=math.fsum(parts.values()),
+        bound_parts_dph=parts,
+    )
+
+
+def _word(value: float) -> int:
+    return int(f32_words([value])[0])
+
+
+def _flushed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.abs(values) < _TINY, 0.0, values)
+
+
+def _head(network: Network) -> Words:
+    return f32_words(_flushed(np.array([network.w0, *network.linear])))
+
+
+def _numbers(words: Words) -> NDArray[np.float64]:
+    return words.view(np.float32).astype(np.float64)
+
+
+def _normalised(scale: Words, temperature: float, slope: float) -> tuple[float, float]:
+    """What the target makes of an input, without its rounding."""
+    offset, gain_t, gain_r = _numbers(scale).tolist()
+    return (temperature - offset) * gain_t, slope * gain_r
+
+
+def _check_range(scale: Words, envelope: Words) -> None:
+    t0, t1, r0, r1 = _numbers(envelope).tolist()
+    for t, r in ((t0, r0), (t1, r1)):
+        if max(map(abs, _normalised(scale, t, r))) > _MAX_ABS_Z:
+            raise CheckFailed(
+                f"f32: the envelope reaches beyond {_MAX_ABS_Z:g} half ranges of the model's scale"
+            )
+
+
+def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.float32]:
+    """Records of the centers, shape (n, 5): c_T, g_T, c_r, g_r, weight."""
+    records = np.zeros((len(network.weights), 5))
+    for record, (c_t, c_r), widths, weight in zip(
+        records, network.centers, network.widths, network.weights, strict=True
+    ):
+        position = _normalised(scale, c_t, c_r * per_block)
+        for k in (0, 1):
+            width = widths[k]
+            if width is not None:
+                record[2 * k] = round(position[k] / _GRID) * _GRID
+                record[2 * k + 1] = _GAIN / width
+        record[4] = weight
+    return f32_words(_flushed(records)).view(np.float32).reshape(-1, 5)
+
+
+def _bound(network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32]) -> dict[str, float]:
+    """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
+    t0, t1, r0, r1 = _numbers(envelope).tolist()
+    offset = float(_numbers(scale)[0])
+    corners = np.abs([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
+    largest = np.max(corners, axis=0)  # |z|
+    # z: its offset, gain, subtraction and product are rounded, then z itself; envelope edges likewise.
+    reach = np.array([max(abs(t0), abs(t1), abs(offset)), max(abs(r0), abs(r1))])
+    gains = _numbers(scale)[1:]
+    z_error = largest * 4.0 * _UNIT + reach * gains * np.array([2.0, 1.0]) * _UNIT + _INPUT_GRID
+    weights = np.abs(np.array(network.weights, dtype=np.float64))
+    linear = np.abs(np.array(network.linear))
+    steep = np.zeros((len(weights), 2))
+    for row, record in zip(steep, centers.astype(np.float64), strict=True):
+        row[:] = STEEPEST * np.array([record[1], record[3]]) / _GAIN
+    center_error = _GRID / 2.0 + np.maximum(np.abs(centers[:, [0, 2]]).astype(np.float64) - 8.0, 0.0) * _UNIT
+    total = float(weights.sum())
+    # u: gain, product, square (twice the error of its root), sum: 2 (1 + 1 + 1) + 1 + 1 roundings at most,
+    # and x exp(-x) <= 1/e.
+    argument = 8.0 * _UNIT / math.e
+    kernel = (0.5 + 0.5 + 1.0 + 1.0 + 1.0) * _UNIT + argument + _POLYNOMIAL + 2.0**-32
+    sizes = abs(network.w0) + float(linear @ largest) + total
+    return {
+        "rounded inputs": float(linear @ z_error + weights @ (steep @ z_error)),
+        "rounded centers": float(np.sum(weights[:, None] * steep * center_error)),
+        "rounded weights": _UNIT * (abs(network.w0) + 2.0 * float(linear @ largest) + total),
+        "Gaussian": kernel * total,
+        "summation": (len(weights) + 2) * _UNIT * sizes,
+    }

@@ -1,0 +1,94 @@
+"""The map in float32: docs/numerics.md, section 2, one numpy operation for each IEEE operation.
+
+No `np.exp`, `@` or `np.sum`: their results differ between processors. The table of the Gaussian is
+made with decimal arithmetic at 60 digits.
+"""
+
+from __future__ import annotations
+
+from decimal import Context, Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..table import Table, Words
+
+__all__ = ["CUT", "ENTRIES", "P1", "P2", "cells", "exp2_table", "gauss", "network_bits"]
+
+ENTRIES = 64
+CUT = np.float32(32 * ENTRIES)
+#: 2^(-f/64) = 1 - f (P1 - f P2) + 8.4e-9 on 0 <= f < 1
+P1 = np.float32(float.fromhex("0x1.62e36cp-7"))
+P2 = np.float32(float.fromhex("0x1.e98446p-15"))
+_ONE, _EIGHT = np.float32(1.0), np.float32(8.0)
+
+
+def exp2_table() -> Words:
+    """Bits of 2^(-i/64), i = 0 ... 63, rounded to float32."""
+    context = Context(prec=60)
+    exact = [context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
+    # float() rounds to float64 first; at 24 of 53 bits no entry lies near a tie.
+    return np.array([float(e) for e in exact], dtype=np.float32).view(np.uint32)
+
+
+_TABLE = exp2_table()
+
+
+def gauss(u: NDArray[np.float32]) -> NDArray[np.float32]:
+    """2^(-u/64); 0 for u >= 2048. u >= 0."""
+    inside = u < CUT
+    v = np.where(inside, u, np.float32(0.0))
+    n = v.astype(np.int32)
+    f = v - n.astype(np.float32)
+    h = f * P2
+    h = P1 - h
+    h = f * h
+    h = _ONE - h
+    bits = _TABLE[n & (ENTRIES - 1)] - ((n >> 6).astype(np.uint32) << np.uint32(23))
+    e = bits.view(np.float32) * h
+    return np.asarray(np.where(inside, e, np.float32(0.0)))
+
+
+def normalise(table: Table, x: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Inputs of the network, multiples of 2^-21."""
+    scale = table.numbers(table.scale)
+    z_t = x[:, 0] - scale[0]
+    z_t = z_t * scale[1]
+    z_t = (z_t + _EIGHT) - _EIGHT
+    z_r = x[:, 1] * scale[2]
+    z_r = (z_r + _EIGHT) - _EIGHT
+    return z_t, z_r
+
+
+def network_bits(table: Table, x: NDArray[np.float32]) -> Words:
+    """Bits of the bias at inputs (T, slope per block) that lie inside the envelope, shape (n, 2)."""
+    z_t, z_r = normalise(table, x)
+    network = table.numbers(table.networks)
+    acc = network[1] + network[2] * z_t
+    acc = acc + network[3] * z_r
+    with np.errstate(under="ignore"):
+        for c_t, g_t, c_r, g_r, weight in table.numbers(table.centers).reshape(-1, 5):
+            u = (z_t - c_t) * g_t
+            u = u * u
+            q = (z_r - c_r) * g_r
+            q = q * q
+            acc = acc + weight * gauss(u + q)
+    return np.asarray(acc).view(np.uint32)
+
+
+def cells(table: Table, x: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Cells of the coverage map, (T, slope), shape (n, 2)."""
+    envelope = table.numbers(table.envelope)
+    columns = [_cell(x[:, k], envelope[2 * k : 2 * k + 2], table.coverage_cells[k]) for k in (0, 1)]
+    return np.stack(columns, axis=1)
+
+
+def _cell(x: NDArray[np.float32], limits: NDArray[Any], n: int) -> NDArray[np.int64]:
+    span = limits[1] - limits[0]
+    if not span > 0:
+        return np.zeros(x.size, dtype=np.int64)
+    factor = np.float32(n) / span
+    position = (x - limits[0]) * factor
+    inner = position < np.float32(n - 1)
+    return np.where(inner, np.where(inner, position, 0).astype(np.int64), n - 1)

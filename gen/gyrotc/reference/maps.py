@@ -1,0 +1,49 @@
+"""The static map of a table: clamp, coverage, status, and the network in the table's arithmetic."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..table import Table, Words
+from . import f32
+
+__all__ = ["CLAMPED", "E_ARG", "UNCOVERED", "evaluate_map"]
+
+CLAMPED, UNCOVERED, E_ARG = 2, 4, -1  # as in gtc.h
+
+
+def evaluate_map(table: Table, inputs: Words) -> tuple[NDArray[np.int32], Words]:
+    """`gtc_<n>_map` for many inputs.
+
+    Args:
+        table: The table.
+        inputs: Bits of (temperature, slope per block), shape (n, 2).
+
+    Returns:
+        Statuses, shape (n,), and the bits of the biases (0 where the status is negative).
+    """
+    numbers = table.numbers(inputs)
+    usable = ~np.any(_is_missing(table, numbers), axis=1)
+    x = np.where(usable[:, None], numbers, table.numbers(table.envelope)[[0, 2]])
+    low, high = table.numbers(table.envelope).reshape(2, 2).T
+    status = np.where(np.any((x < low) | (x > high), axis=1), CLAMPED, 0)
+    x = np.minimum(np.maximum(x, low), high)
+    status = status | np.where(_is_covered(table, x), 0, UNCOVERED)
+    bias = f32.network_bits(table, x)
+    status = np.where(usable, status, E_ARG).astype(np.int32)
+    return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
+
+
+def _is_missing(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(~np.isfinite(x))
+
+
+def _is_covered(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:
+    if table.coverage.size == 0:
+        return np.ones(len(x), dtype=np.bool_)
+    cell = f32.cells(table, x)
+    index = cell[:, 1] * table.coverage_cells[0] + cell[:, 0]
+    return np.asarray((table.coverage[index >> 5] >> (index & 31).astype(np.uint32)) & 1).astype(np.bool_)

@@ -1,0 +1,145 @@
+"""Table layout 1 as Python data: the words of one table, in the order of its binary image.
+
+Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
+every word; `reference` computes with a `Table`, `quantise` makes one, `emit` prints it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ARRAYS", "LAYOUT", "MAGIC", "MISSING_Q31", "Numeric", "Table", "Words", "crc32", "f32_words"]
+
+LAYOUT = 1
+MAGIC = 0x47544331
+MISSING_Q31 = -(2**31)
+_ARITHMETIC = {"f32": 1, "q31": 2}
+_INPUT_BITS = 16  # q31: temperatures in 2^-16 C
+
+#: Arrays of a table in the order of the image, with the words of one record (0: not in records).
+ARRAYS = {"networks": 8, "centers": 5, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4}
+
+Numeric = Literal["f32", "q31"]
+Words = NDArray[np.uint32]
+
+
+def crc32(words: ArrayLike) -> int:
+    """CRC-32 of words, each as four octets, least significant first."""
+    return zlib.crc32(np.asarray(words, dtype="<u4").tobytes())
+
+
+def f32_words(values: ArrayLike) -> Words:
+    """Bits of numbers rounded to float32; a negative zero becomes a positive one."""
+    rounded = np.asarray(values, dtype=np.float64).astype(np.float32) + np.float32(0.0)
+    return np.asarray(rounded).reshape(-1).view(np.uint32)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table: what `emit` prints and `reference` computes with. Every number is a 32-bit word.
+
+    Scalars have the names and the order of the members of gtc_<n>_table_t; `scale` and `envelope` are
+    tuples of words, `coverage_cells` and `sigma_cells` pairs. Arrays are flat.
+    """
+
+    numeric: Numeric
+    serial: str
+    name: str  # id of the table as text
+    id: int  # CRC-32 of it
+    block_s: float
+    slope_blocks: int
+    hold_blocks: int
+    stuck_samples: int
+    bias_frac_bits: int
+    max_step: int
+    max_slope: int
+    fallback: int
+    scale: tuple[int, ...]
+    envelope: tuple[int, ...]
+    n_channels: int
+    coverage_cells: tuple[int, int]
+    sigma_cells: tuple[int, int]
+    networks: Words
+    centers: Words
+    terms: Words
+    coverage: Words
+    sigma: Words
+    probes: Words
+    error_bound_dph: float  # |map - model| never exceeds it: arithmetic and input rounding, no terms
+    bound_parts_dph: dict[str, float]  # what the bound is made of
+
+    @property
+    def n_centers(self) -> int:
+        return self.centers.size // ARRAYS["centers"]
+
+    @property
+    def header(self) -> list[int]:
+        """The words between magic and arrays: layout and arithmetic, length, members."""
+        counts = [getattr(self, a).size // ARRAYS[a] for a in ("networks", "centers")]
+        members = [
+            0, 0, self.id, self.slope_blocks, self.hold_blocks, self.stuck_samples, self.bias_frac_bits,
+            self.max_step, self.max_slope, self.fallback, *self.scale, *self.envelope,
+            *counts, self.n_channels, self.terms.size // ARRAYS["terms"],
+            *self.coverage_cells, *self.sigma_cells, self.probes.size // ARRAYS["probes"],
+        ]  # fmt: skip
+        arrays = sum(getattr(self, a).size for a in ARRAYS)
+        length = 3 + len(members) + arrays + 1
+        return [LAYOUT + 65536 * _ARITHMETIC[self.numeric], length, *members]
+
+    @property
+    def words(self) -> list[int]:
+        """The whole image, magic and CRC included."""
+        body = [*self.header, *(int(w) for a in ARRAYS for w in getattr(self, a))]
+        return [MAGIC, *body, crc32(body)]
+
+    @property
+    def crc(self) -> int:
+        return self.words[-1]
+
+    @property
+    def table_bytes(self) -> int:
+        """Bytes of w0, linear, scale, centers, widths, weights and parameters of terms."""
+        networks = self.networks.size // ARRAYS["networks"]
+        terms = self.terms.size // ARRAYS["terms"]
+        return 4 * (3 * networks + 3 + self.centers.size + 6 * terms)
+
+    @property
+    def rom_bytes(self) -> int:
+        """Bytes of the whole table in ROM: its arrays and its struct on a 32-bit target."""
+        pointers = len(ARRAYS) + 4 + 1
+        return 4 * (len(self.words) - 2 + pointers)
+
+    def encode_inputs(self, values: ArrayLike) -> Words:
+        """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""
+        x = np.asarray(values, dtype=np.float64)
+        if self.numeric == "f32":
+            bits = x.astype(np.float32).view(np.uint32)
+            return np.where(np.isnan(x), np.uint32(0x7FC00000), bits)
+        scaled = np.rint(np.where(np.isfinite(x), x, 0.0) * 2.0**_INPUT_BITS)
+        whole = np.clip(scaled, -(2**31) + 1, 2**31 - 1).astype(np.int64)
+        return np.where(np.isfinite(x), whole, MISSING_Q31).astype(np.int32).view(np.uint32)
+
+    def decode_inputs(self, bits: ArrayLike) -> NDArray[np.float64]:
+        """The other way; missing inputs become NaN."""
+        words = np.ascontiguousarray(bits, dtype=np.uint32)
+        if self.numeric == "f32":
+            return words.view(np.float32).astype(np.float64)
+        whole = words.view(np.int32).astype(np.float64)
+        return np.where(whole == MISSING_Q31, np.nan, whole * 2.0**-_INPUT_BITS)
+
+    def decode_bias(self, bits: ArrayLike) -> NDArray[np.float64]:
+        """Biases in deg/h from their bits."""
+        words = np.ascontiguousarray(bits, dtype=np.uint32)
+        if self.numeric == "f32":
+            return words.view(np.float32).astype(np.float64)
+        return words.view(np.int32).astype(np.float64) * 2.0**-self.bias_frac_bits
+
+    def numbers(self, words: Any) -> NDArray[Any]:
+        """Members or arrays as numbers of the arithmetic: float32, or int64 for fixed point."""
+        bits = np.ascontiguousarray(words, dtype=np.uint32)
+        return bits.view(np.float32) if self.numeric == "f32" else bits.view(np.int32).astype(np.int64)

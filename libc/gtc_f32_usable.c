@@ -1,0 +1,6 @@
+/* gtc_f32_usable.c - whether this build can use a table.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#include "gtc_num_f32.h"
+#include "gtc_usable.inl"

@@ -1,0 +1,287 @@
+/* gtc_front.inl - samples in, correction in force out, in the numbers included before.
+ *
+ * docs/numerics.md, section 1, says every step; gen/gyrotc/frontend is its mirror.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+/* Samples since the last believed one are counted no further than this. */
+#define MAX_GAP 65535UL
+
+/* So many suspects in a row that agree are the new truth. */
+#define NEW_TRUTH 3U
+
+#define MAX_SAMPLES_PER_BLOCK 0x100000UL
+
+/* Makes the correction for an input and puts it in force. */
+static void FN(correct)(STATE *state, NUM temp, NUM slope, int_least32_t remarks)
+{
+    NUM bias = NUM_ZERO;
+    const int status = FN(map)(state->table, temp, slope, &bias);
+
+    state->bias = bias;
+    state->status = remarks | (int_least32_t)status;
+}
+
+/* Begins again at x: slope 0, nothing in the window, the block's samples so far dropped. */
+static void FN(restart)(STATE *state, NUM x)
+{
+    state->filled = 0U;
+    state->window_valid = 0U;
+    state->held_blocks = 0U;
+    state->valid = 0U;
+    state->mean = x;
+    FN(correct)(state, x, NUM_ZERO, GTC_WARMING);
+}
+
+/* Moves the window on by one block: its mean, or a hole. */
+static void FN(push)(STATE *state, uint_least32_t is_valid)
+{
+    uint_least32_t i;
+
+    for (i = state->table->slope_blocks - 1U; i > 0U; i--) {
+        state->window[i] = state->window[i - 1U];
+    }
+    state->window[0] = state->mean;
+    state->window_valid = ((state->window_valid << 1) | is_valid) & 0xFFFFFFFFUL;
+    if (state->filled < state->table->slope_blocks) {
+        state->filled++;
+    }
+}
+
+/* Least-squares slope over the valid blocks of the window, the newest of which is valid.
+ * Returns GTC_OK, or GTC_WARMING (and slope 0) if the window is not full. */
+static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
+{
+    const uint_least32_t blocks = state->table->slope_blocks;
+    const uint_least32_t half = (blocks + 1U) / 2U;
+    WIDE sum_d = NUM_ZERO;
+    WIDE sum_kd = NUM_ZERO;
+    uint_least32_t n = 0U;
+    uint_least32_t sum_k = 0U;
+    uint_least32_t sum_kk = 0U;
+    uint_least32_t k;
+
+    for (k = 0U; k < blocks; k++) {
+        const uint_least32_t age = (blocks - 1U) - k;
+
+        if (((state->window_valid >> age) & 1U) != 0U) {
+            const WIDE d = FN(diff)(state->window[age], state->window[0]);
+
+            sum_d = FN(add)(sum_d, d);
+            sum_kd = FN(add)(sum_kd, FN(scaled)(k, d));
+            n++;
+            sum_k += k;
+            sum_kk += k * k;
+        }
+    }
+    *slope = NUM_ZERO;
+    if ((state->filled < blocks) || (n < 2U) || (n < half)) {
+        return GTC_WARMING;
+    }
+    sum_d = FN(scaled)(sum_k, sum_d);
+    sum_kd = FN(scaled)(n, sum_kd);
+    *slope = FN(quotient)(FN(diff)(sum_kd, sum_d), (n * sum_kk) - (sum_k * sum_k));
+    return GTC_OK;
+}
+
+/* A block with too few valid samples: the last correction stays, but not for ever. */
+static void FN(bridge)(STATE *state)
+{
+    const TABLE *const table = state->table;
+
+    FN(push)(state, 0U);
+    if (state->held_blocks <= table->hold_blocks) {
+        state->held_blocks++;
+    }
+    if (state->held_blocks > table->hold_blocks) {
+        state->bias = FROM_WORD(table->fallback);
+        state->status = GTC_HELD | GTC_FALLBACK;
+    } else {
+        state->status |= GTC_HELD;
+    }
+}
+
+/* The running block is complete: its mean and slope make the next correction. */
+static void FN(close)(STATE *state)
+{
+    if (state->gap == 0U) {
+        /* nothing was ever believed: no correction yet */
+    } else if ((2U * state->valid) >= state->samples_per_block) {
+        NUM slope;
+        int_least32_t remarks;
+
+        state->mean = FN(mean)(state->base, state->sum, state->valid);
+        state->held_blocks = 0U;
+        FN(push)(state, 1U);
+        remarks = FN(window_slope)(state, &slope);
+        FN(correct)(state, state->mean, slope, remarks);
+    } else {
+        FN(bridge)(state);
+    }
+    state->position = 0U;
+    state->valid = 0U;
+}
+
+/* Takes x into the running block. */
+static void FN(believe)(STATE *state, NUM x)
+{
+    if (state->valid == 0U) {
+        state->base = x;
+        state->sum = NUM_ZERO;
+    }
+    state->sum = FN(add)(state->sum, FN(diff)(x, state->base));
+    state->valid++;
+    state->last = x;
+    state->gap = 1U;
+    state->suspects = 0U;
+}
+
+/* `count` samples passed of which none was believed. */
+static void FN(hold)(STATE *state, uint_least32_t count)
+{
+    if (state->gap != 0U) {
+        state->gap = ((MAX_GAP - state->gap) > count) ? (state->gap + count) : MAX_GAP;
+    }
+}
+
+/* 1 if x is identical to too many samples before it. */
+static int FN(is_stuck)(STATE *state, NUM x)
+{
+    const uint_least32_t bits = FN(bits)(x);
+
+    if (bits != state->received) {
+        state->repeats = 0U;
+    } else if (state->repeats < state->table->stuck_samples) {
+        state->repeats++;
+    } else {
+        /* counted far enough */
+    }
+    state->received = bits;
+    return ((state->table->stuck_samples != 0U)
+            && (state->repeats >= state->table->stuck_samples)) ? 1 : 0;
+}
+
+/* 1 if x is too far from the last believed sample; counts the suspects that agree. */
+static int FN(is_suspect)(STATE *state, NUM x)
+{
+    if ((state->gap == 0U) || FN(is_near)(state, x, state->last, state->gap)) {
+        return 0;
+    }
+    if ((state->suspects != 0U) && FN(is_near)(state, x, state->candidate, 1U)) {
+        state->suspects++;
+    } else {
+        state->suspects = 1U;
+    }
+    state->candidate = x;
+    return 1;
+}
+
+/* 1 if x may be believed as far as it can be told without the samples around it. */
+static int FN(is_sound)(STATE *state, NUM x)
+{
+    if (FN(is_missing)(x)) {
+        return 0;
+    }
+    if (FN(is_stuck)(state, x)) {
+        return 0;
+    }
+    return ((x >= NUM_PLAUSIBLE_MIN) && (x <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
+}
+
+/* One temperature: believed, or held. Returns GTC_OK or GTC_HELD. */
+static int FN(take)(STATE *state, NUM x)
+{
+    if (!FN(is_sound)(state, x)) {
+        state->suspects = 0U;
+        FN(hold)(state, 1U);
+        return GTC_HELD;
+    }
+    if (FN(is_suspect)(state, x) && (state->suspects < NEW_TRUTH)) {
+        FN(hold)(state, 1U);
+        return GTC_HELD;
+    }
+    if ((state->gap == 0U) || (state->suspects >= NEW_TRUTH)
+        || ((state->status & GTC_FALLBACK) != 0)) {
+        FN(restart)(state, x);
+    }
+    FN(believe)(state, x);
+    return GTC_OK;
+}
+
+int FN(init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+{
+    const STATE zero = {0};
+
+    if ((state == NULL) || (table == NULL) || (samples_per_block < 1U)
+        || (samples_per_block > MAX_SAMPLES_PER_BLOCK)) {
+        return GTC_E_ARG;
+    }
+    if (!FN(is_usable)(table)) {
+        return GTC_E_LAYOUT;
+    }
+    *state = zero;
+    state->table = table;
+    state->samples_per_block = samples_per_block;
+    state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
+    state->received = NUM_MISSING_BITS;
+    state->status = GTC_HELD;
+    return GTC_OK;
+}
+
+int FN(sample)(STATE *state, const NUM *channels)
+{
+    int remark;
+
+    if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
+        return GTC_E_ARG;
+    }
+    if (state->position >= state->samples_per_block) {
+        FN(close)(state);
+    }
+    state->position++;
+    remark = FN(take)(state, channels[0]);
+    return (int)state->status | remark;
+}
+
+int FN(missed)(STATE *state, uint_least32_t count)
+{
+    uint_least32_t blocks;
+    uint_least32_t most;
+
+    if ((state == NULL) || (state->table == NULL)) {
+        return GTC_E_ARG;
+    }
+    if (count == 0U) {
+        return (int)state->status;
+    }
+    /* After so many blocks nothing changes any more: whole blocks beyond are left out. */
+    most = state->table->hold_blocks + state->table->slope_blocks + 2U;
+    blocks = count / state->samples_per_block;
+    if (blocks > most) {
+        count -= (blocks - most) * state->samples_per_block;
+    }
+    state->suspects = 0U;
+    FN(hold)(state, count);
+    while (count > 0U) {
+        uint_least32_t step;
+
+        if (state->position >= state->samples_per_block) {
+            FN(close)(state);
+        }
+        step = state->samples_per_block - state->position;
+        step = (step < count) ? step : count;
+        state->position += step;
+        count -= step;
+    }
+    return (int)state->status | GTC_HELD;
+}
+
+int FN(bias)(const STATE *state, NUM *bias)
+{
+    if ((state == NULL) || (bias == NULL) || (state->table == NULL)) {
+        return GTC_E_ARG;
+    }
+    *bias = state->bias;
+    return (int)state->status;
+}

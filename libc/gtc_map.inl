@@ -1,0 +1,56 @@
+/* gtc_map.inl - the static map, in the numbers of the gtc_num_<n>.h included before.
+ *
+ * docs/numerics.md, section 2.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+/* Moves x into [low, high]; returns GTC_CLAMPED if it had to, else GTC_OK. */
+static int FN(clamp)(NUM *x, NUM low, NUM high)
+{
+    int status = GTC_OK;
+
+    if (*x < low) {
+        *x = low;
+        status = GTC_CLAMPED;
+    } else if (*x > high) {
+        *x = high;
+        status = GTC_CLAMPED;
+    } else {
+        /* inside */
+    }
+    return status;
+}
+
+/* GTC_OK or GTC_UNCOVERED. */
+static int FN(coverage)(const TABLE *table, NUM temp, NUM slope)
+{
+    uint_least32_t cell[2];
+    uint_least32_t index;
+    int status = GTC_OK;
+
+    if (table->coverage != NULL) {
+        FN(cells)(table, temp, slope, table->coverage_cells, cell);
+        index = (cell[1] * table->coverage_cells[0]) + cell[0];
+        if (((table->coverage[index >> 5].bits >> (index & 31U)) & 1U) == 0U) {
+            status = GTC_UNCOVERED;
+        }
+    }
+    return status;
+}
+
+int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
+{
+    POINT in;
+    int status;
+
+    if ((table == NULL) || (bias == NULL) || FN(is_missing)(temp) || FN(is_missing)(slope)) {
+        return GTC_E_ARG;
+    }
+    status = FN(clamp)(&temp, FROM_WORD(table->envelope[0]), FROM_WORD(table->envelope[1]));
+    status |= FN(clamp)(&slope, FROM_WORD(table->envelope[2]), FROM_WORD(table->envelope[3]));
+    status |= FN(coverage)(table, temp, slope);
+    in = FN(normalise)(table, temp, slope);
+    *bias = FN(network)(table->networks, table->centers, &in);
+    return status;
+}

@@ -1,0 +1,129 @@
+"""The runtime as a shared object: compiled once per test session, called on the words of a `Table`."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.table import ARRAYS, Table, Words
+
+ROOT = Path(__file__).resolve().parents[2]
+_WARNINGS = "all extra conversion sign-conversion double-promotion undef missing-declarations shadow error"
+FLAGS = ["-std=c99", "-pedantic", "-ffp-contract=off", *(f"-W{name}" for name in _WARNINGS.split())]
+_N_SCALE = {"f32": 3, "q31": 6}
+
+
+def _table_struct(numeric: str) -> type[ctypes.Structure]:
+    """The layout of gtc_<n>_table_t."""
+    u32, pointer = ctypes.c_uint32, ctypes.c_void_p
+    integers = (
+        "layout quantity unit id slope_blocks hold_blocks stuck_samples bias_frac_bits "
+        "max_step max_slope fallback"
+    )
+    fields: list[Any] = [(name, u32) for name in integers.split()]
+    fields += [("scale", u32 * _N_SCALE[numeric]), ("envelope", u32 * 4)]
+    fields += [(name, u32) for name in ("n_networks", "n_centers", "n_channels", "n_terms")]
+    fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_probes", u32)]
+    fields += [(name, pointer) for name in ARRAYS]
+    fields += [("crc", u32), ("term_code", pointer * 4), ("serial", ctypes.c_char_p)]
+    return type("TableStruct", (ctypes.Structure,), {"_fields_": fields})
+
+
+class Runtime:
+    """Functions of one build of the runtime."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self.library = library
+
+    def check(self, table: Table) -> int:
+        struct, _keep = self.struct(table)
+        return int(self._function(table, "check")(ctypes.byref(struct)))
+
+    def maps(self, table: Table, inputs: Words) -> tuple[np.ndarray, Words]:
+        """Statuses and bits of the biases for the bits of inputs, shape (n, 2)."""
+        struct, _keep = self.struct(table)
+        inputs = np.ascontiguousarray(inputs, dtype=np.uint32)
+        status, bits = np.zeros(len(inputs), np.int32), np.zeros(len(inputs), np.uint32)
+        self._shim(table, "maps")(
+            ctypes.byref(struct),
+            _address(inputs),
+            ctypes.c_long(len(inputs)),
+            _address(status),
+            _address(bits),
+        )
+        return status, bits
+
+    def steps(
+        self, table: Table, channels: Words, missed: np.ndarray, samples_per_block: int
+    ) -> tuple[np.ndarray, Words]:
+        """Statuses of `missed`, `sample`, `bias` for every row, shape (n, 3), and the bits of the biases."""
+        struct, _keep = self.struct(table)
+        size = self._shim(table, "state_size", ctypes.c_size_t)()
+        state = ctypes.create_string_buffer(size + 16)
+        started = self._function(table, "init")(
+            state, ctypes.byref(struct), ctypes.c_uint32(samples_per_block)
+        )
+        assert started == 0, started
+        channels = np.ascontiguousarray(channels, dtype=np.uint32)
+        missed = np.ascontiguousarray(missed, dtype=np.uint32)
+        status, bits = np.zeros((len(channels), 3), np.int32), np.zeros(len(channels), np.uint32)
+        self._shim(table, "steps")(
+            state,
+            _address(channels),
+            ctypes.c_long(channels.shape[1]),
+            _address(missed),
+            ctypes.c_long(len(channels)),
+            _address(status),
+            _address(bits),
+        )
+        return status, bits
+
+    def struct(self, table: Table) -> tuple[ctypes.Structure, list[Any]]:
+        """The C struct of a table, and what must be kept alive with it."""
+        struct = _table_struct(table.numeric)()
+        struct.layout, struct.crc, struct.serial = 1, table.crc, table.serial.encode()
+        for name in ("id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits"):
+            setattr(struct, name, getattr(table, name))
+        for name in ("max_step", "max_slope", "fallback", "n_channels"):
+            setattr(struct, name, getattr(table, name))
+        for name in ("scale", "envelope", "coverage_cells", "sigma_cells"):
+            getattr(struct, name)[:] = getattr(table, name)
+        keep = []
+        for name, width in ARRAYS.items():
+            words = np.ascontiguousarray(getattr(table, name), dtype=np.uint32)
+            keep.append(words)
+            setattr(struct, name, words.ctypes.data if words.size else None)
+            if width:
+                setattr(struct, f"n_{name}", words.size // width)
+        return struct, keep
+
+    def _function(self, table: Table, name: str) -> Any:
+        return getattr(self.library, f"gtc_{table.numeric}_{name}")
+
+    def _shim(self, table: Table, name: str, result: Any = None) -> Any:
+        function = getattr(self.library, f"shim_{table.numeric}_{name}")
+        function.restype = result
+        return function
+
+
+def _address(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+@lru_cache
+def runtime(compiler: str = "gcc", options: tuple[str, ...] = ("-O2",)) -> Runtime:
+    """Compiles `libc/` and loads it."""
+    folder = Path(tempfile.mkdtemp(prefix="gyrotc-test-"))
+    library = folder / "libgtc.so"
+    sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "py" / "libc_shim.c"]
+    command = [
+        compiler, *FLAGS, *options, "-shared", "-fPIC", "-I", str(ROOT / "include"), "-I", str(ROOT / "libc"),
+        "-o", str(library), *map(str, sources),
+    ]  # fmt: skip
+    subprocess.run(command, check=True)
+    return Runtime(ctypes.CDLL(str(library)))

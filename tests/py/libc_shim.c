@@ -1,0 +1,36 @@
+/* libc_shim.c - loops around the runtime's functions, so that tests call C once for many inputs. */
+#include <stddef.h>
+
+#include "gtc.h"
+
+#define SHIM(n, num)                                                                              \
+    size_t shim_##n##_state_size(void);                                                           \
+    void shim_##n##_maps(const gtc_##n##_table_t *table, const num *in, long n_in, int *status,   \
+                         num *bias);                                                              \
+    void shim_##n##_steps(gtc_##n##_state_t *state, const num *channels, long n_channels,         \
+                          const uint_least32_t *missed, long rows, int *status, num *bias);       \
+    size_t shim_##n##_state_size(void)                                                            \
+    {                                                                                             \
+        return sizeof(gtc_##n##_state_t);                                                         \
+    }                                                                                             \
+    void shim_##n##_maps(const gtc_##n##_table_t *table, const num *in, long n_in, int *status,   \
+                         num *bias)                                                               \
+    {                                                                                             \
+        long i;                                                                                   \
+        for (i = 0; i < n_in; i++) {                                                              \
+            bias[i] = 0;                                                                          \
+            status[i] = gtc_##n##_map(table, in[2 * i], in[(2 * i) + 1], &bias[i]);               \
+        }                                                                                         \
+    }                                                                                             \
+    void shim_##n##_steps(gtc_##n##_state_t *state, const num *channels, long n_channels,         \
+                          const uint_least32_t *missed, long rows, int *status, num *bias)        \
+    {                                                                                             \
+        long i;                                                                                   \
+        for (i = 0; i < rows; i++) {                                                              \
+            status[3 * i] = (missed[i] != 0U) ? gtc_##n##_missed(state, missed[i]) : 0;           \
+            status[(3 * i) + 1] = gtc_##n##_sample(state, &channels[i * n_channels]);             \
+            status[(3 * i) + 2] = gtc_##n##_bias(state, &bias[i]);                                \
+        }                                                                                         \
+    }
+
+SHIM(f32, float)

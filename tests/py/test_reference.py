@@ -1,0 +1,90 @@
+"""The reference gives the same bits as the compiled runtime: maps, histories, self-test."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gyrotc.quantise import NUMERICS, quantise
+from gyrotc.reference import evaluate_map, replay
+from gyrotc.table import f32_words
+from libc_build import runtime
+from models import random_history, random_model
+
+BUILDS = [("gcc", ("-O2",)), ("clang", ("-O3",)), ("gcc", ("-O0",))]
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("build", BUILDS, ids=str)
+@pytest.mark.parametrize("seed", range(12))
+def test_maps_agree_bit_for_bit(numeric: str, build: tuple[str, tuple[str, ...]], seed: int) -> None:
+    model = random_model(seed)
+    table = quantise(model, numeric)
+    rng = np.random.default_rng(seed)
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    low, high = np.array([t0, r0 / 6.0]), np.array([t1, r1 / 6.0])
+    inside = rng.uniform(1.2 * low - 0.2 * high, 1.2 * high - 0.2 * low, (3000, 2))
+    inputs = np.concatenate([table.encode_inputs(inside), rng.integers(0, 2**32, (3000, 2), dtype=np.uint32)])
+    status, bits = evaluate_map(table, inputs)
+    got_status, got_bits = runtime(*build).maps(table, inputs)
+    np.testing.assert_array_equal(status, got_status)
+    np.testing.assert_array_equal(bits, got_bits)
+    assert {0, 2} & set((status & 3).tolist())
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("seed", range(40))
+def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> None:
+    model = random_model(seed)
+    table = quantise(model, numeric)
+    samples_per_block = int(np.random.default_rng(seed).choice([1, 2, 3, 7, 10, 50]))
+    x, missed = random_history(model, seed, 1500, samples_per_block)
+    channels = table.encode_inputs(x[:, None])
+    want = replay(table, channels, missed=missed, samples_per_block=samples_per_block)
+    status, bits = runtime().steps(table, channels, missed, samples_per_block)
+    np.testing.assert_array_equal(want.missed_status, status[:, 0])
+    np.testing.assert_array_equal(want.sample_status, status[:, 1])
+    np.testing.assert_array_equal(want.status, status[:, 2])
+    np.testing.assert_array_equal(want.bits, bits)
+
+
+def test_every_status_bit_was_seen_in_the_histories() -> None:
+    seen = 0
+    for seed in range(12):
+        model = random_model(seed)
+        table = quantise(model, "f32")
+        x, missed = random_history(model, seed, 800, 4)
+        steps = replay(table, table.encode_inputs(x[:, None]), missed=missed, samples_per_block=4)
+        seen |= int(np.bitwise_or.reduce(steps.sample_status))
+    assert seen == 1 | 2 | 4 | 8 | 16
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("seed", range(6))
+def test_self_test_passes(numeric: str, seed: int) -> None:
+    assert runtime().check(quantise(random_model(seed), numeric)) == 0
+
+
+def test_self_test_finds_a_changed_weight_by_its_checksum_and_a_changed_probe_by_its_answer() -> None:
+    table = quantise(random_model(3), "f32")
+    c = runtime()
+    struct, keep = c.struct(table)
+    check = c.library.gtc_f32_check
+    keep[1][4] ^= 1
+    assert check(ctypes.byref(struct)) == -4
+    keep[1][4] ^= 1
+    assert check(ctypes.byref(struct)) == 0
+    probes = table.probes.copy()
+    probes[2] ^= 1
+    assert c.check(replace(table, probes=probes)) == -3
+
+
+def test_self_test_finds_fused_multiply_add() -> None:
+    fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma"))
+    assert fused.check(quantise(random_model(0), "f32")) == -3
+
+
+def test_a_negative_zero_does_not_reach_a_table() -> None:
+    assert f32_words([-0.0]).tolist() == [0]
