@@ -5,7 +5,9 @@
 #include <nanobind/stl/vector.h>
 
 #include "evidence.hpp"
+#include "equal_gaussians.hpp"
 #include "kohonen.hpp"
+#include "ols.hpp"
 #include "varpro.hpp"
 
 namespace nb = nanobind;
@@ -26,6 +28,11 @@ Bins bins(VectorXd t, VectorXd r, VectorXd count, VectorXd mean, double within, 
     return {std::move(t), std::move(r), std::move(count), std::move(mean), within, samples};
 }
 
+Samples samples(VectorXd t, VectorXd r, VectorXd y, VectorXd weight) {
+    same_length({t.size(), r.size(), y.size(), weight.size()});
+    return {std::move(t), std::move(r), std::move(y), std::move(weight)};
+}
+
 VariableProjection projection(VectorXd t, VectorXd r, VectorXd weight, VectorXd target, double ridge) {
     same_length({t.size(), r.size(), weight.size(), target.size()});
     return VariableProjection({std::move(t), std::move(r), std::move(weight), std::move(target)}, ridge);
@@ -43,11 +50,11 @@ NB_MODULE(_core, m) {
     m.def(
         "kohonen",
         [](const MatrixXd &samples, int nodes, int max_epochs, double rate_first, double rate_last, double tolerance,
-           std::uint64_t seed) {
-            return kohonen(samples, {nodes, max_epochs, rate_first, rate_last, tolerance, seed});
+           double neighbourhood, std::uint64_t seed) {
+            return kohonen(samples, {nodes, max_epochs, rate_first, rate_last, tolerance, neighbourhood, seed});
         },
         "samples"_a, "nodes"_a, nb::kw_only(), "max_epochs"_a = 30, "rate_first"_a = 0.5, "rate_last"_a = 0.005,
-        "tolerance"_a = 1e-4, "seed"_a = 0);
+        "tolerance"_a = 1e-4, "neighbourhood"_a = 0.0, "seed"_a = 0);
 
     nb::class_<EvidenceModel>(m, "EvidenceModel")
         .def(
@@ -91,5 +98,47 @@ NB_MODULE(_core, m) {
         .def("project", &VariableProjection::project, "shapes"_a)
         .def("gradient", &VariableProjection::gradient, "network"_a)
         .def("refine", &VariableProjection::refine, "start"_a, "tolerance"_a, "max_steps"_a)
-        .def("path", &VariableProjection::path, "centers"_a, "max_size"_a, "enough"_a, "tolerance"_a);
+        .def("path", &VariableProjection::path, "centers"_a, "max_size"_a, "enough"_a, "settled"_a,
+             "tolerance"_a);
+
+    nb::class_<Samples>(m, "Samples")
+        .def(
+            "__init__",
+            [](Samples *self, VectorXd t, VectorXd r, VectorXd y, VectorXd weight) {
+                new (self) Samples(samples(std::move(t), std::move(r), std::move(y), std::move(weight)));
+            },
+            "t"_a, "r"_a, "y"_a, "weight"_a);
+    nb::class_<EqualGaussians>(m, "EqualGaussians")
+        .def_static(
+            "on_grid",
+            [](double t_first, double t_step, Eigen::Index t_count, double r_first, double r_step,
+               Eigen::Index r_count, double width_t, double width_r) {
+                return EqualGaussians::on_grid({t_first, t_step, t_count}, {r_first, r_step, r_count}, width_t,
+                                               width_r);
+            },
+            "t_first"_a, "t_step"_a, "t_count"_a, "r_first"_a, "r_step"_a, "r_count"_a, "width_t"_a, "width_r"_a)
+        .def_static("at", &EqualGaussians::at, "centers"_a, "width_t"_a, "width_r"_a)
+        .def("add", &EqualGaussians::add, "samples"_a)
+        .def("subtract", &EqualGaussians::subtract, "part"_a)
+        .def("copy", [](const EqualGaussians &self) { return EqualGaussians(self); })
+        .def("norms", &EqualGaussians::norms)
+        .def("moments", &EqualGaussians::moments)
+        .def("column", &EqualGaussians::column, "j"_a)
+        .def_prop_ro("centers", &EqualGaussians::centers)
+        .def_prop_ro("energy", &EqualGaussians::energy)
+        .def_prop_ro("samples", &EqualGaussians::samples);
+    nb::class_<OlsPath>(m, "OlsPath")
+        .def_ro("chosen", &OlsPath::chosen)
+        .def_ro("reduction", &OlsPath::reduction)
+        .def_ro("rest", &OlsPath::rest)
+        .def_ro("factor", &OlsPath::factor)
+        .def_ro("orthogonal", &OlsPath::orthogonal);
+    m.def(
+        "select_columns",
+        [](const EqualGaussians &dictionary, Eigen::Index max_columns, double rho, double guard, bool in_order) {
+            return select_columns(dictionary, {max_columns, rho, guard, in_order});
+        },
+        "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-10, "in_order"_a = false);
+    m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
+    m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);
 }

@@ -1,4 +1,4 @@
-// kohonen.hpp - winner-take-all Kohonen network: candidate centers from samples (Ding et al. 2014, eq. (5), (6)).
+// kohonen.hpp - Kohonen network of two inputs: candidate centers from samples (Ding et al. 2014, eq. (5), (6)).
 #pragma once
 
 #include <Eigen/Dense>
@@ -9,9 +9,10 @@ namespace gyrotc {
 struct KohonenOptions {
     int nodes = 40;
     int max_epochs = 30;
-    double rate_first = 0.5;   // eta of the first step, decays geometrically to rate_last over max_epochs
+    double rate_first = 0.5;    // eta of the first step; falls geometrically to rate_last over max_epochs
     double rate_last = 0.005;
-    double tolerance = 1e-4;   // largest move of a node over an epoch at which learning ends
+    double tolerance = 1e-4;    // learning ends when no node moves further than this over an epoch
+    double neighbourhood = 0.0; // 0: the winner takes all. Else the first radius on a square lattice of nodes, in nodes
     std::uint64_t seed = 0;
 };
 
@@ -22,7 +23,7 @@ struct KohonenMap {
 };
 
 // Samples: n x 2, normalised, n >= 1. Nodes start on samples drawn without replacement; if there are no more samples
-// than nodes, the samples are the nodes.
+// than nodes, the samples are the nodes. Equal distances: the node of the lowest index wins.
 KohonenMap kohonen(const Eigen::MatrixXd &samples, const KohonenOptions &options);
 
 }  // namespace gyrotc

@@ -216,17 +216,18 @@ VectorXd VariableProjection::gains(const Network &network, const Dictionary &can
 }
 
 // The better of two trials: the candidate with the largest gain, and the best one far from it.
-Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance) const {
+Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance,
+                                 int steps) const {
     const VectorXd gain = gains(network, candidates);
     Eigen::Index first = 0;
     gain.maxCoeff(&first);
     Eigen::Index second = -1;
     for (Eigen::Index j = 0; j < gain.size(); ++j)
         if ((second < 0 || gain[j] > gain[second]) && distant(candidates.shapes, first, j)) second = j;
-    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, kMaxRefineSteps);
+    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, steps);
     if (second >= 0) {
         const Shapes shapes = with(network.shapes, candidates.shapes.col(second));
-        Network other = refine(project(shapes), tolerance, kMaxRefineSteps);
+        Network other = refine(project(shapes), tolerance, steps);
         if (other.cost < best.cost) best = std::move(other);
     }
     return best;
@@ -246,7 +247,7 @@ Network VariableProjection::prune(const Network &network, double tolerance) cons
     return best;
 }
 
-std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_size, double enough,
+std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_size, double enough, double settled,
                                               double tolerance) const {
     Dictionary candidates{dictionary(centers), {}, {}};
     candidates.columns = gaussians(candidates.shapes);
@@ -254,10 +255,11 @@ std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_s
     std::vector<Network> sizes{project(Shapes(kNonlinear, 0))};
     while (static_cast<int>(sizes.size()) <= max_size && centers.rows() > 0) {
         const bool reached = sizes.back().misfit <= enough;
-        Network next = grow(sizes.back(), candidates, tolerance);
+        const int steps = sizes.back().misfit > settled ? kMaxRefineSteps : 0;
+        Network next = grow(sizes.back(), candidates, tolerance, steps);
         if (!(next.cost < sizes.back().cost)) break;
         sizes.push_back(std::move(next));
-        for (std::size_t m = sizes.size() - 1; m > 1; --m) {
+        for (std::size_t m = sizes.size() - 1; m > 1 && steps > 0; --m) {
             Network fewer = prune(sizes[m], tolerance);
             if (!(fewer.cost < sizes[m - 1].cost)) break;
             sizes[m - 1] = std::move(fewer);

@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 MEAN_S = 50.0
 MAX_CENTERS = 24
 _DEPARTURE = 0.25
+_SETTLED = 0.01
 _RIDGE = 0.01
 _KOHONEN_NODES = 40
 _TRIM_SIGMA = 4.5
@@ -147,7 +148,8 @@ def _compress(
     solver = _core.VariableProjection(t, r, weight, process.mean(t, r), _RIDGE * noise)
     nodes = _core.kohonen(np.stack([bins.t, bins.r], axis=1), _KOHONEN_NODES, seed=seed).nodes
     enough = _DEPARTURE * process.freedom * noise
-    sizes = solver.path(nodes, centers or MAX_CENTERS, 0.0 if centers else enough, 0.01 * enough)
+    limit, stop = (MAX_CENTERS, enough) if centers is None else (centers, 0.0)
+    sizes = solver.path(nodes, limit, stop, _SETTLED * enough, 0.01 * enough)
     target = process.mean(bins.t, bins.r)
     departures = [
         float(np.average((target - evaluate(n, bins.t, bins.r)) ** 2, weights=bins.count)) for n in sizes
