@@ -1,0 +1,291 @@
+/* test_front.c - samples in, correction in force out: every status, every fault. */
+#include "test_num.h"
+
+/* Window of the test table: 4 blocks; invalid blocks bridged: 2; identical samples believed: 12. */
+#define WINDOW 4
+#define STEP C(0.015625) /* per sample: 1/16 C per block */
+
+TEST(before_the_first_sample_the_correction_is_zero_and_held)
+{
+    state_t state = started();
+
+    CHECK_INT(GTC_HELD, status_of(&state));
+    CHECK(same(0, bias_of(&state)));
+    CHECK_INT(GTC_HELD, feed(&state, MISSING, 9));
+    CHECK(same(0, bias_of(&state)));
+}
+
+TEST(the_first_valid_sample_gives_the_map_at_slope_0)
+{
+    state_t state = started();
+
+    CHECK_INT(GTC_HELD, feed(&state, MISSING, 3));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.5), 1));
+    CHECK(same(map_of(C(15.5), 0), bias_of(&state)));
+}
+
+TEST(a_correction_is_in_force_for_a_block)
+{
+    state_t state = started();
+    num_t first;
+
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    first = bias_of(&state);
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.25), 3));
+    CHECK(same(first, bias_of(&state)));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.25), 1));
+    CHECK(same(map_of(C(15.1875), 0), bias_of(&state)));
+}
+
+TEST(a_full_window_gives_the_slope)
+{
+    state_t state = started();
+    num_t temp = C(15.0);
+
+    CHECK_INT(GTC_WARMING, ramp(&state, &temp, STEP, (int)N * WINDOW));
+    CHECK_INT(GTC_OK, ramp(&state, &temp, STEP, 1));
+    /* Mean of the last block: its middle, 2.5 steps before the sample just fed. */
+    CHECK(same(map_of(C(15.0 + (0.015625 * 13.5)), C(0.0625)), bias_of(&state)));
+}
+
+TEST(missing_samples_are_held_and_do_not_move_the_mean)
+{
+    state_t state = started();
+
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 2));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 2));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
+}
+
+TEST(impossible_samples_are_held)
+{
+    state_t state = started();
+
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(200.5), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(-90.5), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+}
+
+TEST(a_window_with_a_hole_still_gives_the_slope)
+{
+    state_t state = started();
+    num_t temp = C(15.0);
+
+    CHECK_INT(GTC_WARMING, ramp(&state, &temp, STEP, (int)N * 2));
+    CHECK_INT(GTC_WARMING | GTC_HELD, FN(missed)(&state, N));
+    temp += STEP * (num_t)N;
+    CHECK_INT(GTC_WARMING | GTC_HELD, ramp(&state, &temp, STEP, 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, ramp(&state, &temp, STEP, (int)N - 1));
+    CHECK_INT(GTC_OK, ramp(&state, &temp, STEP, 1));
+    CHECK(same(map_of(C(15.0 + (0.015625 * 13.5)), C(0.0625)), bias_of(&state)));
+}
+
+TEST(a_window_with_too_many_holes_warms_again)
+{
+    state_t state = started();
+    num_t temp = C(15.0);
+
+    CHECK_INT(GTC_WARMING, ramp(&state, &temp, 0, (int)N));
+    CHECK_INT(GTC_WARMING | GTC_HELD, FN(missed)(&state, 2U * N));
+    (void)feed(&state, C(15.015625), (int)N);
+    /* Window: valid, hole, hole, valid. */
+    CHECK_INT(GTC_OK, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_HELD, FN(missed)(&state, N));
+    (void)feed(&state, C(15.0), (int)N - 1);
+    CHECK_INT(GTC_HELD, status_of(&state));
+}
+
+TEST(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart)
+{
+    state_t state = started();
+    num_t temp = C(15.0);
+    num_t before;
+
+    (void)ramp(&state, &temp, STEP, ((int)N * WINDOW) + 1);
+    before = bias_of(&state);
+    CHECK_INT(GTC_HELD, FN(missed)(&state, (3U * N) - 1U));
+    CHECK(same(before, bias_of(&state)));
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, FN(missed)(&state, 1U));
+    CHECK(!same(before, bias_of(&state)));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
+}
+
+TEST(a_jump_is_held_until_three_samples_agree)
+{
+    state_t state = started();
+
+    (void)feed(&state, C(10.0), 5);
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.25), 1));
+    CHECK(same(map_of(C(10.0), 0), bias_of(&state)));
+    CHECK_INT(GTC_WARMING, feed(&state, C(30.125), 1));
+    CHECK(same(map_of(C(30.125), 0), bias_of(&state)));
+}
+
+TEST(suspects_that_disagree_or_are_interrupted_start_again)
+{
+    state_t state = started();
+
+    (void)feed(&state, C(10.0), 5);
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
+    CHECK_INT(GTC_WARMING | GTC_HELD, FN(missed)(&state, 1U));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
+    CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
+    state = started();
+    (void)feed(&state, C(10.0), 5);
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
+    CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
+}
+
+TEST(the_longer_the_gap_the_larger_the_believable_step)
+{
+    state_t state = started();
+
+    /* max_step 0.5 C, and 0.25 C for each sample since the last one. */
+    (void)feed(&state, C(10.0), 1);
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(10.8125), 1));
+    state = started();
+    (void)feed(&state, C(10.0), 1);
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.8125), 1));
+    state = started();
+    (void)feed(&state, C(0.0), 1);
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, FN(missed)(&state, 100000UL));
+    CHECK_INT(GTC_WARMING | GTC_CLAMPED, feed(&state, C(-21.0), 3));
+    CHECK(same(map_of(C(-20.0), 0), bias_of(&state)));
+}
+
+TEST(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says)
+{
+    state_t state = started();
+
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.0), 11));
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(10.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(10.0), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.015625), 1));
+}
+
+TEST(a_table_that_believes_any_number_of_identical_samples)
+{
+    table_t table = TABLE;
+    state_t state;
+
+    table.stuck_samples = 0U;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_OK, feed(&state, C(10.0), 100));
+}
+
+TEST(missed_is_the_same_as_missing_samples)
+{
+    state_t a = started();
+    state_t b = started();
+    int k;
+
+    for (k = 0; k < 40; k++) {
+        num_t temp = C(15.0) + (STEP * (num_t)k);
+        const int count = (k * k) % 13;
+
+        if (count > 0) {
+            CHECK_INT(feed(&a, MISSING, count), FN(missed)(&b, (uint_least32_t)count));
+        }
+        CHECK_INT(feed(&a, temp, 2), feed(&b, temp, 2));
+        CHECK(same(bias_of(&a), bias_of(&b)));
+    }
+    CHECK_INT(status_of(&b), FN(missed)(&b, 0U));
+}
+
+TEST(a_table_that_this_build_cannot_use_is_refused)
+{
+    state_t state;
+    table_t table;
+
+#define REFUSED(change)                                             \
+    do {                                                            \
+        table = TABLE;                                              \
+        change;                                                     \
+        CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));       \
+        CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));                 \
+    } while (0)
+
+    REFUSED(table.layout = 2U);
+    REFUSED(table.quantity = 1U);
+    REFUSED(table.unit = 1U);
+    REFUSED(table.slope_blocks = 1U);
+    REFUSED(table.slope_blocks = GTC_MAX_SLOPE_BLOCKS + 1U);
+    REFUSED(table.hold_blocks = 0U);
+    REFUSED(table.hold_blocks = 100001UL);
+    REFUSED(table.stuck_samples = 0x80000000UL);
+    REFUSED(table.n_networks = 0U);
+    REFUSED(table.n_networks = 17U);
+    REFUSED(table.networks = NULL);
+    REFUSED(table.n_centers = 2U);
+    REFUSED(table.n_centers = 513U);
+    REFUSED(table.n_centers = 0U);
+    REFUSED(table.centers = NULL);
+    REFUSED(table.n_terms = 1U);
+    REFUSED(table.n_channels = 0U);
+    REFUSED(table.probes = NULL);
+    REFUSED(table.n_probes = 4097U);
+    REFUSED(table.coverage = NULL);
+    REFUSED(table.coverage_cells[0] = 257U);
+    REFUSED(table.coverage_cells[1] = 257U);
+    REFUSED(table.coverage_cells[1] = 0U);
+    REFUSED(table.sigma = NULL);
+    REFUSED(table.envelope[0] = table.envelope[1]; table.envelope[1] = TABLE.envelope[0]);
+    REFUSED(table.envelope[2] = table.envelope[3]; table.envelope[3] = TABLE.envelope[2]);
+#undef REFUSED
+}
+
+TEST(bad_arguments_are_refused)
+{
+    state_t state = started();
+    const num_t temp = C(15.0);
+    num_t bias = 0;
+
+    CHECK_INT(GTC_E_ARG, FN(init)(NULL, &TABLE, N));
+    CHECK_INT(GTC_E_ARG, FN(init)(&state, NULL, N));
+    CHECK_INT(GTC_E_ARG, FN(init)(&state, &TABLE, 0U));
+    CHECK_INT(GTC_E_ARG, FN(init)(&state, &TABLE, 0x100001UL));
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 0x100000UL));
+    CHECK_INT(GTC_E_ARG, FN(sample)(NULL, &temp));
+    CHECK_INT(GTC_E_ARG, FN(sample)(&state, NULL));
+    CHECK_INT(GTC_E_ARG, FN(missed)(NULL, 1U));
+    CHECK_INT(GTC_E_ARG, FN(bias)(NULL, &bias));
+    CHECK_INT(GTC_E_ARG, FN(bias)(&state, NULL));
+    memset(&state, 0, sizeof state);
+    CHECK_INT(GTC_E_ARG, FN(sample)(&state, &temp));
+    CHECK_INT(GTC_E_ARG, FN(missed)(&state, 1U));
+    CHECK_INT(GTC_E_ARG, FN(bias)(&state, &bias));
+}
+
+int main(void)
+{
+    RUN(before_the_first_sample_the_correction_is_zero_and_held);
+    RUN(the_first_valid_sample_gives_the_map_at_slope_0);
+    RUN(a_correction_is_in_force_for_a_block);
+    RUN(a_full_window_gives_the_slope);
+    RUN(missing_samples_are_held_and_do_not_move_the_mean);
+    RUN(impossible_samples_are_held);
+    RUN(a_window_with_a_hole_still_gives_the_slope);
+    RUN(a_window_with_too_many_holes_warms_again);
+    RUN(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart);
+    RUN(a_jump_is_held_until_three_samples_agree);
+    RUN(suspects_that_disagree_or_are_interrupted_start_again);
+    RUN(the_longer_the_gap_the_larger_the_believable_step);
+    RUN(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says);
+    RUN(a_table_that_believes_any_number_of_identical_samples);
+    RUN(missed_is_the_same_as_missing_samples);
+    RUN(a_table_that_this_build_cannot_use_is_refused);
+    RUN(bad_arguments_are_refused);
+    return test_end();
+}

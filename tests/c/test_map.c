@@ -1,0 +1,68 @@
+/* test_map.c - the static map: clamping, coverage, arguments. */
+#include "test_num.h"
+
+TEST(inside_it_answers_without_remark)
+{
+    num_t bias;
+
+    CHECK_INT(GTC_OK, FN(map)(&TABLE, C(-15.0), C(-0.4), &bias));
+}
+
+TEST(outside_it_gives_the_value_at_the_edge)
+{
+    num_t bias;
+
+    CHECK_INT(GTC_CLAMPED, FN(map)(&TABLE, C(-60.0), C(0.0), &bias));
+    CHECK(same(bias, map_of(C(-20.0), C(0.0))));
+    CHECK_INT(GTC_CLAMPED, FN(map)(&TABLE, C(100.0), C(0.25), &bias));
+    CHECK(same(bias, map_of(C(60.0), C(0.25))));
+    CHECK_INT(GTC_CLAMPED, FN(map)(&TABLE, C(-15.0), C(-9.0), &bias));
+    CHECK(same(bias, map_of(C(-15.0), C(-0.5))));
+    CHECK_INT(GTC_CLAMPED, FN(map)(&TABLE, C(45.0), C(9.0), &bias));
+    CHECK(same(bias, map_of(C(45.0), C(0.5))));
+}
+
+TEST(cells_without_training_data_are_told)
+{
+    num_t bias;
+
+    /* Cells are 10 C by 1/3 C per block; rows of coverage: 11110000, 11111110, 00111111. */
+    CHECK_INT(GTC_OK, FN(map)(&TABLE, C(19.0), C(-0.4), &bias));
+    CHECK_INT(GTC_UNCOVERED, FN(map)(&TABLE, C(21.0), C(-0.4), &bias));
+    CHECK_INT(GTC_UNCOVERED, FN(map)(&TABLE, C(55.0), C(0.0), &bias));
+    CHECK_INT(GTC_UNCOVERED, FN(map)(&TABLE, C(-1.0), C(0.4), &bias));
+    CHECK_INT(GTC_OK, FN(map)(&TABLE, C(1.0), C(0.4), &bias));
+    CHECK_INT(GTC_UNCOVERED | GTC_CLAMPED, FN(map)(&TABLE, C(61.0), C(0.0), &bias));
+}
+
+TEST(without_a_coverage_map_nothing_is_uncovered)
+{
+    table_t table = TABLE;
+    num_t bias;
+
+    table.coverage = NULL;
+    table.coverage_cells[0] = 0U;
+    table.coverage_cells[1] = 0U;
+    CHECK_INT(GTC_OK, FN(map)(&table, C(21.0), C(-0.4), &bias));
+}
+
+TEST(bad_arguments_write_nothing)
+{
+    num_t bias = C(7.0);
+
+    CHECK_INT(GTC_E_ARG, FN(map)(NULL, C(1.0), C(0.0), &bias));
+    CHECK_INT(GTC_E_ARG, FN(map)(&TABLE, MISSING, C(0.0), &bias));
+    CHECK_INT(GTC_E_ARG, FN(map)(&TABLE, C(1.0), MISSING, &bias));
+    CHECK_INT(GTC_E_ARG, FN(map)(&TABLE, C(1.0), C(0.0), NULL));
+    CHECK(same(bias, C(7.0)));
+}
+
+int main(void)
+{
+    RUN(inside_it_answers_without_remark);
+    RUN(outside_it_gives_the_value_at_the_edge);
+    RUN(cells_without_training_data_are_told);
+    RUN(without_a_coverage_map_nothing_is_uncovered);
+    RUN(bad_arguments_write_nothing);
+    return test_end();
+}

@@ -1,0 +1,106 @@
+/* test_num.h - the names in which a test is written once for both arithmetics.
+ *
+ * TEST_Q31 = 0 or 1 chooses. Temperatures in tests are multiples of 2^-16 C, exact in both.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef TEST_NUM_H_INCLUDED
+#define TEST_NUM_H_INCLUDED
+
+#include <string.h>
+
+#include "gtc_test.h"
+#include "gtc_test_1.h"
+
+#if TEST_Q31
+typedef int_least32_t num_t;
+typedef gtc_q31_table_t table_t;
+typedef gtc_q31_state_t state_t;
+#define FN(name) gtc_q31_##name
+#define TABLE gtc_test_1_q31
+#define C(temperature) ((int_least32_t)((temperature) * 65536.0))
+#define MISSING GTC_TEMP_MISSING
+#else
+typedef float num_t;
+typedef gtc_f32_table_t table_t;
+typedef gtc_f32_state_t state_t;
+#define FN(name) gtc_f32_##name
+#define TABLE gtc_test_1_f32
+#define C(temperature) ((float)(temperature))
+#define MISSING test_nan()
+
+static inline float test_nan(void)
+{
+    gtc_word_t word;
+
+    word.bits = 0x7FC00000UL;
+    return word.value;
+}
+#endif
+
+#define N 4UL /* samples in a block */
+
+static inline int same(num_t a, num_t b)
+{
+    return (memcmp(&a, &b, sizeof a) == 0) ? 1 : 0;
+}
+
+/* The map of the test table; a status is not expected to be an error. */
+static inline num_t map_of(num_t temp, num_t slope)
+{
+    num_t bias = 0;
+
+    CHECK(FN(map)(&TABLE, temp, slope, &bias) >= 0);
+    return bias;
+}
+
+static inline state_t started(void)
+{
+    state_t state;
+
+    memset(&state, 0xA5, sizeof state);
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, N));
+    return state;
+}
+
+/* Feeds n equal samples; returns the last status. */
+static inline int feed(state_t *state, num_t temp, int n)
+{
+    int status = GTC_E_ARG;
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status = FN(sample)(state, &temp);
+    }
+    return status;
+}
+
+/* n samples that rise (or fall) by `step`, starting at *temp, which moves on. */
+static inline int ramp(state_t *state, num_t *temp, num_t step, int n)
+{
+    int status = GTC_E_ARG;
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status = FN(sample)(state, temp);
+        *temp += step;
+    }
+    return status;
+}
+
+static inline num_t bias_of(const state_t *state)
+{
+    num_t bias = 0;
+
+    CHECK(FN(bias)(state, &bias) >= 0);
+    return bias;
+}
+
+static inline int status_of(const state_t *state)
+{
+    num_t bias = 0;
+
+    return FN(bias)(state, &bias);
+}
+
+#endif /* TEST_NUM_H_INCLUDED */
