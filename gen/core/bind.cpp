@@ -125,6 +125,8 @@ NB_MODULE(_core, m) {
         .def("moments", &EqualGaussians::moments)
         .def("column", &EqualGaussians::column, "j"_a)
         .def_prop_ro("centers", &EqualGaussians::centers)
+        .def_prop_ro("width_t", &EqualGaussians::width_t)
+        .def_prop_ro("width_r", &EqualGaussians::width_r)
         .def_prop_ro("energy", &EqualGaussians::energy)
         .def_prop_ro("samples", &EqualGaussians::samples);
     nb::class_<OlsPath>(m, "OlsPath")

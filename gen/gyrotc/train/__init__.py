@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from gyrotc.errors import InputError
+from gyrotc.train.bank import fit_bank
 from gyrotc.train.data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
+from gyrotc.train.linear import fit_mlr, fit_poly
 from gyrotc.train.mrbf import fit_mrbf
 from gyrotc.train.noise import floor_dph
-from gyrotc.train.result import Fit, network_dph, predict
+from gyrotc.train.ols import SIZE_RULES, fit_ols
+from gyrotc.train.result import Fit, Outcome, network, predict
 
-__all__ = ["METHODS", "Fit", "TrainingData", "fit", "predict"]
+__all__ = ["METHODS", "SIZE_RULES", "Fit", "Outcome", "TrainingData", "fit", "predict"]
 
-METHODS = ("mrbf",)
+METHODS = ("mlr", "poly", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
 _MAX_CENTERS = 512
 
 
@@ -25,6 +28,7 @@ def fit(
     seed: int = 0,
     centers: int | None = None,
     rho: float | None = None,
+    size_rule: str | None = None,
     average_s: float = 100.0,
 ) -> Fit:
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
@@ -33,67 +37,77 @@ def fit(
         data: Samples; exact duplicates by run and time count once.
         method: One of `METHODS`.
         seed: Of everything random.
-        centers: Largest number of centers; None: chosen from the data.
-        rho: Stop rule of the orthogonal least squares methods, eq. (16) of Ding et al. 2014.
+        centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
+        rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
+        size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
 
     Raises:
         InputError: Bad samples or arguments.
     """
+    _check(method, centers, rho, average_s)
+    samples = cleaned(data)
+    scaling = scaling_of(samples)
+    findings = []
+    if np.ptp(samples.temperature_c) < MIN_TEMPERATURE_SPAN_C:
+        outcome = _constant(samples)
+        findings.append(_no_information(samples))
+    else:
+        outcome = _trainer(method, seed, centers, rho, size_rule, average_s)(samples, scaling)
+    mean = float(np.average(samples.bias_dph, weights=samples.weight))
+    bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
+    residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
+    floor = floor_dph(samples, residual, average_s)
+    return Fit(method, outcome, scaling, findings, floor, average_s, mean)
+
+
+def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:
     if method not in METHODS:
         raise InputError("method", repr(method), "one of " + ", ".join(METHODS))
     if centers is not None and not 0 <= centers <= _MAX_CENTERS:
         raise InputError("centers", repr(centers), f"0 ... {_MAX_CENTERS}")
+    if rho is not None and not 0.0 <= rho < 1.0:
+        raise InputError("rho", repr(rho), "0 ... 1")
     if not (np.isfinite(average_s) and average_s > 0.0):
         raise InputError("average_s", repr(average_s), "a number of seconds above 0")
-    samples = cleaned(data)
-    scaling = scaling_of(samples)
-    mean = float(np.average(samples.bias_dph, weights=samples.weight))
-    if np.ptp(samples.temperature_c) < MIN_TEMPERATURE_SPAN_C:
-        return _constant(samples, scaling, mean, method, average_s)
-    outcome = fit_mrbf(samples, scaling, seed=seed, centers=centers, average_s=average_s)
-    residual = samples.bias_dph - network_dph(
-        outcome.network, scaling, samples.temperature_c, samples.slope_c_per_min
-    )
-    return Fit(
-        method=method,
-        networks=(outcome.network,),
-        scaling=scaling,
-        findings=(),
-        curves=outcome.curves,
-        predicted_rms_ratio=None if outcome.withheld else outcome.predicted_rms_ratio,
-        withheld=outcome.withheld,
-        noise_floor_dph=floor_dph(samples, residual, average_s),
+
+
+def _trainer(
+    method: str, seed: int, centers: int | None, rho: float | None, size_rule: str | None, average_s: float
+) -> Callable[[TrainingData, Scaling], Outcome]:
+    if method == "mlr":
+        return lambda data, scaling: fit_mlr(data, scaling, average_s)
+    if method == "poly":
+        return lambda data, scaling: fit_poly(data, scaling, average_s)
+    if method in ("mrbf", "bank"):
+        run = fit_mrbf if method == "mrbf" else fit_bank
+        return lambda data, scaling: run(data, scaling, seed=seed, centers=centers, average_s=average_s)
+    return lambda data, scaling: fit_ols(
+        method,
+        data,
+        scaling,
+        seed=seed,
+        centers=centers,
+        rho=rho,
+        size_rule=size_rule,
         average_s=average_s,
-        fallback_dph=mean,
     )
 
 
-def _constant(samples: TrainingData, scaling: Scaling, mean: float, method: str, average_s: float) -> Fit:
+def _constant(samples: TrainingData) -> Outcome:
     """A temperature span under 2 C says nothing about temperature: the mean is the model."""
+    mean = float(np.average(samples.bias_dph, weights=samples.weight))
+    return Outcome(
+        networks=(network(mean),),
+        curves={"sizes": [], "chosen": 0, "samples": len(samples)},
+        withheld="a constant model has nothing to predict from",
+    )
+
+
+def _no_information(samples: TrainingData) -> dict[str, object]:
     span = float(np.ptp(samples.temperature_c))
-    network: dict[str, Any] = {
-        "w0": mean,
-        "linear": [0.0, 0.0],
-        "centers": [],
-        "widths": [],
-        "weights": [],
-        "region": None,
-    }
-    finding = {
+    return {
         "id": "no_temperature_information",
         "text": f"Temperature spans only {span:.2f} C: the model is the mean bias.",
         "evidence": {"span_c": span, "required_c": MIN_TEMPERATURE_SPAN_C},
     }
-    return Fit(
-        method=method,
-        networks=(network,),
-        scaling=scaling,
-        findings=(finding,),
-        curves={"sizes": [], "chosen": 0, "samples": len(samples)},
-        predicted_rms_ratio=None,
-        withheld="a constant model has nothing to predict from",
-        noise_floor_dph=floor_dph(samples, samples.bias_dph - mean, average_s),
-        average_s=average_s,
-        fallback_dph=mean,
-    )

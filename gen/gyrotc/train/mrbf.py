@@ -3,7 +3,7 @@
 1. Means over 50 s are gathered into bins; a Hilbert-space Gaussian process is fitted by maximum evidence.
 2. A Kohonen network on the bins proposes places; orthogonal least squares picks among them; variable
    projection moves all centers and widths. The target is the mean of the process, not the samples.
-3. The number of centers is the smallest whose departure d from the process' mean is at most 1/4 of the
+3. The number of centers is the smallest whose departure d from the process' mean is at most 1/10 of the
    process' own expected squared error v. Predicted RMS over noise floor: √(1 + v + d).
 """
 
@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from gyrotc import _core
 from gyrotc.train.data import Bins, Scaling, TrainingData, average, gather
 from gyrotc.train.noise import not_white
+from gyrotc.train.result import Outcome, network
 
-__all__ = ["Compressed", "fit_mrbf"]
+__all__ = ["fit_mrbf"]
 
 Floats = NDArray[np.float64]
 
 MEAN_S = 50.0
 MAX_CENTERS = 24
-_DEPARTURE = 0.25
+_DEPARTURE = 0.1
 _SETTLED = 0.01
 _RIDGE = 0.01
 _KOHONEN_NODES = 40
@@ -34,16 +35,6 @@ _TRIM_SIGMA = 4.5
 _TRIMS = 3
 _GAP_GRID = (17, 9)
 _GAP_WEIGHT = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Compressed:
-    """Outcome of the method in physical units."""
-
-    network: dict[str, Any]
-    predicted_rms_ratio: float
-    withheld: str
-    curves: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +53,7 @@ class _Samples:
 
 def fit_mrbf(
     data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float
-) -> Compressed:
+) -> Outcome:
     """Trains on cleaned samples whose temperature spans at least 2 C.
 
     Args:
@@ -99,11 +90,13 @@ def fit_mrbf(
         "trimmed": int(np.sum(~kept)),
         "seconds": {"evidence": evidence_s, "compression": time.process_time() - began - evidence_s},
     }
-    return Compressed(
-        network=_physical(sizes[chosen], samples, scaling),
-        predicted_rms_ratio=float(np.sqrt(1.0 + expected + departures[chosen] * per_noise)),
-        withheld=not_white(residual, samples.run[kept], samples.weight[kept]),
+    withheld = not_white(residual, samples.run[kept], samples.weight[kept])
+    predicted = float(np.sqrt(1.0 + expected + departures[chosen] * per_noise))
+    return Outcome(
+        networks=(_physical(sizes[chosen], samples, scaling),),
         curves=curves,
+        predicted_rms_ratio=None if withheld else predicted,
+        withheld=withheld,
     )
 
 
@@ -177,19 +170,12 @@ def evaluate(network: _core.Network, t: Floats, r: Floats) -> Floats:
     return np.asarray(value)
 
 
-def _physical(network: _core.Network, samples: _Samples, scaling: Scaling) -> dict[str, Any]:
+def _physical(found: _core.Network, samples: _Samples, scaling: Scaling) -> dict[str, Any]:
     """The network in deg/h, C and C/min, centers ordered by temperature."""
-    order = np.lexsort((network.shapes[1], network.shapes[0]))
-    w = network.weights * samples.spread
-    c, d, s, q = network.shapes[:, order]
-    return {
-        "w0": float(w[0] + samples.center),
-        "linear": [float(w[1]), float(w[2])],
-        "centers": [
-            [float(a * scaling.half_range_c + scaling.center_c), float(b * scaling.half_range_c_per_min)]
-            for a, b in zip(c, d, strict=True)
-        ],
-        "widths": [[float(np.exp(a)), float(np.exp(b))] for a, b in zip(s, q, strict=True)],
-        "weights": [float(x) for x in w[3:][order]],
-        "region": None,
-    }
+    order = np.lexsort((found.shapes[1], found.shapes[0]))
+    w = found.weights * samples.spread
+    c, d, s, q = found.shapes[:, order]
+    centers = np.stack(
+        [c * scaling.half_range_c + scaling.center_c, d * scaling.half_range_c_per_min], axis=1
+    )
+    return network(w[0] + samples.center, w[1:3], centers, np.exp(np.stack([s, q], axis=1)), w[3:][order])

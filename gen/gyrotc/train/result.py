@@ -11,7 +11,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyrotc.train.data import Scaling
 
-__all__ = ["Fit", "predict"]
+__all__ = ["Fit", "Outcome", "network", "networks_dph", "predict"]
+
+Floats = NDArray[np.float64]
+Network = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a method hands to `fit`.
+
+    Attributes:
+        networks: As in `model.json` (docs/FORMAT.md): w0, linear, centers, widths, weights, region.
+        curves: For `training.json`.
+        predicted_rms_ratio: Predicted RMS over noise floor, None if withheld.
+        withheld: Why, empty if it is not.
+        polynomial: Further summands (power of z_T, power of z_r, deg/h), for comparison only.
+    """
+
+    networks: Sequence[Network]
+    curves: Mapping[str, Any]
+    predicted_rms_ratio: float | None = None
+    withheld: str = "the method predicts nothing"
+    polynomial: Sequence[tuple[int, int, float]] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,27 +42,37 @@ class Fit:
 
     Attributes:
         method: Name of the method.
-        networks: As in `model.json` (docs/FORMAT.md): w0, linear, centers, widths, weights, region.
+        outcome: What the method found; its fields are also attributes of the fit.
         scaling: Normalisation of the inputs and their range in training.
         findings: What a user should know, each with id, text and evidence.
-        curves: For `training.json`: cost by size, evidence, times.
-        predicted_rms_ratio: Predicted RMS of the compensated bias over the noise floor, None if withheld.
-        withheld: Why the prediction is withheld, empty if it is not.
         noise_floor_dph: Estimated noise of means over `average_s`, deg/h.
         average_s: Averaging of RMS figures, s.
         fallback_dph: Weighted mean of the training bias, deg/h.
     """
 
     method: str
-    networks: Sequence[Mapping[str, Any]]
+    outcome: Outcome
     scaling: Scaling
     findings: Sequence[Mapping[str, Any]]
-    curves: Mapping[str, Any]
-    predicted_rms_ratio: float | None
-    withheld: str
     noise_floor_dph: float
     average_s: float
     fallback_dph: float
+
+    @property
+    def networks(self) -> Sequence[Network]:
+        return self.outcome.networks
+
+    @property
+    def curves(self) -> Mapping[str, Any]:
+        return self.outcome.curves
+
+    @property
+    def predicted_rms_ratio(self) -> float | None:
+        return self.outcome.predicted_rms_ratio
+
+    @property
+    def withheld(self) -> str:
+        return self.outcome.withheld
 
     @property
     def scale(self) -> dict[str, Any]:
@@ -65,8 +97,9 @@ class Fit:
 
     @property
     def table_bytes(self) -> int:
-        """Bytes of the map's parameters as 32-bit words: 24 + 20 M for one network."""
-        return 12 + sum(12 + 20 * len(network["weights"]) for network in self.networks)
+        """Parameters of the map as 32-bit words: 24 + 20 M for one network, 4 for each further summand."""
+        parts = sum(12 + 20 * len(network["weights"]) for network in self.networks)
+        return 12 + parts + 4 * len(self.outcome.polynomial)
 
     @property
     def sum_abs_weights(self) -> float:
@@ -74,31 +107,73 @@ class Fit:
         return max(float(np.abs(network["weights"]).sum()) for network in self.networks)
 
 
-def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64]:
+def network(
+    w0: float,
+    linear: ArrayLike = (0.0, 0.0),
+    centers: ArrayLike = (),
+    widths: ArrayLike = (),
+    weights: ArrayLike = (),
+) -> dict[str, Any]:
+    """A network of plain numbers without a region."""
+    return {
+        "w0": float(w0),
+        "linear": np.asarray(linear, dtype=np.float64).tolist(),
+        "centers": np.asarray(centers, dtype=np.float64).tolist(),
+        "widths": np.asarray(widths, dtype=np.float64).tolist(),
+        "weights": np.asarray(weights, dtype=np.float64).tolist(),
+        "region": None,
+    }
+
+
+def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> Floats:
     """Bias of the map in deg/h at inputs in C and C/min, clamped to the envelope; shapes broadcast."""
     s = fit.scaling
     t = np.clip(np.asarray(temperature_c, dtype=np.float64), *s.temperature_c)
     r = np.clip(np.asarray(slope_c_per_min, dtype=np.float64), *s.slope_c_per_min)
     t, r = np.broadcast_arrays(t, r)
-    return network_dph(fit.networks[0], s, t, r)
+    bias = networks_dph(fit.networks, s, t, r)
+    z_t, z_r = s.normalise(t, r)
+    for power_t, power_r, weight in fit.outcome.polynomial:
+        bias = bias + weight * z_t**power_t * z_r**power_r
+    return bias
 
 
-def network_dph(
-    network: Mapping[str, Any],
-    scaling: Scaling,
-    temperature_c: NDArray[np.float64],
-    slope: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """One network at inputs that are already clamped (docs/FORMAT.md, section 1), deg/h."""
+def networks_dph(
+    networks: Sequence[Network], scaling: Scaling, temperature_c: Floats, slope: Floats
+) -> Floats:
+    """Networks at inputs that are already clamped, deg/h; over the overlap of their regions blended linearly.
+
+    A network's share is the distance to the nearest inner edge of its region, in lengths of the region.
+    """
+    if len(networks) == 1:
+        return _network_dph(networks[0], scaling, temperature_c, slope)
+    total, shares = np.zeros(temperature_c.shape), np.zeros(temperature_c.shape)
+    for one in networks:
+        share = np.ones(temperature_c.shape)
+        for key, x, envelope in (
+            ("temperature_c", temperature_c, scaling.temperature_c),
+            ("slope_c_per_min", slope, scaling.slope_c_per_min),
+        ):
+            low, high = one["region"][key]
+            length = (high - low) or 1.0
+            if low > envelope[0]:
+                share = np.minimum(share, (x - low) / length)
+            if high < envelope[1]:
+                share = np.minimum(share, (high - x) / length)
+        share = np.maximum(share, 0.0)
+        total += share * _network_dph(one, scaling, temperature_c, slope)
+        shares += share
+    return np.asarray(total / shares)
+
+
+def _network_dph(network: Network, scaling: Scaling, temperature_c: Floats, slope: Floats) -> Floats:
+    """One network (docs/FORMAT.md, section 1), deg/h."""
     t, r = scaling.normalise(temperature_c, slope)
     bias = network["w0"] + network["linear"][0] * t + network["linear"][1] * r
     for (c_t, c_r), (d_t, d_r), weight in zip(
         network["centers"], network["widths"], network["weights"], strict=True
     ):
-        u = np.zeros_like(t)
-        if d_t is not None:
-            u = u + ((t - (c_t - scaling.center_c) / scaling.half_range_c) / d_t) ** 2
-        if d_r is not None:
-            u = u + ((r - c_r / scaling.half_range_c_per_min) / d_r) ** 2
+        u = ((t - (c_t - scaling.center_c) / scaling.half_range_c) / d_t) ** 2
+        u = u + ((r - c_r / scaling.half_range_c_per_min) / d_r) ** 2
         bias = bias + weight * np.exp(-u)
     return np.asarray(bias, dtype=np.float64)
