@@ -58,7 +58,7 @@ extras=""
 [ "$level" = demo ] || extras="[test]"
 [ "$level" = bench ] && extras="[test,bench]"
 stamp=.venv/.gyrotc$extras
-fingerprint=$(cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh | sha256sum | cut -d' ' -f1)
+fingerprint=$({ cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
 if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
   [ -x .venv/bin/python ] || { echo "setup: making .venv"; python3 -m venv .venv; }
   echo "setup: installing gyrotc into .venv (builds the C++ core)"

@@ -177,7 +177,7 @@ def emit_texts(
         "n": numerics[0],
         "n_channels": vectors.n_channels,
         "id_code": first.id,
-        "tables": [_table_text(t) for t in emission.tables.values()],
+        "tables": [_table_text(t, _row_comments(model)) for t in emission.tables.values()],
         "facts": list(_facts(model)),
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
@@ -224,7 +224,7 @@ def _facts(model: Model) -> Iterator[tuple[str, str]]:
         if key in ("warnings", "environments") or isinstance(value, (dict, list)):
             continue
         text = " ".join(str(value).split())
-        safe = text.encode("ascii", "replace").decode("ascii").replace("*/", "* /")[:120]
+        safe = text.encode("ascii", "replace").decode("ascii").replace("*/", "* /").replace("/*", "/ *")[:120]
         yield key[:24], safe
 
 
@@ -269,7 +269,7 @@ def _intel_hex(data: bytes) -> str:
     return "".join(lines) + record(1, 0, b"")
 
 
-def _table_text(table: Table) -> _TableText:
+def _table_text(table: Table, comments: dict[str, list[str]]) -> _TableText:
     """Decodes the image's words into named members; the order is that of gtc_table.h."""
     words = iter(table.words[_HEAD_WORDS:])
     sizes = {"scale": 3 if table.numeric == "f32" else 6, "envelope": 4}
@@ -292,7 +292,7 @@ def _table_text(table: Table) -> _TableText:
         if name == "terms":
             kinds = body[:: _RECORDS["terms"]]
         if length:
-            arrays.append(_array(table.numeric, name, body, counts))
+            arrays.append(_array(table.numeric, name, body, counts, comments.get(name, [])))
         members.append(_Member(name, f"{table.numeric}_{name}" if length else "NULL"))
     members.append(_Member("crc", f"0x{next(words):08x}UL"))
     codes = [f"gtc_{table.numeric}_term_{_TERM_CODES[k]}" for k in kinds]
@@ -315,14 +315,32 @@ def _array_lengths(counts: dict[str, list[int]]) -> dict[str, int]:
     }
 
 
-def _array(numeric: str, name: str, body: list[int], counts: dict[str, list[int]]) -> _Array:
+def _row_comments(model: Model) -> dict[str, list[str]]:
+    """What a row of an array says in the units of the trade."""
+    centers = [
+        f"{t:.2f} C, {r:+.3f} C/min; widths {_width(d_t)}, {_width(d_r)}; {w:+.3e} deg/h"
+        for n in model.networks
+        for (t, r), (d_t, d_r), w in zip(n.centers, n.widths, n.weights, strict=True)
+    ]
+    return {"centers": centers, "terms": [term.id for term in model.terms]}
+
+
+def _width(width: float | None) -> str:
+    return "infinite" if width is None else f"{width:.3f}"
+
+
+def _array(
+    numeric: str, name: str, body: list[int], counts: dict[str, list[int]], comments: list[str]
+) -> _Array:
     width = _RECORDS.get(name, counts["sigma_cells"][0] if name == "sigma" else 6)
     rows = []
     for start in range(0, len(body), width):
         cells = [
             _word(numeric, w, integer=_is_integer(name, k)) for k, w in enumerate(body[start : start + width])
         ]
-        rows.append(", ".join(cells) + ",")
+        number = start // width
+        comment = f" /* {comments[number]} */" if number < len(comments) else ""
+        rows.append(", ".join(cells) + "," + comment)
     return _Array(name, _ARRAY_COMMENTS[name], len(body), tuple(rows))
 
 
@@ -338,15 +356,13 @@ def _is_integer(name: str, column: int) -> bool:
 
 def _word(numeric: str, word: int, *, integer: bool) -> str:
     if integer:
-        return f"{{ .bits = 0x{word:x}UL }}"
-    if numeric == "f32":
-        return f"{{ .value = {_float_text(word)} }}"
-    return f"{{ .bits = 0x{word:08x}UL }}"
+        return f"B(0x{word:x}UL)"
+    return f"V({_float_text(word)})" if numeric == "f32" else f"B(0x{word:08x}UL)"
 
 
 def _number(numeric: str, word: int) -> str:
     if numeric == "f32":
-        return f"{{ .value = {_float_text(word)} }}"
+        return f"V({_float_text(word)})"
     signed = word - 2**32 if word >= 2**31 else word
     return "(-2147483647L - 1L)" if signed == -(2**31) else f"{signed}L"
 

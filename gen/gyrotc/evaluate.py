@@ -40,10 +40,14 @@ _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensate
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """One run replayed, every row of the file: correction in force (deg/h), status bits, differing steps."""
+    """One run replayed, every row of the file.
+
+    Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps.
+    """
 
     bias_dph: NDArray[np.float64]
     status: NDArray[np.int64]
+    scored: NDArray[np.bool_]
     mismatches: int
 
 
@@ -142,6 +146,7 @@ def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[
     return Replayed(
         bias_dph=table.decode_bias(got[:, 2]),
         status=got[:, 1].astype(np.int64),
+        scored=want.block_valid,
         mismatches=int(np.count_nonzero(~same)),
     )
 
@@ -159,7 +164,7 @@ def _one_run(
     rows = run.rows()
     replayed = replay_run(rows, run, model, table, program)
     span = run.in_span(rows.time_s)
-    scored = span & scored_rows(replayed.status)
+    scored = span & replayed.scored
     after = rows.rate_dph - replayed.bias_dph
     averages = average(
         rows.time_s[span],
@@ -173,11 +178,6 @@ def _one_run(
         shared = sum(r.file == run.file for r in all_runs) > 1
         _write_trace(trace, run, rows, replayed, span, shared=shared)
     return _Part(run, averages, replayed.mismatches)
-
-
-def scored_rows(status: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Rows that count: all but those of blocks whose correction was held or had fallen back."""
-    return (status & (8 | 16)) == 0
 
 
 def _write_trace(

@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from .metrics import Averages
 from .model import Model
@@ -22,7 +23,7 @@ from .model import Model
 __all__ = ["bias_over_time", "curve_by_size", "map_with_centers", "svg"]
 
 BEFORE, AFTER, COVERED, ACCENT = "#b4552d", "#1f6f8b", "#7a7a7a", "#222222"
-_STYLE = {
+_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "gyrotc",
     "font.family": "sans-serif",
@@ -154,6 +155,7 @@ def curve_by_size(training: dict[str, Any]) -> str | None:
         chosen = curves.get("chosen")
         if chosen is not None:
             ax.axvline(chosen, color=ACCENT, linewidth=0.8, linestyle="--", label=f"chosen: {chosen}")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set(xlabel="number of centers")
         ax.legend(fontsize=8)
         return svg(figure)

@@ -39,6 +39,12 @@ def f32_words(values: ArrayLike) -> Words:
     return np.asarray(rounded).reshape(-1).view(np.uint32)
 
 
+def _widened(words: Words) -> NDArray[np.float64]:
+    """float32 numbers by their bits, in float64; a signalling NaN among them is no warning."""
+    with np.errstate(invalid="ignore"):
+        return words.view(np.float32).astype(np.float64)
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """One table: what `emit` prints and `reference` computes with. Every number is a 32-bit word.
@@ -128,7 +134,7 @@ class Table:
         """The other way; missing inputs become NaN."""
         words = np.ascontiguousarray(bits, dtype=np.uint32)
         if self.numeric == "f32":
-            return words.view(np.float32).astype(np.float64)
+            return _widened(words)
         whole = words.view(np.int32).astype(np.float64)
         return np.where(whole == MISSING_Q31, np.nan, whole * 2.0**-_INPUT_BITS)
 
@@ -136,7 +142,7 @@ class Table:
         """Biases in deg/h from their bits."""
         words = np.ascontiguousarray(bits, dtype=np.uint32)
         if self.numeric == "f32":
-            return words.view(np.float32).astype(np.float64)
+            return _widened(words)
         return words.view(np.int32).astype(np.float64) * 2.0**-self.bias_frac_bits
 
     def numbers(self, words: Any) -> NDArray[Any]:

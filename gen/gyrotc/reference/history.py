@@ -52,6 +52,7 @@ class Replay:
     bits: Words  # of the bias that it writes
 
     missed_status: NDArray[np.int32]  # what `missed` returns before the row (0 where nothing was missed)
+    block_valid: NDArray[np.bool_]  # the row's own block has enough believed samples
 
 
 def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> Replay:
@@ -80,6 +81,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         status=status[at_rows],
         bits=bits[at_rows],
         missed_status=np.where(shortened > 0, status[before] | _HELD, 0).astype(np.int32),
+        block_valid=steps.valid[position // samples_per_block],
     )
 
 

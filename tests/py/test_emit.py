@@ -1,0 +1,103 @@
+"""Emission: a pure function of the model. The golden files are compared byte for byte on every machine."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import GOLDEN, Command
+from gyrotc.emit import emit, emit_texts, quantise_all
+from gyrotc.errors import InputError
+from gyrotc.model import Model, load_model
+
+# The runtime beside the tables is a copy of libc/, which its own tests hold.
+RUNTIME = {"gtc.h", "gtc.c"}
+
+
+def _golden_texts() -> dict[str, bytes]:
+    model = load_model(GOLDEN / "model.json")
+    return emit_texts(model, quantise_all(model, None))
+
+
+def test_emitted_files_are_the_golden_ones() -> None:
+    """Long files by their SHA-256, the table itself in full, so that a change shows in review."""
+    sums = dict(reversed(line.split()) for line in (GOLDEN / "SHA256SUMS").read_text().splitlines())
+    texts = _golden_texts()
+    assert set(texts) - RUNTIME == set(sums)
+    for name in ("gtc_rlg_0042.c", "gtc_rlg_0042.h"):
+        assert texts[name].decode() == (GOLDEN / name).read_text()
+    found = {name: hashlib.sha256(texts[name]).hexdigest() for name in sums}
+    assert found == sums
+
+
+def test_emitted_text_names_no_time_path_or_version(tmp_path: Path) -> None:
+    from gyrotc import __version__
+
+    for name, data in _golden_texts().items():
+        text = data.decode("latin-1")
+        if name in RUNTIME or not name.endswith((".c", ".h")):
+            continue
+        assert __version__ not in text
+        assert str(Path.home()) not in text and "/tmp" not in text
+
+
+def test_emit_replaces_the_folder_whole(tmp_path: Path) -> None:
+    model = load_model(GOLDEN / "model.json")
+    emit(model, tmp_path)
+    (tmp_path / "c" / "stale.c").write_text("old")
+    emit(model, tmp_path)
+    assert not (tmp_path / "c" / "stale.c").exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["c"]
+
+
+def test_methods_for_comparison_are_refused(model_dict: dict[str, Any], tmp_path: Path) -> None:
+    model = Model.from_dict(model_dict | {"method": "poly"})
+    with pytest.raises(InputError, match="comparison"):
+        emit(model, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: Path) -> None:
+    model = load_model(GOLDEN / "model.json")
+    emit(model, tmp_path)
+    c = tmp_path / "c"
+    program = tmp_path / "main"
+    subprocess.run(
+        ["gcc", "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-o", program]
+        + [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"],
+        check=True,
+    )
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    temperature, bias = float(printed.split()[2]), float(printed.split()[4])
+    assert bias == pytest.approx(float(model.map_dph(temperature, 0.0)), abs=2e-6)
+
+
+def test_intel_hex_holds_the_image(tmp_path: Path) -> None:
+    texts = _golden_texts()
+    data = bytearray()
+    for line in texts["gtc_rlg_0042.hex"].decode().split():
+        raw = bytes.fromhex(line[1:])
+        assert sum(raw) % 256 == 0
+        if raw[3] == 0:
+            assert int.from_bytes(raw[1:3], "big") == len(data) % 65536
+            data += raw[4:-1]
+    assert bytes(data) == texts["gtc_rlg_0042.bin"]
+
+
+def test_zero_at_emits_a_table_that_is_zero_there_and_verifies(tmp_path: Path, gyrotc: Command) -> None:
+    done = gyrotc("emit", GOLDEN / "model.json", "--out", tmp_path, "--zero-at", "20")
+    assert done.returncode == 0, done.stderr
+    assert "--zero-at 20" in (tmp_path / "c" / "gtc_rlg_0042.h").read_text()
+    verified = gyrotc("verify", tmp_path, "--target", "host-gcc-O2")
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+def test_a_serial_cannot_break_out_of_its_comment(model_dict: dict[str, Any]) -> None:
+    model = Model.from_dict(model_dict | {"meta": {"operator": "x */ int hidden; /*", "note": "a\nb\tc é"}})
+    text = emit_texts(model, quantise_all(model, None))["gtc_rlg_0042.h"].decode("ascii")
+    assert "*/ int hidden" not in text
+    assert text.count("/*") == text.count("*/")
