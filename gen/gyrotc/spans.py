@@ -1,9 +1,9 @@
 """Cuts a few training runs into spans, so that each can be left out in turn.
 
 With fewer than three runs, whole runs are too few to learn from the rest. A run is cut at the turning points
-of its temperature (where smoothed dT/dt changes sign: the branches of a cycle, at least 5 minutes each); where
-it has none, into five parts of equal length. Samples within a guard gap of a span are not trained on while it
-is left out.
+of its temperature (where smoothed dT/dt changes sign: the branches of a cycle, at least 5 minutes each), or,
+where it has none, into five parts of equal length. Samples within a guard gap of a span are not trained on
+while it is left out.
 """
 
 from __future__ import annotations

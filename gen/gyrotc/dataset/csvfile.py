@@ -8,7 +8,6 @@ that lost power) is left out.
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import re
 from array import array
@@ -21,6 +20,7 @@ import pyarrow.csv as pacsv
 
 from ..errors import InputError
 from .records import Floats
+from .source import Prefix, Source
 from .values import Fault
 
 __all__ = ["CsvFile"]
@@ -31,46 +31,37 @@ _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
 
 
-class CsvFile:
+class CsvFile(Source):
     """One CSV file, as long as it was when it was opened.
 
     Args:
         name: Name in messages.
         path: Where it is.
 
-    Attributes:
-        names: Column names.
-        sha256: Of the bytes that are read.
-        torn: The unfinished last line that is left out, empty if there is none.
-
     Raises:
         InputError: It cannot be read, is no text, is empty or has no header.
     """
+
+    row_unit = "line"
 
     def __init__(self, name: str, path: Path) -> None:
         self.name = name
         self.path = path
         try:
-            self._size = path.stat().st_size
+            size = path.stat().st_size
             with path.open("rb") as file:
                 head = file.readline(_LONGEST_LINE)
             self.names = _header(name, head)
-            self._size, self.torn = _without_torn_line(path, self._size, len(head), len(self.names))
-            self.sha256 = self._hash()
+            self.size, self.torn = _without_torn_line(path, size, len(head), len(self.names))
+            self.keep_as_read()
         except OSError as error:
             raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
 
     def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
-        """Columns as float64; None if pyarrow cannot make numbers of them: `scan` says why.
-
-        Raises:
-            InputError: The file has been changed since it was opened.
-        """
-        if self.path.stat().st_size < self._size:
-            raise InputError(self.name, "was changed while it was being read", "a recording that stays")
+        """As `Source.read`, fast: by pyarrow, one block after the other."""
         unique = [f"{index} {name}" for index, name in enumerate(self.names)]
         try:
-            with _Prefix(self.path, self._size) as prefix:
+            with Prefix(self.path, self.size) as prefix:
                 table = pacsv.read_csv(
                     prefix,
                     pacsv.ReadOptions(
@@ -88,17 +79,12 @@ class CsvFile:
         return {name: column.to_numpy() for name, column in zip(columns, table.columns, strict=True)}
 
     def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
-        """Reads line by line what can be read.
-
-        Returns:
-            Columns of the rows that are whole (NaN where a cell is no number), their line numbers, and the
-            faults; `Fault.row` is a line number here.
-        """
+        """As `Source.scan`, line by line."""
         cells: list[array[float]] = [array("d") for _ in self.names]
         lines = array("q")
         seen = _Faults()
         for number, line in self._lines():
-            row = [cell.strip().strip('"').strip() for cell in line.split(",")]
+            row = [_bare(cell) for cell in line.split(",")]
             if "\x00" in line:
                 seen.add(number, "", "NUL byte", "a NUL byte (binary or damaged)", "text")
             elif len(row) != len(self.names):
@@ -112,7 +98,7 @@ class CsvFile:
         return columns, list(lines), seen.faults()
 
     def place(self, row: int) -> int:
-        """Line number of a row (0 is the first one below the header)."""
+        """Line number of a row."""
         for index, (number, _) in enumerate(self._lines()):
             if index == row:
                 return number
@@ -120,18 +106,11 @@ class CsvFile:
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         """Lines below the header that are not empty, with their numbers."""
-        with _Prefix(self.path, self._size) as prefix:
+        with Prefix(self.path, self.size) as prefix:
             text = io.TextIOWrapper(io.BufferedReader(prefix), encoding="utf-8", errors="replace")
             for number, line in enumerate(text, start=1):
                 if number > 1 and line.rstrip("\r\n"):
                     yield number, line.rstrip("\r\n")
-
-    def _hash(self) -> str:
-        digest = hashlib.sha256()
-        with _Prefix(self.path, self._size) as prefix:
-            while block := prefix.read(_BLOCK_BYTES):
-                digest.update(block)
-        return digest.hexdigest()
 
 
 class _Faults:
@@ -163,26 +142,6 @@ class _Faults:
         ]
 
 
-class _Prefix(io.RawIOBase):
-    """The first `size` bytes of a file."""
-
-    def __init__(self, path: Path, size: int) -> None:
-        self._file = path.open("rb", buffering=0)
-        self._left = size
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        count = self._file.readinto(memoryview(buffer)[: self._left])
-        self._left -= count
-        return count
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-
 def _header(name: str, head: bytes) -> tuple[str, ...]:
     where = f"{name}, line 1"
     if not head:
@@ -200,10 +159,16 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
             if mark in text:
                 expected = "commas between columns and points in decimals"
                 raise InputError(where, f"{what} between columns", expected)
-    names = tuple(cell.strip() for cell in next(csv.reader([text]), []))
+    cells = next(csv.reader([text], skipinitialspace=True), [])
+    names = tuple(_bare(cell) for cell in cells)
     if not names or all(_NUMBER.fullmatch(cell) for cell in names):
         raise InputError(where, "no header" if names else "an empty line", "the names of the columns")
     return names
+
+
+def _bare(cell: str) -> str:
+    """A cell without the spaces and quotes around it."""
+    return cell.strip().strip('"').strip()
 
 
 def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[int, str]:

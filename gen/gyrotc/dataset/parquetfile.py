@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,29 +12,26 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from .records import Floats
+from .source import Source
+from .values import Fault
 
 __all__ = ["ParquetFile"]
 
 _BATCH_ROWS = 2**18
-_BLOCK_BYTES = 2**22
 
 
-class ParquetFile:
+class ParquetFile(Source):
     """One Parquet file.
 
     Args:
         name: Name in messages.
         path: Where it is.
 
-    Attributes:
-        names: Column names.
-        sha256: Of the file.
-
     Raises:
         InputError: It cannot be read, is no Parquet, or has a column that holds no numbers.
     """
 
-    torn = ""  # a Parquet file is whole or cannot be opened
+    row_unit = "row"
 
     def __init__(self, name: str, path: Path) -> None:
         self.name = name
@@ -44,7 +40,8 @@ class ParquetFile:
             with pq.ParquetFile(path) as file:
                 schema = file.schema_arrow
                 self._n_rows = file.metadata.num_rows
-            self.sha256 = self._hash()
+            self.size = path.stat().st_size
+            self.keep_as_read()
         except (pa.ArrowException, OSError) as error:
             raise InputError(
                 name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
@@ -55,11 +52,7 @@ class ParquetFile:
                 raise InputError(f"{name}, column {field.name}", f"holds {field.type}", "numbers")
 
     def read(self, columns: Sequence[str]) -> dict[str, Floats]:
-        """Columns as float64, NaN where a value is missing.
-
-        Raises:
-            InputError: The file is damaged.
-        """
+        """As `Source.read`, row group by row group; never None."""
         read = {column: np.empty(self._n_rows) for column in columns}
         at = 0
         try:
@@ -73,16 +66,14 @@ class ParquetFile:
             raise InputError(self.name, f"is damaged ({_short(error)})", "a whole Parquet file") from error
         return read
 
+    def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
+        """As `Source.scan`: a Parquet file has no cells that are no numbers."""
+        columns = self.read(self.names)
+        return columns, list(range(1, self._n_rows + 1)), []
+
     def place(self, row: int) -> int:
         """Number of a row, from 1."""
         return row + 1
-
-    def _hash(self) -> str:
-        digest = hashlib.sha256()
-        with self.path.open("rb") as file:
-            while block := file.read(_BLOCK_BYTES):
-                digest.update(block)
-        return digest.hexdigest()
 
 
 def _short(error: Exception) -> str:

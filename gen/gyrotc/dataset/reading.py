@@ -14,9 +14,10 @@ from .parquetfile import ParquetFile
 from .problems import Problems
 from .records import Applied, EarthRate, Floats, Rows
 from .schema import Columns
+from .source import Source
 from .values import MIN_ROWS, RATE_DPH, Fault, faults
 
-__all__ = ["Reader", "Recording", "open_recording"]
+__all__ = ["Reader", "Recording", "open_file", "open_recording"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +28,14 @@ class Recording:
         file: The file.
         layout: Its columns.
         time_s: Its times, s.
+        n_rows: Number of its rows.
         row_period_s: Median row period, s.
     """
 
-    file: CsvFile | ParquetFile
+    file: Source
     layout: Layout
     time_s: Floats
+    n_rows: int
     row_period_s: float
 
 
@@ -46,7 +49,7 @@ class Reader:
         applied: Correction to add back.
     """
 
-    file: CsvFile | ParquetFile
+    file: Source
     layout: Layout
     axis: str | None
     channels: tuple[str, ...]
@@ -63,9 +66,10 @@ class Reader:
         """
         layout = self.layout
         value = layout.value_of(self.axis)
+        self.file.check_unchanged()
         columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
         if columns is None:
-            raise InputError(self.file.name, "was changed while it was being read", "a recording that stays")
+            columns, _, _ = self.file.scan()
         time, rate = columns[layout.time], columns[value]
         if layout.pulses:
             rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
@@ -92,11 +96,7 @@ def open_recording(
     """Opens and checks one file; None (and problems) if it is not in order."""
     before = len(problems)
     try:
-        if path.is_dir() or not path.exists():
-            raise InputError(
-                name, "is a folder" if path.is_dir() else "does not exist", "a file of the data set"
-            )
-        file = ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
+        file = open_file(name, path)
         layout = arrange(name, file.names, columns, problems)
         if layout is None:
             return None
@@ -108,23 +108,31 @@ def open_recording(
         return None
     if len(problems) > before:
         return None
-    return Recording(file, layout, time, float(np.median(np.diff(time))))
+    return Recording(file, layout, time, len(time), float(np.median(np.diff(time))))
 
 
-def _checked(
-    file: CsvFile | ParquetFile, layout: Layout, pulse_weight_arcsec: float | None, problems: Problems
-) -> Floats:
+def open_file(name: str, path: Path) -> Source:
+    """Opens a file by the ending of its name.
+
+    Raises:
+        InputError: There is none, or it is not what its name says.
+    """
+    if not path.is_file():
+        raise InputError(name, "is no file" if path.exists() else "does not exist", "a file of the data set")
+    return ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
+
+
+def _checked(file: Source, layout: Layout, pulse_weight_arcsec: float | None, problems: Problems) -> Floats:
     """Reads all columns and checks them; the times."""
     values = file.read(file.names)
     lines = None
-    if values is None and isinstance(file, CsvFile):
+    if values is None:
         values, lines, found = file.scan()
         for fault in found:
             problems.add(_problem(file, fault, fault.row))
         keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
         values = {name: column[keep] for name, column in values.items()}
         lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
-    assert values is not None
     time = values[layout.time]
     for fault in faults(values, layout):
         problems.add(_problem(file, fault, lines[fault.row] if lines else file.place(fault.row)))
@@ -137,7 +145,7 @@ def _checked(
     return time
 
 
-def _check_pulse_rate(file: CsvFile | ParquetFile, rate: Floats, problems: Problems) -> None:
+def _check_pulse_rate(file: Source, rate: Floats, problems: Problems) -> None:
     wrong = np.abs(rate) > RATE_DPH[1]
     if wrong.any():
         first = int(np.argmax(wrong))
@@ -151,8 +159,8 @@ def _check_pulse_rate(file: CsvFile | ParquetFile, rate: Floats, problems: Probl
         )
 
 
-def _problem(file: CsvFile | ParquetFile, fault: Fault, place: int) -> InputError:
-    unit = "line" if isinstance(file, CsvFile) else "row"
+def _problem(file: Source, fault: Fault, place: int) -> InputError:
+    unit = file.row_unit
     where = f"{file.name}, {unit} {place}" + (f", column {fault.column}" if fault.column else "")
     more = f" (and {fault.rows - 1} more {unit}s)" if fault.rows > 1 else ""
     return InputError(where, fault.found + more, fault.expected)

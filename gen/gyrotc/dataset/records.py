@@ -11,7 +11,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Applied", "Dataset", "DeclaredNoise", "EarthRate", "Exclusion", "Floats", "Role", "Rows", "Run"]
+__all__ = [
+    "Applied",
+    "Dataset",
+    "DeclaredNoise",
+    "EarthRate",
+    "Exclusion",
+    "Floats",
+    "Role",
+    "Rows",
+    "Run",
+    "inside",
+]
 
 Floats = NDArray[np.float64]
 Role = Literal["train", "exam"]
@@ -112,7 +123,7 @@ class Run:
     row_period_s: float
     n_rows: int
     earth: EarthRate | None
-    reader: Callable[[], Rows] | None = field(repr=False, compare=False)
+    reader: Callable[[], Rows] = field(repr=False, compare=False)
 
     def rows(self) -> Rows:
         """All rows of the file, also those outside the span: the front end runs from the first row on.
@@ -120,19 +131,25 @@ class Run:
         Raises:
             InputError: The file has been changed since it was first read.
         """
-        assert self.reader is not None
         return self.reader()
 
     def in_span(self, time_s: Floats) -> NDArray[np.bool_]:
         """Which times (s on the file's clock) belong to the run: from_s <= t < to_s and not excluded."""
-        inside = np.ones(np.shape(time_s), dtype=bool)
-        if self.from_s is not None:
-            inside &= time_s >= self.from_s
-        if self.to_s is not None:
-            inside &= time_s < self.to_s
-        for gap in self.exclude:
-            inside &= (time_s < gap.from_s) | (time_s >= gap.to_s)
-        return inside
+        return inside(time_s, self.from_s, self.to_s, self.exclude)
+
+
+def inside(
+    time_s: Floats, from_s: float | None, to_s: float | None, exclude: tuple[Exclusion, ...]
+) -> NDArray[np.bool_]:
+    """Which times belong to a span without its exclusions; None: no limit on that side."""
+    result = np.ones(np.shape(time_s), dtype=bool)
+    if from_s is not None:
+        result &= time_s >= from_s
+    if to_s is not None:
+        result &= time_s < to_s
+    for gap in exclude:
+        result &= (time_s < gap.from_s) | (time_s >= gap.to_s)
+    return result
 
 
 @dataclass(frozen=True, slots=True)

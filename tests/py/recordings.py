@@ -1,0 +1,436 @@
+"""Recordings for tests: small ones in every accepted form, and one for each thing that must be refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+Columns = dict[str, NDArray[np.float64]]
+ROWS = 120
+PERIOD_S = 10.0
+
+
+def columns(n: int = ROWS, *, seed: int = 1) -> Columns:
+    """Time, temperature and rate of a plain ramp up and down."""
+    rng = np.random.default_rng(seed)
+    phase = np.arange(n) / n
+    temperature = 20.0 + 30.0 * (1.0 - np.abs(2.0 * phase - 1.0))
+    return {
+        "time_s": PERIOD_S * np.arange(n),
+        "temperature_c": np.round(temperature + rng.normal(0.0, 0.01, n), 4),
+        "rate_dph": np.round(20.0 + 0.0001 * temperature + rng.normal(0.0, 0.001, n), 6),
+    }
+
+
+def columns_of_pulses() -> Columns:
+    """Whole counts instead of a rate."""
+    table = columns()
+    return {k: v for k, v in table.items() if k != "rate_dph"} | {"pulses": np.round(10 * table["rate_dph"])}
+
+
+def csv_text(table: Mapping[str, NDArray[np.float64]], form: str = "{!r}") -> str:
+    """CSV with a header, every number in the given form."""
+    lines = [",".join(table)]
+    lines += [",".join(form.format(float(v)) for v in row) for row in zip(*table.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def write_csv(path: Path, table: Mapping[str, NDArray[np.float64]] | None = None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(csv_text(columns() if table is None else table), "utf-8")
+
+
+def write_parquet(path: Path, table: Mapping[str, NDArray[np.float64]] | None = None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(pa.table(dict(columns() if table is None else table)), path, row_group_size=50)
+
+
+def toml(
+    *runs: str, head: str = 'schema = 1\nserial = "RLG-0042"\nearth_rate = "removed"', tail: str = ""
+) -> str:
+    """A description; each run is the lines of one [[run]]."""
+    return "\n".join([head, *(f"[[run]]\n{run}" for run in runs), tail, ""])
+
+
+def described(folder: Path, *runs: str, **parts: str) -> None:
+    """A folder with `run-01.csv` and a description (default: that run alone)."""
+    write_csv(folder / "run-01.csv")
+    (folder / "dataset.toml").write_text(toml(*(runs or ('file = "run-01.csv"',)), **parts), "utf-8")
+
+
+def with_text(change: Callable[[list[str]], Sequence[str]]) -> Callable[[Path], None]:
+    """Makes `RLG-1/a.csv` with its lines changed (lines[0] is the header)."""
+
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        lines = csv_text(columns()).splitlines()
+        (folder / "a.csv").write_text("\n".join(change(lines)) + "\n", "utf-8")
+
+    return make
+
+
+def with_bytes(change: Callable[[bytes], bytes], name: str = "a.csv") -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        (folder / name).write_bytes(change(csv_text(columns()).encode()))
+
+    return make
+
+
+def with_columns(change: Callable[[Columns], Mapping[str, NDArray[np.float64]]]) -> Callable[[Path], None]:
+    return lambda folder: write_csv(folder / "a.csv", change(columns()))
+
+
+def line(number: int, text: str) -> Callable[[Path], None]:
+    """Line `number` (the header is line 1) replaced."""
+    return with_text(lambda lines: [*lines[: number - 1], text, *lines[number:]])
+
+
+def description(*runs: str, **parts: str) -> Callable[[Path], None]:
+    return lambda folder: described(folder, *runs, **parts)
+
+
+def parquet(table: Callable[[], pa.Table]) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        pq.write_table(table(), folder / "a.parquet", row_group_size=50)
+
+    return make
+
+
+def _damaged_parquet(folder: Path) -> None:
+    write_parquet(folder / "a.parquet")
+    data = bytearray((folder / "a.parquet").read_bytes())
+    data[200:600] = bytes(400)
+    (folder / "a.parquet").write_bytes(data)
+
+
+def _with_nan(values: NDArray[np.float64], at: int, value: float) -> NDArray[np.float64]:
+    changed = values.copy()
+    changed[at] = value
+    return changed
+
+
+@dataclass(frozen=True)
+class Refused:
+    """How to make a folder that is refused, and what the message must hold."""
+
+    make: Callable[[Path], object]
+    message: tuple[str, ...]
+    folder: str = "RLG-1"
+
+
+RUN = 'file = "run-01.csv"'
+HEAD = 'schema = 1\nserial = "RLG-0042"'
+
+REFUSED: dict[str, Refused] = {
+    "missing folder": Refused(lambda folder: None, ("does not exist", "a folder of recordings")),
+    "folder is a file": Refused(lambda folder: folder.write_text("x"), ("is no folder",)),
+    "empty folder": Refused(lambda folder: folder.mkdir(), ("no recordings", "*.csv or *.parquet")),
+    "folder name no serial": Refused(
+        lambda folder: write_csv(folder / "a.csv"), ("'my gyro!'", "dataset.toml"), "my gyro!"
+    ),
+    # files
+    "empty file": Refused(with_bytes(lambda data: b""), ("a.csv", "is empty")),
+    "header only": Refused(with_text(lambda lines: lines[:1]), ("a.csv", "0 rows", "at least 10")),
+    "too few rows": Refused(with_text(lambda lines: lines[:5]), ("a.csv", "4 rows", "at least 10")),
+    "no header": Refused(with_text(lambda lines: lines[1:]), ("a.csv, line 1", "no header")),
+    "binary": Refused(with_bytes(lambda data: bytes(range(256)) * 40), ("a.csv", "binary")),
+    "UTF-16": Refused(with_bytes(lambda data: data.decode().encode("utf-16")), ("a.csv", "UTF-16", "UTF-8")),
+    "no UTF-8": Refused(
+        with_bytes(lambda data: data.replace(b"temperature_c", b"temperature_\xb0c")),
+        ("a.csv, line 1", "UTF-8"),
+    ),
+    "missing column": Refused(
+        with_columns(lambda c: {k: v for k, v in c.items() if k != "temperature_c"}),
+        ("a.csv, line 1", "no column temperature_c among time_s, rate_dph"),
+    ),
+    "missing rate": Refused(
+        with_columns(lambda c: {k: v for k, v in c.items() if k != "rate_dph"}),
+        ("a.csv, line 1", "no column rate_dph", "pulses", "rate_x_dph"),
+    ),
+    "duplicate column": Refused(
+        with_text(lambda lines: [f"{text},{text.split(',')[1]}" for text in lines]),
+        ("a.csv, line 1, column temperature_c", "2 times"),
+    ),
+    "column without name": Refused(
+        with_text(lambda lines: [lines[0] + ",", *(text + ",1" for text in lines[1:])]),
+        ("a.csv, line 1, column 4", "no name"),
+    ),
+    "text column": Refused(
+        with_text(lambda lines: [lines[0] + ",note", *(text + ",ok" for text in lines[1:])]),
+        ("a.csv, line 2, column note", "'ok' (and 119 more lines)", "a number"),
+    ),
+    "text cell": Refused(line(7, "50.0,20.1,abc"), ("a.csv, line 7, column rate_dph", "'abc'", "number")),
+    "NaN cell": Refused(line(7, "50.0,nan,20.0"), ("a.csv, line 7, column temperature_c", "'nan'")),
+    "infinite cell": Refused(line(7, "50.0,20.1,-inf"), ("a.csv, line 7, column rate_dph", "inf", "finite")),
+    "overflowing cell": Refused(line(7, "50.0,20.1,1e400"), ("a.csv, line 7, column rate_dph", "finite")),
+    "empty cell": Refused(line(7, "50.0,,20.0"), ("a.csv, line 7, column temperature_c", "an empty cell")),
+    "short row": Refused(line(7, "50.0,20.1"), ("a.csv, line 7", "2 cells", "3 as in the header")),
+    "long row": Refused(line(7, "50.0,20.1,20.0,1"), ("a.csv, line 7", "4 cells", "3 as in the header")),
+    "NUL byte": Refused(line(7, "50.0,20.1,20\x00.0"), ("a.csv, line 7", "NUL byte")),
+    "NUL tail": Refused(with_bytes(lambda data: data + bytes(4096)), ("a.csv, line 122", "NUL byte")),
+    "repeated time": Refused(
+        line(7, "40.0,20.1,20.0"), ("a.csv, line 7, column time_s", "repeated: 40 s after 40 s", "increase")
+    ),
+    "backward time": Refused(
+        line(7, "30.0,20.1,20.0"), ("a.csv, line 7, column time_s", "going back: 30 s after 40 s", "increase")
+    ),
+    "kelvin": Refused(
+        with_columns(lambda c: c | {"temperature_c": c["temperature_c"] + 273.15}),
+        ("a.csv, line 2, column temperature_c", "(and 119 more lines)", "-90 ... 200 C", "kelvin?"),
+    ),
+    "too cold": Refused(line(7, "50.0,-95,20.0"), ("a.csv, line 7, column temperature_c", "-95", "-90")),
+    "implausible rate": Refused(
+        line(7, "50.0,20.1,8e6"), ("a.csv, line 7, column rate_dph", "8000000", "7.5e+06")
+    ),
+    "semicolons": Refused(
+        with_text(lambda lines: [text.replace(",", ";").replace(".", ",") for text in lines]),
+        ("a.csv, line 1", "semicolons", "commas", "points"),
+    ),
+    "tabs": Refused(with_text(lambda lines: [text.replace(",", "\t") for text in lines]), ("a.csv", "tabs")),
+    "decimal commas": Refused(
+        with_text(lambda lines: [lines[0], *(text.replace(".", ",") for text in lines[1:])]),
+        ("a.csv, line 2", "6 cells", "3 as in the header"),
+    ),
+    "rate and pulses": Refused(
+        with_columns(lambda c: c | {"pulses": np.ones(ROWS)}), ("a.csv, line 1", "both rate_dph and pulses")
+    ),
+    "rate and axes": Refused(
+        with_columns(lambda c: c | {"rate_x_dph": np.ones(ROWS)}), ("both rate_dph and rate_x_dph",)
+    ),
+    "axes without --axis": Refused(
+        with_columns(lambda c: {("rate_x_dph" if k == "rate_dph" else k): v for k, v in c.items()}),
+        ("a.csv", "rates of the axes x", "--axis x|all"),
+    ),
+    "pulses without weight": Refused(
+        with_columns(lambda c: columns_of_pulses()),
+        ("a.csv, column pulses", "no weight", "pulse_weight_arcsec"),
+    ),
+    "half pulses": Refused(
+        lambda folder: (
+            write_csv(folder / "a.csv", columns_of_pulses() | {"pulses": np.full(ROWS, 0.5)}),
+            (folder / "dataset.toml").write_text(
+                toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")
+            ),
+        ),
+        ("a.csv, line 2, column pulses", "0.5 (and 119 more lines)", "whole counts"),
+    ),
+    "pulses too heavy": Refused(
+        lambda folder: (
+            write_csv(folder / "a.csv", columns_of_pulses()),
+            (folder / "dataset.toml").write_text(
+                toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1e6")
+            ),
+        ),
+        ("a.csv, line 3, column pulses", "deg/h", "at most 7.5e+06"),
+    ),
+    # Parquet
+    "no Parquet": Refused(with_bytes(lambda data: data, "a.parquet"), ("a.parquet", "Parquet")),
+    "short Parquet": Refused(
+        lambda folder: (write_parquet(folder / "a.parquet"), _cut(folder / "a.parquet")),
+        ("a.parquet", "Parquet"),
+    ),
+    "damaged Parquet": Refused(_damaged_parquet, ("a.parquet", "damaged")),
+    "text in Parquet": Refused(
+        parquet(lambda: pa.table(columns() | {"note": ["ok"] * ROWS})), ("a.parquet, column note", "string")
+    ),
+    "NaN in Parquet": Refused(
+        parquet(lambda: pa.table(columns() | {"rate_dph": _with_nan(columns()["rate_dph"], 60, np.nan)})),
+        ("a.parquet, row 61, column rate_dph", "nan", "finite"),
+    ),
+    "missing value in Parquet": Refused(
+        parquet(lambda: pa.table(columns() | {"rate_dph": pa.array([None, *columns()["rate_dph"][1:]])})),
+        ("a.parquet, row 1, column rate_dph", "finite"),
+    ),
+    # dataset.toml
+    "broken TOML": Refused(
+        description(head='schema = 1\nserial = "RLG'), ("dataset.toml", "no TOML", "line 2")
+    ),
+    "missing schema": Refused(description(head='serial = "A"'), ("dataset.toml, field schema", "missing")),
+    "unknown schema": Refused(
+        description(head='schema = 2\nserial = "A"'), ("dataset.toml, field schema", "2", "1")
+    ),
+    "missing serial": Refused(description(head="schema = 1"), ("dataset.toml, field serial", "missing")),
+    "serial as path": Refused(
+        description(head='schema = 1\nserial = "../RLG"'), ("dataset.toml, field serial", "'../RLG'")
+    ),
+    "serial of dots": Refused(description(head='schema = 1\nserial = ".."'), ("field serial", "'..'")),
+    "serial as code": Refused(
+        description(head='schema = 1\nserial = "*/ x; /*"'), ("dataset.toml, field serial", "'*/ x; /*'")
+    ),
+    "serial too long": Refused(
+        description(head=f'schema = 1\nserial = "{"R" * 65}"'), ("dataset.toml, field serial", "1 to 64")
+    ),
+    "serial no text": Refused(description(head="schema = 1\nserial = 42"), ("field serial", "42", "string")),
+    "unknown key": Refused(
+        description(head=HEAD + "\nserail = 1"), ("dataset.toml, field serail", "not known")
+    ),
+    "unknown key of a run": Refused(
+        description(RUN + '\nrol = "train"'), ("dataset.toml, run 1 (run-01.csv), field rol", "not known")
+    ),
+    "unknown role": Refused(
+        description(RUN + '\nrole = "test"'),
+        ("dataset.toml, run 1 (run-01.csv), field role", "'test'", "'train' or 'exam'"),
+    ),
+    "unknown earth rate": Refused(
+        description(head=HEAD + '\nearth_rate = "yes"'),
+        ("field earth_rate", "'yes'", "'removed'", "'compute'"),
+    ),
+    "no runs": Refused(lambda folder: _only_toml(folder, HEAD), ("dataset.toml, field run", "missing")),
+    "no training run": Refused(
+        description(RUN + '\nrole = "exam"'), ("dataset.toml", "no run has the role train")
+    ),
+    "file missing": Refused(description('file = "run-02.csv"'), ("run-02.csv", "does not exist")),
+    "file is a folder": Refused(
+        lambda folder: (described(folder, 'file = "b.csv"'), (folder / "b.csv").mkdir()),
+        ("b.csv", "is no file"),
+    ),
+    "file outside": Refused(
+        description('file = "../run-01.csv"'),
+        ("dataset.toml, run 1 (../run-01.csv), field file", "inside the folder"),
+    ),
+    "absolute file": Refused(description('file = "/tmp/run-01.csv"'), ("field file", "inside the folder")),
+    "unknown kind of file": Refused(description('file = "run-01.xls"'), (".csv or .parquet",)),
+    "same file twice": Refused(
+        description(RUN, RUN), ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1")
+    ),
+    "same span twice": Refused(
+        description(*[RUN + "\nfrom_s = 0.0\nto_s = 500.0"] * 2), ("run 2 (run-01.csv)", "overlaps")
+    ),
+    "overlapping spans": Refused(
+        description(RUN + "\nto_s = 500.0", RUN + "\nfrom_s = 499.0"), ("run 2 (run-01.csv)", "overlaps")
+    ),
+    "span the wrong way": Refused(
+        description(RUN + "\nfrom_s = 500.0\nto_s = 400.0"),
+        ("field from_s", "500 s", "less than to_s, 400 s"),
+    ),
+    "span without rows": Refused(
+        description(RUN + "\nfrom_s = 5000.0"), ("run 1 (run-01.csv)", "a span without rows", "0 ... 1190 s")
+    ),
+    "all excluded": Refused(
+        description(RUN + '\nexclude = [{from_s = -1.0, to_s = 2e3, reason = "all"}]'),
+        ("a span without rows",),
+    ),
+    "exclusion the wrong way": Refused(
+        description(RUN + '\nexclude = [{from_s = 9.0, to_s = 2.0, reason = "x"}]'),
+        ("field exclude.0.from_s",),
+    ),
+    "exclusion without end": Refused(
+        description(RUN + "\nexclude = [{from_s = 9.0}]"), ("field exclude.0.to_s", "missing")
+    ),
+    "started no date": Refused(
+        description(RUN + '\nstarted = "yesterday"'), ("field started", "'yesterday'", "2026-03-01T08:00:00Z")
+    ),
+    "power-on no time": Refused(
+        description(RUN + '\npower_on_s = "often"'), ("field power_on_s", "'often'", 'seconds or "unknown"')
+    ),
+    "infinite span": Refused(description(RUN + "\nto_s = inf"), ("field to_s", "inf", "finite")),
+    "column named wrong": Refused(
+        description(head=HEAD, tail='[columns]\nrate = "omega"'), ("run-01.csv", "no column omega", "omega")
+    ),
+    "negative noise": Refused(
+        description(head=HEAD, tail="[noise]\narw_deg_per_sqrt_h = -1.0"), ("field noise.arw_deg_per_sqrt_h",)
+    ),
+    "pulse weight zero": Refused(
+        description(head=HEAD + "\npulse_weight_arcsec = 0.0"), ("pulse_weight_arcsec",)
+    ),
+    "compute without latitude": Refused(
+        description(
+            RUN + "\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0", head=HEAD + '\nearth_rate = "compute"'
+        ),
+        ("field latitude_deg", "missing"),
+    ),
+    "compute without axis": Refused(
+        description(head=HEAD + '\nearth_rate = "compute"\nlatitude_deg = 48.0'),
+        ("run 1 (run-01.csv), field axis_azimuth_deg", "missing"),
+    ),
+    "applied without model": Refused(
+        description(head=HEAD + f'\napplied_table = "{"a" * 64}"'), ("field applied_table", "--applied FILE")
+    ),
+    "applied no hash": Refused(description(head=HEAD + '\napplied_table = "yes"'), ("field applied_table",)),
+}
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def _only_toml(folder: Path, text: str) -> None:
+    folder.mkdir()
+    (folder / "dataset.toml").write_text(text, "utf-8")
+
+
+def _bom(folder: Path) -> None:
+    write_csv(folder / "a.csv")
+    data = (folder / "a.csv").read_bytes()
+    (folder / "a.csv").write_bytes(b"\xef\xbb\xbf" + data.replace(b"\n", b"\r\n"))
+
+
+def _unfinished(folder: Path) -> None:
+    write_csv(folder / "a.csv")
+    with (folder / "a.csv").open("a") as file:
+        file.write("1200.0,20.0")
+
+
+ACCEPTED: dict[str, Callable[[Path], object]] = {
+    "no dataset.toml": lambda folder: write_csv(folder / "a.csv"),
+    "dataset.toml": description(),
+    "byte order mark, CRLF": _bom,
+    "spaces and quotes": with_text(lambda lines: [", ".join(f'"{c}"' for c in t.split(",")) for t in lines]),
+    "any column order": with_columns(lambda c: dict(reversed(c.items()))),
+    "further numeric columns": with_columns(lambda c: c | {"supply_v": np.linspace(5.0, 5.1, ROWS)}),
+    "scientific notation": lambda folder: (
+        folder.mkdir(),
+        (folder / "a.csv").write_text(csv_text(columns(), "{:+.9E}")),
+    ),
+    "no final newline": with_bytes(lambda data: data.rstrip(b"\n")),
+    "empty lines": with_text(lambda lines: [*lines[:9], "", *lines[9:], ""]),
+    "one constant temperature": with_columns(lambda c: c | {"temperature_c": np.full(ROWS, 25.0)}),
+    "whole numbers": with_text(
+        lambda lines: [lines[0], *(f"{k},{20 + k // 9},{k % 7}" for k in range(ROWS))]
+    ),
+    "time that starts late": with_columns(lambda c: c | {"time_s": c["time_s"] + 86400.0}),
+    "time before zero": with_columns(lambda c: c | {"time_s": c["time_s"] - 3600.0}),
+    "uneven rows": with_columns(
+        lambda c: c | {"time_s": c["time_s"] + np.r_[np.zeros(60), np.full(60, 77.0)]}
+    ),
+    "Parquet": lambda folder: write_parquet(folder / "a.parquet"),
+    "unfinished last line": _unfinished,
+    "several runs": description(
+        RUN + '\nto_s = 600.0\nenvironment = "ramp up"\nstarted = 2026-03-01T08:00:00Z\npower_on_s = -3600.0',
+        RUN + '\nfrom_s = 600.0\nrole = "exam"\nstarted = "2026-03-01T09:30:00+01:00"\npower_on_s = "unknown"'
+        '\nexclude = [{from_s = 700.0, to_s = 720.0, reason = "door opened"}]',
+        head=HEAD + '\ndescription = "two spans"\nearth_rate = "none"\napplied_table = "none"',
+        tail='[meta]\noperator = "A. B."\ncalibrated_on = 2026-03-01\n[noise]\narw_deg_per_sqrt_h = 0.0001',
+    ),
+    "named columns": lambda folder: (
+        write_csv(folder / "a.csv", dict(zip(("t", "T", "w"), columns().values(), strict=True))),
+        (folder / "dataset.toml").write_text(
+            toml('file = "a.csv"', tail='[columns]\ntime = "t"\ntemperature = "T"\nrate = "w"')
+        ),
+    ),
+    "pulses": lambda folder: (
+        write_csv(
+            folder / "a.csv",
+            columns_of_pulses(),
+        ),
+        (folder / "dataset.toml").write_text(
+            toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")
+        ),
+    ),
+    "computed earth rate": description(
+        RUN + "\naxis_azimuth_deg = 90.0\naxis_elevation_deg = 0",
+        head=HEAD + '\nearth_rate = "compute"\nlatitude_deg = 48.1',
+    ),
+    "a channel that not every run has": lambda folder: (
+        write_csv(folder / "a.csv", columns() | {"supply_v": np.linspace(5.0, 5.1, ROWS)}),
+        write_csv(folder / "b.csv", columns(seed=2)),
+    ),
+}
