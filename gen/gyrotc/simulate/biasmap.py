@@ -57,24 +57,24 @@ def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: Array, slope: Array
 
 def draw(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
     """One gyro: a map whose values over the operating range reach from end to end of `range_dph`, deg/h."""
-    knots_c = np.linspace(*T_RANGE_C, 6)
-    values = rng.normal(0.0, 0.35, len(knots_c))
+    knots_c = np.linspace(*T_RANGE_C, 7)
+    values = rng.normal(0.0, 0.3, len(knots_c))
     sign = rng.choice([-1.0, 1.0])
     parameters: dict[str, Any] = {
         "knots_c": knots_c.tolist(),
         "knots": values.tolist(),
         "well": -rng.uniform(0.8, 1.6),
         "well_c": rng.uniform(0.0, 35.0),
-        "well_width_c": rng.uniform(30.0, 50.0),
-        "turn": sign * rng.uniform(0.1, 0.4),
+        "well_width_c": rng.uniform(25.0, 45.0),
+        "turn": sign * rng.uniform(0.15, 0.4),
         "turn_c": rng.uniform(-20.0, 50.0),
-        "turn_width_c": rng.uniform(18.0, 35.0),
-        "flow": rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.3),
+        "turn_width_c": rng.uniform(10.0, 25.0),
+        "flow": rng.choice([-1.0, 1.0]) * rng.uniform(0.15, 0.4),
         "flow_c_per_min": rng.uniform(2.0, 4.0),
-        "flow_turn": rng.uniform(-0.1, 0.1),
+        "flow_turn": rng.uniform(-0.2, 0.2),
         "flow_turn_c": rng.uniform(-10.0, 40.0),
-        "flow_width_c": rng.uniform(25.0, 45.0),
-        "even": rng.uniform(-0.15, 0.15),
+        "flow_width_c": rng.uniform(15.0, 35.0),
+        "even": rng.uniform(-0.3, 0.3),
         "even_c_per_min": rng.uniform(1.5, 3.0),
     }
     spline = CubicSpline(knots_c, values, bc_type="natural")
