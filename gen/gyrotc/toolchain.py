@@ -1,32 +1,55 @@
-"""Compile and run C for a target: compiler, flags, how to run. One short TOML file describes each target."""
+"""Compile and run C for a target: compiler, flags, how to run. One short TOML file describes each target.
+
+Bare-metal targets are linked with parts of `bare/`: start-up code, and the few functions of the C
+library that the test programs use. Their standard input is the file `stdin.bin` of the working folder.
+"""
 
 from __future__ import annotations
 
+import functools
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from .errors import CheckFailed, GyrotcError
+from .errors import CheckFailed, InputError
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-__all__ = ["C_FLAGS", "Run", "Target", "all_targets", "compile_c", "compiler_version", "run_program"]
+__all__ = [
+    "C_FLAGS",
+    "Run",
+    "Symbol",
+    "Target",
+    "all_targets",
+    "compile_c",
+    "compile_objects",
+    "compiler_version",
+    "link",
+    "load_target",
+    "run_program",
+    "symbols",
+    "writable_bytes",
+]
 
 C_FLAGS = (
     "-std=c99", "-pedantic", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion",
     "-Werror", "-ffunction-sections", "-fdata-sections",
 )  # fmt: skip
+_HERE = Path(__file__).resolve().parent
+_BARE = _HERE / "bare"
+_STDIN = "stdin.bin"
 _RUN_LIMIT_S = 600
+_SHOWN_LINES = 12
 
 
 class Target(BaseModel):
@@ -36,16 +59,30 @@ class Target(BaseModel):
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][A-Za-z0-9_.-]*$")]
     compiler: str
-    package: str
+    package: str  # Debian packages that bring compiler and emulator
     flags: tuple[str, ...] = ()
+    link: tuple[str, ...] = ()  # for the linker alone
+    bare: tuple[str, ...] = ()  # files of bare/ that are linked in
+    script: str | None = None  # linker script in bare/
     run: tuple[str, ...] = ()
     numerics: tuple[str, ...] = ("f32", "q31")
-    default: bool = True
+    byte_order: Literal["little", "big"] = "little"
+    counts: Literal["instructions", "cycles"] | None = None  # what the board's counter counts ...
+    ticks_per_count: Annotated[float, Field(gt=0.0)] = 1.0  # ... and how often it ticks for each
+    reads_input: bool = True  # recordings can be replayed on it
+    default: bool = False  # tried when no target is named
 
     def missing(self) -> str | None:
-        """The package that brings what this target lacks here; None if it can run."""
+        """The packages that bring what this target lacks here; None if it can be built and run."""
         tools = [self.compiler, *self.run[:1]]
-        return None if all(shutil.which(tool) for tool in tools) else self.package
+        if all(shutil.which(tool) for tool in tools) and _links(self):
+            return None
+        return self.package
+
+    @property
+    def all_flags(self) -> tuple[str, ...]:
+        """Flags of the compiler, as results report them."""
+        return (*C_FLAGS, *self.flags)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,50 +94,146 @@ class Run:
     stderr: str
 
 
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A symbol of an object or program: its `kind` is nm's letter, its size is in bytes."""
+
+    name: str
+    kind: str
+    size: int
+
+
+def load_target(path: Path) -> Target:
+    """The target that a TOML file describes.
+
+    Raises:
+        InputError: The file cannot be read, or a field is wrong.
+    """
+    try:
+        return Target.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValidationError) as error:
+        raise InputError(str(path), str(error), "a target file") from error
+
+
 def all_targets() -> dict[str, Target]:
     """Every target by name, in the order of the file names."""
-    found = {}
-    folder = resources.files("gyrotc") / "targets"
-    for entry in sorted(folder.iterdir(), key=lambda e: e.name):
-        if entry.name.endswith(".toml"):
-            target = Target.model_validate(tomllib.loads(entry.read_text(encoding="utf-8")))
-            found[target.name] = target
-    return found
+    found = [load_target(path) for path in sorted((_HERE / "targets").glob("*.toml"))]
+    return {target.name: target for target in found}
 
 
-def compile_c(
-    target: Target, sources: Sequence[Path], program: Path, *, include: Path, defines: Sequence[str] = ()
-) -> list[str]:
-    """Compiles and links a program; returns the command.
+def compile_objects(
+    target: Target, sources: Sequence[Path], folder: Path, *, include: Path, defines: Sequence[str] = ()
+) -> list[Path]:
+    """Compiles each source into `folder`; returns the objects.
 
     Raises:
         CheckFailed: The compiler refused; the message holds its first lines.
     """
-    flags = [*C_FLAGS, *target.flags, *(f"-D{d}" for d in defines)]
-    files = [str(s) for s in sources]
-    command = [target.compiler, *flags, f"-I{include}", *files, "-Wl,--gc-sections", "-o", str(program)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        lines = "\n".join(done.stderr.splitlines()[:12])
-        raise CheckFailed(f"{target.name}: {target.compiler} failed:\n{lines}")
-    return [target.compiler, *flags]
+    bare = [f"-I{_BARE}"] if target.bare else []
+    flags = [*target.all_flags, *(f"-D{d}" for d in defines), *bare, f"-I{include}"]
+    objects = []
+    for source in sources:
+        objects.append(folder / f"{source.stem}.o")
+        _command(target, [target.compiler, *flags, "-c", str(source), "-o", str(objects[-1])])
+    return objects
+
+
+def link(target: Target, objects: Sequence[Path], program: Path) -> None:
+    """Links objects, and the bare parts of the target, into a program.
+
+    Raises:
+        CheckFailed: The linker refused.
+    """
+    parts = compile_objects(target, [_BARE / f for f in target.bare], program.parent, include=_BARE)
+    script = ["-T", str(_BARE / target.script)] if target.script else []
+    files = [str(f) for f in (*objects, *parts)]
+    arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections", "-o", str(program)]
+    _command(target, [target.compiler, *arguments])
+
+
+def compile_c(
+    target: Target, sources: Sequence[Path], program: Path, *, include: Path, defines: Sequence[str] = ()
+) -> None:
+    """Compiles and links a program, objects beside it.
+
+    Raises:
+        CheckFailed: The compiler or the linker refused.
+    """
+    objects = compile_objects(target, sources, program.parent, include=include, defines=defines)
+    link(target, objects, program)
 
 
 def run_program(target: Target, program: Path, data: bytes = b"") -> Run:
-    """Runs a compiled program with `data` on its standard input; bounded in time."""
-    command = [*target.run, str(program)]
+    """Runs a program with `data` on its standard input; bounded in time.
+
+    Raises:
+        CheckFailed: It did not end.
+    """
+    if target.bare:
+        (program.parent / _STDIN).write_bytes(data)
     try:
-        done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=_RUN_LIMIT_S)
+        done = subprocess.run(
+            [*target.run, str(program)],
+            input=b"" if target.bare else data,
+            capture_output=True,
+            check=False,
+            timeout=_RUN_LIMIT_S,
+            cwd=program.parent,
+        )
     except subprocess.TimeoutExpired as error:
-        raise GyrotcError(f"{target.name}: the program did not end within {_RUN_LIMIT_S} s") from error
+        raise CheckFailed(f"{target.name}: the program did not end within {_RUN_LIMIT_S} s") from error
     return Run(done.returncode, done.stdout, done.stderr.decode("utf-8", "replace"))
+
+
+def symbols(target: Target, file: Path) -> list[Symbol]:
+    """Symbols with a size, of an object or a program."""
+    rows = [line.split() for line in _inspected(target, "nm", "-S", file)]
+    return [Symbol(row[3], row[2], int(row[1], 16)) for row in rows if len(row) == 4]
+
+
+def writable_bytes(target: Target, file: Path) -> int:
+    """Bytes of writable static data in an object (what is constant once it is relocated does not count)."""
+    rows = [line.split() for line in _inspected(target, "size", "-A", file)]
+    sizes = {row[0]: int(row[1]) for row in rows if len(row) == 3 and row[1].isdigit()}
+    writable = (".data", ".bss", ".sdata", ".sbss", "COMMON")
+    return sum(n for name, n in sizes.items() if name.startswith(writable) and ".rel.ro" not in name)
+
+
+def _inspected(target: Target, tool: str, option: str, file: Path) -> list[str]:
+    """Lines that a tool of the toolchain (nm, size) prints."""
+    asked = [target.compiler, f"-print-prog-name={tool}"]
+    name = subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or tool
+    done = subprocess.run([name, option, str(file)], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise CheckFailed(f"{target.name}: {name} failed: {done.stderr[:200]}")
+    return done.stdout.splitlines()
 
 
 def compiler_version(compiler: str) -> str:
     """Name and version in one short text, e.g. ``gcc 12.2.0``."""
-    done = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True, check=False)
-    version = done.stdout.strip()
-    if done.returncode != 0 or not version or len(version.splitlines()) != 1:
-        done = subprocess.run([compiler, "-dumpversion"], capture_output=True, text=True, check=False)
+    for option in ("-dumpfullversion", "-dumpversion"):
+        done = subprocess.run([compiler, option], capture_output=True, text=True, check=False)
         version = done.stdout.strip()
-    return f"{compiler} {version}"
+        if done.returncode == 0 and len(version.splitlines()) == 1:
+            return f"{compiler} {version}"
+    return compiler
+
+
+def _command(target: Target, command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        lines = "\n".join(done.stderr.splitlines()[:_SHOWN_LINES])
+        raise CheckFailed(f"{target.name}: {target.compiler} failed:\n{lines}")
+
+
+@functools.cache
+def _links(target: Target) -> bool:
+    """Whether an empty program can be built: a compiler may lack the C library of the target."""
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        source = Path(work) / "empty.c"
+        source.write_text("int main(void)\n{\n    return 0;\n}\n", encoding="ascii")
+        try:
+            compile_c(target, [source], Path(work) / "empty", include=Path(work))
+        except CheckFailed:
+            return False
+    return True

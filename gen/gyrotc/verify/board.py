@@ -1,0 +1,139 @@
+"""The board test on one target: compiled, run, compared, measured."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CheckFailed
+from ..model import Model
+from ..table import Table
+from ..toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
+from .boardlog import BoardOutput, compare, read_output
+
+__all__ = ["Job", "checked_output", "test_target"]
+
+_CODE = "tT"
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be verified: emitted C, its tables, and what the reference answers to its vectors."""
+
+    c_folder: Path
+    model: Model
+    tables: dict[str, Table]
+    expected: dict[str, NDArray[np.uint32]]
+
+
+def test_target(job: Job, target: Target) -> list[dict[str, Any]]:
+    """Entries of `verify.json` for one target, one for each arithmetic."""
+    numerics = [n for n in job.tables if n in target.numerics]
+    package = target.missing()
+    if package is not None:
+        missing = {"name": target.name, "status": "missing"}
+        return [missing | {"numeric": n, "package": package} for n in numerics]
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        return list(_entries(job, target, numerics, Path(work)))
+
+
+def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[dict[str, Any]]:
+    """Compiles runtime and table once, and a test program for each arithmetic."""
+    shared: list[Path] | CheckFailed
+    sources = [job.c_folder / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
+    try:
+        shared = compile_objects(target, sources, work, include=job.c_folder)
+    except CheckFailed as error:
+        shared = error
+    for numeric in numerics:
+        entry: dict[str, Any] = {
+            "name": target.name,
+            "status": "fail",
+            "numeric": numeric,
+            "compiler": compiler_version(target.compiler),
+            "flags": " ".join(target.all_flags),
+            "table_bytes": job.tables[numeric].table_bytes,
+        }
+        try:
+            if isinstance(shared, CheckFailed):
+                raise shared
+            entry |= _one(job, target, numeric, shared, work)
+        except CheckFailed as error:
+            entry["error"] = str(error)
+        yield entry
+
+
+def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path) -> dict[str, Any]:
+    defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
+    if target.counts:
+        defines.append('BOARD_HEADER="board.h"')
+    test = compile_objects(
+        target, [job.c_folder / "board_test.c"], work, include=job.c_folder, defines=defines
+    )
+    program = work / f"board_{numeric}"
+    link(target, [*test, *shared], program)
+    run = run_program(target, program)
+    text = run.stdout.decode("ascii", "replace")
+    # Some simulators print what a program says among their own messages.
+    output = checked_output(text if "begin " in text else run.stderr, job, numeric)
+    if run.returncode != 0:
+        raise CheckFailed(f"the program ended with status {run.returncode}: {run.stderr[:200]}")
+    comparison = compare(output, job.expected[numeric])
+    return {
+        "status": "fail" if comparison.mismatches else "pass",
+        "vectors": comparison.vectors,
+        "mismatches": comparison.mismatches,
+        "first_mismatches": list(comparison.first),
+        **_costs(target, output),
+        **_sizes(target, program, shared),
+    }
+
+
+def checked_output(text: str, job: Job, numeric: str) -> BoardOutput:
+    """The part of a board test's output for one arithmetic.
+
+    Raises:
+        CheckFailed: It is not whole, or of another model.
+    """
+    output = next((part for part in read_output(text) if part.numeric == numeric), None)
+    if output is None:
+        raise CheckFailed(f"the output has no part for {numeric}")
+    if (output.id, output.model) != (job.model.id, int(job.model.hash[:8], 16)):
+        raise CheckFailed(
+            f"the output is of table {output.id}, model {output.model:08x}..., "
+            f"not of {job.model.id}, model {job.model.hash[:8]}..."
+        )
+    return output
+
+
+def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
+    """Counts and stack of a call of the map and, apart, of a sample (one in a block evaluates the map)."""
+    if target.counts is None:
+        return {}
+    found: dict[str, Any] = {}
+    for what, cost in output.costs.items():
+        prefix = "" if what == "map" else f"{what}_"
+        found[prefix + target.counts] = {
+            "min": round(cost.low / target.ticks_per_count),
+            "mean": round(cost.total / cost.calls / target.ticks_per_count, 1),
+            "max": round(cost.high / target.ticks_per_count),
+        }
+        found[f"{prefix}stack_bytes"] = cost.stack
+    return found
+
+
+def _sizes(target: Target, program: Path, objects: list[Path]) -> dict[str, int]:
+    """Code of the runtime that the program links, and writable static data of runtime and table."""
+    own = [symbol for file in objects for symbol in symbols(target, file)]
+    code = {symbol.name for symbol in own if symbol.kind in _CODE}
+    linked = [symbol for symbol in symbols(target, program) if symbol.name in code]
+    return {
+        "code_bytes": sum(symbol.size for symbol in linked),
+        "ram_bytes": sum(writable_bytes(target, file) for file in objects),
+    }
