@@ -108,7 +108,20 @@ NB_MODULE(_core, m) {
                 new (self) Samples(samples(std::move(t), std::move(r), std::move(y), std::move(weight)));
             },
             "t"_a, "r"_a, "y"_a, "weight"_a);
-    nb::class_<EqualGaussians>(m, "EqualGaussians")
+    nb::class_<NormalEquations>(m, "NormalEquations")
+        .def("norms", &NormalEquations::norms)
+        .def("moments", &NormalEquations::moments)
+        .def("column", &NormalEquations::column, "j"_a)
+        .def_prop_ro("energy", &NormalEquations::energy);
+    nb::class_<DenseColumns, NormalEquations>(m, "DenseColumns")
+        .def(
+            "__init__",
+            [](DenseColumns *self, MatrixXd columns, const VectorXd &y) {
+                same_length({columns.rows(), y.size()});
+                new (self) DenseColumns(std::move(columns), y);
+            },
+            "columns"_a, "y"_a);
+    nb::class_<EqualGaussians, NormalEquations>(m, "EqualGaussians")
         .def_static(
             "on_grid",
             [](double t_first, double t_step, Eigen::Index t_count, double r_first, double r_step,
@@ -121,13 +134,9 @@ NB_MODULE(_core, m) {
         .def("add", &EqualGaussians::add, "samples"_a)
         .def("subtract", &EqualGaussians::subtract, "part"_a)
         .def("copy", [](const EqualGaussians &self) { return EqualGaussians(self); })
-        .def("norms", &EqualGaussians::norms)
-        .def("moments", &EqualGaussians::moments)
-        .def("column", &EqualGaussians::column, "j"_a)
         .def_prop_ro("centers", &EqualGaussians::centers)
         .def_prop_ro("width_t", &EqualGaussians::width_t)
         .def_prop_ro("width_r", &EqualGaussians::width_r)
-        .def_prop_ro("energy", &EqualGaussians::energy)
         .def_prop_ro("samples", &EqualGaussians::samples);
     nb::class_<OlsPath>(m, "OlsPath")
         .def_ro("chosen", &OlsPath::chosen)
@@ -137,10 +146,10 @@ NB_MODULE(_core, m) {
         .def_ro("orthogonal", &OlsPath::orthogonal);
     m.def(
         "select_columns",
-        [](const EqualGaussians &dictionary, Eigen::Index max_columns, double rho, double guard, bool in_order) {
-            return select_columns(dictionary, {max_columns, rho, guard, in_order});
-        },
-        "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-10, "in_order"_a = false);
+        [](const NormalEquations &dictionary, Eigen::Index max_columns, double rho, double guard, Eigen::Index given,
+           bool in_order) { return select_columns(dictionary, {max_columns, rho, guard, given, in_order}); },
+        "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-10, "given"_a = 1,
+        "in_order"_a = false);
     m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
     m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);
 }

@@ -21,6 +21,17 @@ struct Samples {
     Eigen::VectorXd t, r, y, weight;
 };
 
+// Candidate columns as far as least squares needs them: their products with one another and with the target.
+class NormalEquations {
+  public:
+    virtual ~NormalEquations() = default;
+    virtual Eigen::Index size() const = 0;
+    virtual double energy() const = 0;                           // y'Ny
+    virtual Eigen::VectorXd norms() const = 0;                   // diagonal of the Gram
+    virtual Eigen::VectorXd moments() const = 0;                 // with y
+    virtual Eigen::VectorXd column(Eigen::Index j) const = 0;    // of the Gram
+};
+
 struct Axis {
     double first = 0.0, step = 1.0;
     Eigen::Index count = 1;
@@ -29,7 +40,7 @@ struct Axis {
 
 // The dictionary's sums over the samples added so far. Column 0 of the normal equations is the constant, column
 // j + 1 the Gaussian at center j.
-class EqualGaussians {
+class EqualGaussians final : public NormalEquations {
   public:
     // Candidates at every node of t x r, r running fastest.
     static EqualGaussians on_grid(const Axis &t, const Axis &r, double width_t, double width_r);
@@ -40,16 +51,16 @@ class EqualGaussians {
     // Takes away what was added to `part`, a dictionary made the same way.
     void subtract(const EqualGaussians &part);
 
-    Eigen::Index size() const { return centers_.rows() + 1; }
+    Eigen::Index size() const override { return centers_.rows() + 1; }
     const Eigen::MatrixXd &centers() const { return centers_; }
     double width_t() const { return width_t_; }
     double width_r() const { return width_r_; }
-    double energy() const { return energy_; }  // y'Ny
+    double energy() const override { return energy_; }
     double samples() const { return samples_; }
 
-    Eigen::VectorXd norms() const;                    // diagonal of the Gram
-    Eigen::VectorXd moments() const;                  // with y
-    Eigen::VectorXd column(Eigen::Index j) const;     // of the Gram
+    Eigen::VectorXd norms() const override;
+    Eigen::VectorXd moments() const override;
+    Eigen::VectorXd column(Eigen::Index j) const override;
 
   private:
     EqualGaussians(double width_t, double width_r) : width_t_(width_t), width_r_(width_r) {}

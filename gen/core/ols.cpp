@@ -9,7 +9,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-OlsPath select_columns(const EqualGaussians &dictionary, const SelectionRule &rule) {
+OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &rule) {
     const VectorXd norms = dictionary.norms();
     VectorXd rest = norms, moments = dictionary.moments();
     const Index q = dictionary.size(), limit = std::min(rule.max_columns, q);
@@ -23,18 +23,19 @@ OlsPath select_columns(const EqualGaussians &dictionary, const SelectionRule &ru
     double left = energy;
     Index m = 0;
     for (; m < limit; ++m) {
-        Index best = m == 0 ? 0 : -1;
+        const bool in_order = rule.in_order || m < rule.given;
+        Index best = -1;
         double gain = -1.0;
-        for (Index j = 0; m > 0 && j < q; ++j) {
+        for (Index j = 0; j < q; ++j) {
             if (!open[static_cast<std::size_t>(j)] || !(rest[j] > rule.guard * norms[j])) continue;
             const double g = moments[j] * moments[j] / rest[j];
             if (g > gain) {
                 gain = g;
                 best = j;
-                if (rule.in_order) break;
+                if (in_order) break;
             }
         }
-        if (best < 0 || !(rest[best] > 0.0)) break;
+        if (best < 0) break;
         const double root = std::sqrt(rest[best]);
         VectorXd l = dictionary.column(best);
         if (m > 0) l.noalias() -= rows.leftCols(m) * rows.row(best).head(m).transpose();

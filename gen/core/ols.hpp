@@ -9,8 +9,25 @@
 
 namespace gyrotc {
 
-// The whole path of models: the first m chosen columns are the model of m columns. Column 0 (the constant, w0) is
-// always the first.
+// Candidates that are given as columns.
+class DenseColumns final : public NormalEquations {
+  public:
+    DenseColumns(Eigen::MatrixXd columns, const Eigen::VectorXd &y)
+        : columns_(std::move(columns)), energy_(y.squaredNorm()), moments_(columns_.transpose() * y) {}
+
+    Eigen::Index size() const override { return columns_.cols(); }
+    double energy() const override { return energy_; }
+    Eigen::VectorXd norms() const override { return columns_.colwise().squaredNorm(); }
+    Eigen::VectorXd moments() const override { return moments_; }
+    Eigen::VectorXd column(Eigen::Index j) const override { return columns_.transpose() * columns_.col(j); }
+
+  private:
+    Eigen::MatrixXd columns_;
+    double energy_;
+    Eigen::VectorXd moments_;
+};
+
+// The whole path of models: the first m chosen columns are the model of m columns.
 struct OlsPath {
     std::vector<Eigen::Index> chosen;  // columns in order of selection
     Eigen::VectorXd reduction;         // error-reduction ratio of each, of y'y
@@ -23,11 +40,12 @@ struct SelectionRule {
     Eigen::Index max_columns = 31;
     double rho = 0.0;      // ends when 1 - sum of reductions < rho, eq. (16)
     double guard = 1e-10;  // passes over a candidate whose squared norm orthogonal to the chosen is below this share
-    bool in_order = false; // takes the candidates as they come instead of by largest reduction
+    Eigen::Index given = 1;  // so many leading columns (the constant, w0) are taken first
+    bool in_order = false;   // takes the others as they come, too, instead of by largest reduction
 };
 
 // Selects columns until the rule ends it or nothing can be chosen.
-OlsPath select_columns(const EqualGaussians &dictionary, const SelectionRule &rule);
+OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &rule);
 
 // Weighted sum of squared errors on other samples of every model on the path (its first 1, 2, ... columns), with the
 // weights that the path's own samples gave.

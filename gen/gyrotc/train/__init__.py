@@ -14,8 +14,19 @@ from gyrotc.train.mrbf import fit_mrbf
 from gyrotc.train.noise import floor_dph
 from gyrotc.train.ols import SIZE_RULES, fit_ols
 from gyrotc.train.result import Fit, Outcome, network, predict
+from gyrotc.train.uncertainty import coverage, uncertainty
 
-__all__ = ["METHODS", "SIZE_RULES", "Fit", "Outcome", "TrainingData", "fit", "predict"]
+__all__ = [
+    "METHODS",
+    "SIZE_RULES",
+    "Fit",
+    "Outcome",
+    "TrainingData",
+    "coverage",
+    "fit",
+    "predict",
+    "uncertainty",
+]
 
 METHODS = ("mlr", "poly", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
 _MAX_CENTERS = 512
