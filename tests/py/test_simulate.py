@@ -319,3 +319,14 @@ def test_the_truth_names_the_causes(tmp_path: Path) -> None:
     ]
     described = (folder / "dataset.toml").read_text("utf-8")
     assert "truth" not in described and "seed" not in described
+
+
+def test_the_example_of_the_manual_runs(tmp_path: Path) -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text("utf-8")
+    example = tmp_path / "example.toml"
+    example.write_text(manual.split("```toml\n")[1].split("```")[0], "utf-8")
+    dataset = load(made(example, tmp_path / "data", row_s=60.0))
+    assert [run.environment for run in dataset.runs] == ["up and down", "nested loops"]
+    assert set(dataset.runs[0].rows().channels) == {"supply_v"}
+    for name in names():
+        assert f"`{name}`" in manual, name
