@@ -15,13 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
-from .dataset import Dataset, load
+from .applied import applied_of
+from .dataset import Dataset, axes_of, load
 from .emit import emit
 from .errors import InputError
 from .evaluate import evaluate
 from .fitting import FitOptions, fit_dataset
 from .model import Model, write_atomically
 from .report import write_report
+from .triad import join_axes
 from .verify import verify
 
 __all__ = ["Built", "build", "folder_in_place"]
@@ -46,11 +48,17 @@ def build(
     *,
     axis: str | None = None,
     numerics: Sequence[str] | None = None,
+    applied: Path | None = None,
     progress: Progress | None = None,
-) -> Built:
-    """Recordings in, verified C and a report out.
+) -> list[Built]:
+    """Recordings in, verified C and a report out; one result for each axis.
 
     `out` is replaced as a whole at the end; until then an older one stays as it was.
+
+    Args:
+        axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
+            `out/c` the runtime once with all tables.
+        applied: Model that was subtracted while recording.
 
     Raises:
         InputError: Bad recordings or arguments; `out` is untouched.
@@ -58,28 +66,49 @@ def build(
     """
     say = progress or (lambda _: None)
     say("reading")
-    dataset = load(source, axis=axis)
+    known = applied_of(applied) if applied else None
+    axes = axes_of(source) if axis == "all" else ()
+    if axis == "all" and not axes:
+        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
     with folder_in_place(out) as work:
-        fitted = fit_dataset(dataset, options, progress=say)
-        fitted.model.save(work / "model.json")
-        _write(work / "training.json", fitted.training)
-        say("emitting C")
-        emission = emit(fitted.model, work, numerics=numerics)
-        verification = verify(work, progress=lambda name: say(f"verifying {name}"))
-        _write(work / "verify.json", verification)
-        evaluation = evaluate(
-            work,
-            dataset,
-            average_s=options.average_s,
-            trace=work / "trace",
-            training=fitted.training,
-            progress=lambda file: say(f"replaying {file}"),
-        )
-        _write(work / "evaluate.json", evaluation)
-        _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
-        say("drawing the report")
-        write_report(work)
+        if not axes:
+            dataset = load(source, axis=axis, applied=known)
+            return [_build_axis(dataset, work, options, numerics, say)]
+        built = []
+        for name in axes:
+            dataset = load(source, axis=name, applied=known)
+            built.append(_build_axis(dataset, work / name, options, numerics, _of_axis(name, say)))
+        join_axes(work, axes)
+        return built
+
+
+def _build_axis(
+    dataset: Dataset, work: Path, options: FitOptions, numerics: Sequence[str] | None, say: Progress
+) -> Built:
+    fitted = fit_dataset(dataset, options, progress=say)
+    fitted.model.save(work / "model.json")
+    _write(work / "training.json", fitted.training)
+    say("emitting C")
+    emission = emit(fitted.model, work, numerics=numerics)
+    verification = verify(work, progress=lambda name: say(f"verifying {name}"))
+    _write(work / "verify.json", verification)
+    evaluation = evaluate(
+        work,
+        dataset,
+        average_s=options.average_s,
+        trace=work / "trace",
+        training=fitted.training,
+        progress=lambda file: say(f"replaying {file}"),
+    )
+    _write(work / "evaluate.json", evaluation)
+    _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
+    say("drawing the report")
+    write_report(work)
     return Built(evaluation, verification, tuple(_failures(evaluation, verification)))
+
+
+def _of_axis(axis: str, say: Progress) -> Progress:
+    return lambda text: say(f"{axis}: {text}")
 
 
 def _failures(evaluation: dict[str, Any], verification: dict[str, Any]) -> Iterator[str]:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -16,6 +16,9 @@ from rich.table import Table as RichTable
 from . import __version__
 from .errors import CheckFailed, GyrotcError
 from .model import write_atomically
+
+if TYPE_CHECKING:
+    from .build import Built
 
 app = typer.Typer(
     name="gyrotc",
@@ -48,6 +51,9 @@ RhoOption = Annotated[
 BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
 NumericOption = Annotated[
     str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
+]
+AppliedOption = Annotated[
+    Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 
@@ -135,18 +141,21 @@ def fit(
     rho: RhoOption = None,
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train a model: DIR/model.json and DIR/training.json.
 
     Example: gyrotc fit recordings --out result
     """
+    from .applied import applied_of
     from .dataset import load
     from .fitting import FitOptions, fit_dataset
 
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    known = applied_of(applied) if applied else None
     with _progress() as say:
-        fitted = fit_dataset(load(dataset, axis=axis), options, progress=say)
+        fitted = fit_dataset(load(dataset, axis=axis, applied=known), options, progress=say)
     write_atomically(out / "model.json", fitted.model.to_json())
     write_atomically(out / "training.json", json_text(fitted.training))
     _write_json(json_file, fitted.training)
@@ -232,21 +241,22 @@ def evaluate(
     numeric: NumericOption = None,
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
     average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
+    applied: AppliedOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
+    from .applied import applied_of
     from .dataset import load
     from .evaluate import evaluate as run
     from .model import load_model
 
     axis = load_model(folder / "model.json").axis
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
     with _progress() as say:
-        result = run(
-            folder, load(dataset, axis=axis), numeric=numeric, average_s=average_s, trace=trace, progress=say
-        )
+        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=trace, progress=say)
     write_atomically(folder / "evaluate.json", json_text(result))
     _write_json(json_file, result)
     _OUT.print(evaluation_table(result))
@@ -266,6 +276,7 @@ def build(
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
     numeric: NumericOption = None,
+    applied: AppliedOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -277,16 +288,27 @@ def build(
 
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     with _progress() as say:
-        result = run(dataset, out, options, axis=axis, numerics=_numerics(numeric), progress=say)
-    _write_json(json_file, result.evaluation)
+        results = run(
+            dataset, out, options, axis=axis, numerics=_numerics(numeric), applied=applied, progress=say
+        )
+    if len(results) == 1:
+        _write_json(json_file, results[0].evaluation)
+    else:
+        _write_json(json_file, {r.evaluation["axis"]: r.evaluation for r in results})
+    for result in results:
+        _print_built(result)
+    _OUT.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+    failures = [failure for result in results for failure in result.failures]
+    if failures:
+        raise CheckFailed("; ".join(failures))
+
+
+def _print_built(result: Built) -> None:
     _OUT.print(evaluation_table(result.evaluation))
     _OUT.print(verify_table(result.verification))
     for finding in result.evaluation["findings"]:
         _OUT.print(f"finding {finding['id']}: {finding['text']}", highlight=False, soft_wrap=True)
     _OUT.print(summary(result.evaluation), highlight=False, soft_wrap=True)
-    _OUT.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
-    if result.failures:
-        raise CheckFailed("; ".join(result.failures))
 
 
 @app.command()

@@ -20,6 +20,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from . import __version__
+from .applied import channels_of
 from .dataset import Dataset, Rows, Run
 from .emit import emitted_tables
 from .errors import CheckFailed, GyrotcError
@@ -128,9 +129,7 @@ def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
     missed = missed_before(rows.time_s, run.row_period_s)
     per_block = samples_per_block(model.block_s, run.row_period_s)
-    names = sorted({t.channel for t in model.terms if t.channel})
-    columns = [rows.temperature_c, *(rows.channels[name] for name in names)]
-    channels = table.encode_inputs(np.stack(columns, axis=1))
+    channels = channels_of(rows, model, table)
     stream = np.concatenate([missed[:, None].astype(np.uint32), channels], axis=1)
     head = np.array([per_block, len(stream)], dtype=np.uint32)
     done = run_program(*program, data=head.tobytes() + stream.astype(np.uint32).tobytes())

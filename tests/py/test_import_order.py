@@ -27,6 +27,7 @@ ORDER = [
     "fitting",
     "reference",
     "quantise",
+    "applied",
     "amalgamate",
     "vectors",
     "emit",
@@ -39,6 +40,7 @@ ORDER = [
     "diagnose",
     "plots",
     "report",
+    "triad",
     "build",
     "cli",
 ]

@@ -1,0 +1,54 @@
+"""The model that was already subtracted while recording: its correction, to be added back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dataset import Applied, Rows
+from .errors import InputError
+from .frontend import missed_before, samples_per_block
+from .model import Model, load_model
+from .quantise import quantise
+from .reference import replay
+from .table import Table
+
+__all__ = ["applied_of", "channels_of"]
+
+
+def applied_of(path: Path) -> Applied:
+    """The model of a `model.json` as `load` takes it.
+
+    Raises:
+        InputError: The file is no model.
+        CheckFailed: It has no float32 table.
+    """
+    model = load_model(path)
+    table = quantise(model, "f32")
+
+    def correction_dph(rows: Rows, row_period_s: float) -> NDArray[np.float64]:
+        replayed = replay(
+            table,
+            channels_of(rows, model, table),
+            missed=missed_before(rows.time_s, row_period_s),
+            samples_per_block=samples_per_block(model.block_s, row_period_s),
+        )
+        return table.decode_bias(replayed.bits)
+
+    return Applied(model.hash, correction_dph)
+
+
+def channels_of(rows: Rows, model: Model, table: Table) -> NDArray[np.uint32]:
+    """Bits of temperature and auxiliary channels of every row, as the table takes them, shape (n, n_channels).
+
+    Raises:
+        InputError: The recording lacks a channel that a term of the model needs.
+    """
+    names = sorted({t.channel for t in model.terms if t.channel})
+    for name in names:
+        if name not in rows.channels:
+            raise InputError(f"channel {name}", "the recording has no such column", "the channel of a term")
+    columns = [rows.temperature_c, *(rows.channels[name] for name in names)]
+    return table.encode_inputs(np.stack(columns, axis=1))
