@@ -1,0 +1,179 @@
+"""The bank: signatures of all candidates as block means, and their inner products under every noise colour.
+
+It depends on the temperature records alone, not on the rates, and is kept on disk by their hash.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import terms
+from .baseline import MapBasis, fine_columns, make_basis
+from .catalogue import Candidate, columns_of, grid, testable
+from .noise import COLOURS, Whitener
+from .records import Records, centred_slope
+
+__all__ = ["Bank", "Group", "build", "replaced_map"]
+
+Array = NDArray[np.float64]
+
+_DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
+_COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
+_SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
+
+
+@dataclass(frozen=True)
+class Group:
+    """A candidate and where its columns lie in `Bank.signatures`."""
+
+    candidate: Candidate
+    columns: slice
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Everything of the search that does not depend on the rates.
+
+    Attributes:
+        basis, map: The static map and its block means, shape (N, m), orthonormal.
+        signatures: Columns of all groups, map projected out, shape (N, K); single columns have norm 1.
+        scale: Norm that a column of `signatures` had before, shape (K,).
+        groups: Candidates with columns of their own.
+        inputs: Candidates that change the map's input.
+        replaced: Map of the changed inputs, shape (len(inputs), N, m).
+        known: Blocks where the changed inputs are known, shape (len(inputs), N).
+        common: From signatures to their principal directions, shape (K, p).
+        grams: Inner products of (map, signatures) under each colour, shape (len(COLOURS), m + K, m + K).
+        log_dets: log det of each colour's covariance.
+        untestable: Why a cause cannot be tested, by id.
+    """
+
+    basis: MapBasis
+    map: Array
+    signatures: Array
+    scale: Array
+    groups: tuple[Group, ...]
+    inputs: tuple[Candidate, ...]
+    replaced: Array
+    known: NDArray[np.bool_]
+    common: Array
+    grams: Array
+    log_dets: Array
+    untestable: dict[str, str]
+
+
+def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
+    """Computes the bank. `sigma`: factor of the noise of every block, shape (N,), None: even."""
+    basis, static = make_basis(records, level)
+    groups, columns, untestable = _columns(records)
+    raw = np.column_stack(columns)
+    rest = raw - static @ (static.T @ raw)
+    rest -= static @ (static.T @ rest)
+    scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
+    for group in groups:
+        if group.candidate.role == "variance":
+            scale[group.columns] = scale[group.columns].max()
+    signatures = rest / scale
+    inputs, replaced, known = _inputs(records, basis)
+    _, size, right = np.linalg.svd(signatures, full_matrices=False)
+    keep = size > _COMMON * size[0]
+    both = np.column_stack([static, signatures])
+    grams, log_dets = [], []
+    for colour in COLOURS:
+        whiten = Whitener(colour, records.kept, records.block_s, sigma)
+        white = whiten(both)
+        grams.append(white.T @ white)
+        log_dets.append(whiten.log_det)
+    return Bank(
+        basis=basis,
+        map=static,
+        signatures=signatures,
+        scale=scale,
+        groups=tuple(groups),
+        inputs=tuple(inputs),
+        replaced=replaced,
+        known=known,
+        common=right[keep].T / size[keep],
+        grams=np.array(grams),
+        log_dets=np.array(log_dets),
+        untestable=untestable,
+    )
+
+
+def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]]:
+    """Columns of every candidate that adds columns, and of the dictionary of the lack-of-fit test."""
+    span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
+    longest = max(float(np.ptp(r.history.time_s)) for r in records.runs)
+    groups: list[Group] = []
+    columns: list[Array] = []
+    untestable: dict[str, str] = {}
+    at = 0
+
+    def add(candidate: Candidate, block: Array) -> None:
+        nonlocal at
+        groups.append(Group(candidate, slice(at, at + block.shape[1])))
+        columns.append(block)
+        at += block.shape[1]
+
+    for cause, term in terms.CATALOGUE.items():
+        if term.kind not in ("add", "random", "static") or cause in ("auxiliary", "earth_rate_tilt"):
+            continue
+        reason = testable(records, cause)
+        if reason:
+            untestable[cause] = reason
+            continue
+        for values in grid(cause, span, longest):
+            if cause == "map_too_coarse":
+                add(Candidate(cause, {}, "variance"), fine_columns(records))
+            else:
+                role = "variance" if term.kind == "random" else "columns"
+                add(Candidate(cause, dict(values), role), columns_of(records, cause, values))
+    add(Candidate("structure", {}, "structure"), _dictionary(records))
+    return groups, columns, untestable
+
+
+def _dictionary(records: Records) -> Array:
+    """Shapes that no cause has, for the lack-of-fit test: memories times T and rectified."""
+    out = []
+    for tau in _DICTIONARY_LAGS_S:
+        late = columns_of(records, "thermal_gradient", {"tau_s": tau})[:, 0]
+        t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+        out += [late * (t - t.mean()), np.abs(late)]
+    if len(records.runs) < 3:
+        out += list(columns_of(records, "turn_on_offset", {}).T)
+    return np.column_stack(out)
+
+
+def _inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], Array, NDArray[np.bool_]]:
+    """Map of the changed inputs for every candidate of kind "input" or "record" that has features."""
+    span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
+    longest = max(float(np.ptp(r.history.time_s)) for r in records.runs)
+    candidates, maps, knowns = [], [], []
+    for cause in ("cavity_lag", "time_misalignment"):
+        for values in grid(cause, span, longest):
+            candidates.append(Candidate(cause, dict(values), "input"))
+            block, known = replaced_map(records, basis, candidates[-1])
+            maps.append(block)
+            knowns.append(known)
+    return candidates, np.array(maps), np.array(knowns)
+
+
+def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[Array, NDArray[np.bool_]]:
+    """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
+    features = terms.CATALOGUE[candidate.id].features
+    assert features is not None
+    maps, known = [], []
+    for k, run in enumerate(records.runs):
+        seen = features(run.history, candidate.values)
+        slope = seen.columns[:, 1]
+        if candidate.id == "time_misalignment":
+            moved = replace(run.history, temperature_c=seen.columns[:, 0])
+            slope = centred_slope(moved)
+            known.append(records.average_run(k, seen.known.astype(float)) > 0.999)
+        else:
+            known.append(np.ones(records.kept[k].size, dtype=bool))
+        maps.append(records.average_run(k, basis(seen.columns[:, 0], slope)))
+    return np.concatenate(maps), np.concatenate(known)

@@ -1,0 +1,218 @@
+"""One data set under all noise colours: inner products with the bank, the colours allowed, the detection.
+
+Everything that is asked of the data afterwards is algebra on these inner products.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bank import Bank
+from .catalogue import Candidate
+from .detect import Columns, Projection, draw_null, score
+from .noise import COLOURS, Colour, Whitener
+from .records import Records
+
+__all__ = ["Detection", "Found", "Search"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_SET_95 = 5.99  # chi-square with two degrees of freedom (ratio and correlation time)
+_SEED = 20140916
+
+
+@dataclass(frozen=True)
+class View:
+    """Inner products under one colour: of the columns, with the data, of the data; log det; REML log-likelihood."""
+
+    gram: Array
+    b: Array
+    yy: float
+    log_det: float
+    log_likelihood: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """A candidate with its p-values: of its own, and adjusted for the whole search (worst colour)."""
+
+    candidate: Candidate
+    log_p: float
+    p_value: float
+
+
+class Search:
+    """Binds a bank to one record of rates.
+
+    Args:
+        records: The runs.
+        bank: Their bank.
+        y: Block means of the rate, deg/h, shape (N,).
+        extras: Further candidate columns, shape (N, e), and their candidates.
+        nuisance: Columns that are in every model beside the map (blocks left out), shape (N, d).
+        sigma: Factor of the noise of every block, shape (N,); None: even.
+    """
+
+    def __init__(
+        self,
+        records: Records,
+        bank: Bank,
+        y: Array,
+        extras: tuple[Array, list[Candidate]] | None = None,
+        nuisance: Array | None = None,
+        sigma: Array | None = None,
+    ) -> None:
+        self.records, self.bank, self.sigma = records, bank, sigma
+        size = records.size
+        self.y = y
+        added, names = extras if extras is not None else (np.zeros((size, 0)), [])
+        dropped = nuisance if nuisance is not None else np.zeros((size, 0))
+        first = self.baseline_weights(y)
+        moved = [r @ first - bank.map @ first for r in bank.replaced]
+        moved = [np.where(k, m, 0.0) for k, m in zip(bank.known, moved, strict=True)]
+        columns = np.column_stack([added, *moved, dropped])
+        rest = columns - bank.map @ (bank.map.T @ columns)
+        norm = np.linalg.norm(rest, axis=0)
+        self.extra = rest / np.where(norm > 1e-9 * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
+        m, k = bank.map.shape[1], bank.signatures.shape[1]
+        self.n_map, self.n_bank = m, k
+        self.base = np.arange(m)
+        self.base = np.concatenate([self.base, m + k + added.shape[1] + len(moved) + np.arange(dropped.shape[1])])
+        self.extra_candidates = [*names, *bank.inputs]
+        self._index()
+        self.views = [self._view(c, g, d) for c, g, d in zip(COLOURS, bank.grams, bank.log_dets, strict=True)]
+        likelihood = np.array([v.log_likelihood for v in self.views])
+        self.best = int(likelihood.argmax())
+        self.allowed = [int(k) for k in np.flatnonzero(2 * (likelihood.max() - likelihood) <= _SET_95)]
+
+    def baseline_weights(self, y: Array) -> Array:
+        """Least-squares weights of the map."""
+        return np.asarray(self.bank.map.T @ y)
+
+    def _index(self) -> None:
+        """Where single columns, pairs and variance groups stand among the joined columns."""
+        single: list[int] = []
+        pairs: list[tuple[int, int]] = []
+        variance: list[Index] = []
+        owners: list[Candidate] = []
+        pair_owners: list[Candidate] = []
+        variance_owners: list[Candidate] = []
+        for group in self.bank.groups:
+            at = np.arange(group.columns.start, group.columns.stop) + self.n_map
+            role = group.candidate.role
+            if role == "columns" and at.size == 1:
+                single.append(int(at[0]))
+                owners.append(group.candidate)
+            elif role == "columns":
+                pairs.append((int(at[0]), int(at[1])))
+                pair_owners.append(group.candidate)
+            elif role == "variance":
+                variance.append(at)
+                variance_owners.append(group.candidate)
+        start = self.n_map + self.n_bank
+        single += [start + k for k in range(len(self.extra_candidates))]
+        owners += self.extra_candidates
+        self.columns = Columns(
+            np.array(single), np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(variance)
+        )
+        self.owners = [*owners, *pair_owners, *variance_owners, Candidate("structure", {}, "structure")]
+
+    def _view(self, colour: Colour, gram: Array, log_det: float) -> View:
+        whiten = Whitener(colour, self.records.kept, self.records.block_s, self.sigma)
+        both = np.column_stack([self.extra, self.y])
+        white = whiten(both)
+        inverse = whiten.back(white)
+        cross_map = self.bank.map.T @ inverse
+        cross_bank = self.bank.signatures.T @ inverse
+        e = self.extra.shape[1]
+        inner = white.T @ white
+        p = len(gram)
+        full = np.empty((p + e, p + e))
+        full[:p, :p] = gram
+        full[:p, p:] = np.concatenate([cross_map, cross_bank])[:, :e]
+        full[p:, :p] = full[:p, p:].T
+        full[p:, p:] = inner[:e, :e]
+        b = np.concatenate([cross_map[:, e], cross_bank[:, e], inner[:e, e]])
+        return self._reml(full, b, float(inner[e, e]), log_det)
+
+    def _reml(self, gram: Array, b: Array, yy: float, log_det: float) -> View:
+        """Residual likelihood with map, common directions and extras projected out; the scale profiled."""
+        m, k = self.n_map, self.n_bank
+        to = np.zeros((len(gram), m + self.bank.common.shape[1]))
+        to[:m, :m] = np.eye(m)
+        to[m : m + k, m:] = self.bank.common
+        n_dropped = len(self.base) - m
+        extra = np.eye(len(gram))[:, len(gram) - n_dropped :] if n_dropped else np.zeros((len(gram), 0))
+        to = np.column_stack([to, extra])
+        inner = to.T @ gram @ to
+        factor = np.linalg.cholesky(inner + 1e-10 * np.eye(len(inner)))
+        c = np.linalg.solve(factor, to.T @ b)
+        freedom = self.y.size - len(inner)
+        left = max(yy - float(c @ c), 1e-300)
+        logs = log_det + 2.0 * float(np.log(np.diag(factor)).sum())
+        likelihood = -0.5 * (freedom * np.log(left / freedom) + logs)
+        return View(gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
+
+    def project(self, view: View, out: Index) -> Projection:
+        """Everything after the columns `out` are projected out."""
+        inner = view.gram[np.ix_(out, out)]
+        size, vectors = np.linalg.eigh(inner)
+        keep = size > 1e-10 * size[-1]
+        half = vectors[:, keep] / np.sqrt(size[keep])
+        cross = half.T @ view.gram[out]
+        gram = view.gram - cross.T @ cross
+        a = (view.b - cross.T @ (half.T @ view.b[out])) / view.scale
+        common = np.zeros((len(gram), self.bank.common.shape[1]))
+        common[self.n_map : self.n_map + self.n_bank] = self.bank.common
+        rest = view.yy - float(((half.T @ view.b[out]) ** 2).sum())
+        log_det = view.log_det + float(np.log(size[keep]).sum())
+        return Projection(a, gram, np.diag(view.gram).copy(), common, rest, log_det, int(keep.sum()))
+
+    def detect(self, out: Index) -> list[Found]:
+        """Candidates by adjusted p-value under the worst colour allowed for each, best first.
+
+        Colours are allowed for a candidate when they lie in the 95 % likelihood set with the candidate taken
+        out of the data, and in the set with everything taken out. The null distribution is that of the
+        likeliest colour: between colours its 1 % point moves by less than 0.2 in ln p.
+        """
+        projections = [self.project(self.views[k], out) for k in self.allowed]
+        own = np.array([score(p, self.columns, p.a).joined() for p in projections])
+        fits = [_refitted(p, self.columns, self.views[k], self.y.size) for k, p in zip(self.allowed, projections, strict=True)]
+        likelihood = np.array(fits)
+        inside = 2.0 * (likelihood.max(axis=0) - likelihood) <= _SET_95
+        log_p = np.where(inside, own, np.inf).min(axis=0)
+        null = np.sort(draw_null(projections[self.allowed.index(self.best)], self.columns, _SEED))
+        adjusted = (null.size - np.searchsorted(null, log_p) + 1.0) / (null.size + 1.0)
+        order = np.lexsort((-log_p, adjusted))
+        return [Found(self.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
+
+
+def _refitted(projection: Projection, columns: Columns, view: View, size: int) -> Array:
+    """Residual log-likelihood of a colour with map and candidate projected out, for every candidate."""
+    gram, a = projection.gram, projection.a * view.scale
+    alive, diagonal = projection.alive, np.diag(projection.gram)
+    index = columns.single
+    parts: list[Array] = []
+    safe = np.where(alive[index], diagonal[index], 1.0)
+    energy = np.where(alive[index], a[index] ** 2 / safe, 0.0)
+    freedom = size - projection.rank - 1
+    parts.append(_reml(projection.rest - energy, freedom, projection.log_det + np.log(safe)))
+    for group in (*columns.pairs, *columns.variance):
+        values, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
+        keep = values > 1e-4 * values[-1]
+        c = vectors[:, keep].T @ a[group]
+        left = projection.rest - float((c**2 / values[keep]).sum())
+        own = projection.log_det + float(np.log(values[keep]).sum())
+        parts.append(np.array([_reml(left, size - projection.rank - int(keep.sum()), own)]))
+    parts.append(np.array([view.log_likelihood]))
+    return np.concatenate(parts)
+
+
+def _reml(rest: Array | float, freedom: int, log_det: Array | float) -> Array:
+    """Residual log-likelihood with the scale profiled."""
+    return np.asarray(-0.5 * (freedom * np.log(np.maximum(rest, 1e-300) / freedom) + log_det))

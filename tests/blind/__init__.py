@@ -1,0 +1,5 @@
+"""Hidden-effect tests of `gyrotc diagnose`: an independent generator of recordings, and a grader.
+
+Nothing here imports gyrotc. Physics, operators, noise and maps are written a second time, by other
+methods, so that an error of the tool cannot hide behind the same error in its test.
+"""
