@@ -20,7 +20,7 @@ from .frontend import Blocks, run_blocks
 from .metrics import Averages, pooled
 from .model import Model
 from .spans import Span, training_spans
-from .train import Fit, TrainingData, fit, predict
+from .train import Fit, TrainingData, coverage, fit, predict, uncertainty
 
 __all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "samples_of"]
 
@@ -30,6 +30,7 @@ _HOLD_S = 300.0
 _MAX_RATE_C_PER_MIN = 30.0
 _MAX_STEP_C = 1.0
 _COVERAGE_CELLS = (32, 12)
+_UNCERTAINTY_CELLS = (6, 4)
 _MIN_SAMPLES = 8
 
 
@@ -108,22 +109,6 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
 def _joined(parts: Sequence[TrainingData]) -> TrainingData:
     names = TrainingData.__dataclass_fields__
     return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
-
-
-def _coverage(data: TrainingData, envelope: dict[str, Any]) -> dict[str, Any]:
-    """Cells of the envelope that hold training samples."""
-    seen, *_ = np.histogram2d(
-        data.slope_c_per_min,
-        data.temperature_c,
-        bins=_COVERAGE_CELLS[::-1],
-        range=(_open(envelope["slope_c_per_min"]), _open(envelope["temperature_c"])),
-    )
-    return {"cells": _COVERAGE_CELLS, "rows": ["".join("1" if n else "0" for n in row) for row in seen]}
-
-
-def _open(span: Sequence[float]) -> tuple[float, float]:
-    """A range of some width, as histogram2d needs one."""
-    return (span[0], span[1]) if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
 
 
 def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
@@ -225,7 +210,7 @@ def _model(
             "slope_blocks": front.slope_blocks,
             "scale": fitted.scale,
             "envelope": fitted.envelope,
-            "coverage": _coverage(data, fitted.envelope),
+            "coverage": coverage(data, fitted, _COVERAGE_CELLS),
             "networks": [dict(n) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
@@ -235,6 +220,7 @@ def _model(
             "noise_floor_dph": fitted.noise_floor_dph,
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
+            "uncertainty_dph": uncertainty(data, fitted, _UNCERTAINTY_CELLS) if fitted.n_centers else None,
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from conftest import GOLDEN, Command
 from gyrotc.emit import emit, emit_texts, quantise_all
 from gyrotc.errors import InputError
@@ -66,11 +65,9 @@ def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: P
     emit(model, tmp_path)
     c = tmp_path / "c"
     program = tmp_path / "main"
-    subprocess.run(
-        ["gcc", "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-o", program]
-        + [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"],
-        check=True,
-    )
+    sources = [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"]
+    flags = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run(["gcc", *flags, "-o", program, *sources], check=True)
     printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
     temperature, bias = float(printed.split()[2]), float(printed.split()[4])
     assert bias == pytest.approx(float(model.map_dph(temperature, 0.0)), abs=2e-6)
