@@ -1,7 +1,8 @@
 """`RBFNetworkRegressor`: a small Gaussian network as a scikit-learn estimator.
 
-Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train`, any other
-number of inputs by orthogonal least squares with samples as centers, one width, size by BIC. Needs scikit-learn.
+Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train`, any
+other number of inputs by orthogonal least squares: samples as centers, one width, size by BIC. Needs
+scikit-learn 1.6 or later.
 """
 
 from __future__ import annotations
