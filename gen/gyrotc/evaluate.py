@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from . import __version__
 from .applied import channels_of
-from .dataset import Dataset, Rows, Run
+from .dataset import Dataset, Rows, Run, RunFacts, facts_of
 from .emit import emitted_tables
 from .errors import CheckFailed, GyrotcError
+from .findings import findings_of
 from .frontend import missed_before, samples_per_block
 from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
@@ -54,11 +55,12 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A run, its averaged samples, and which rows were its own."""
+    """A run, its averaged samples, the steps that differ from the reference, and plain facts about it."""
 
     run: Run
     averages: Averages
     mismatches: int
+    facts: RunFacts
 
 
 def evaluate(
@@ -101,6 +103,7 @@ def evaluate(
     result = _result(model, dataset, table, parts, average_s=window)
     if result["exam"] is None and training:
         result["left_out"] = training.get("left_out")
+    result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
     return result
 
 
@@ -176,7 +179,7 @@ def _one_run(
     if trace is not None:
         shared = sum(r.file == run.file for r in all_runs) > 1
         _write_trace(trace, run, rows, replayed, span, shared=shared)
-    return _Part(run, averages, replayed.mismatches)
+    return _Part(run, averages, replayed.mismatches, facts_of(run, rows))
 
 
 def _write_trace(

@@ -4,6 +4,7 @@
 after a problem and tells all of them. What a folder may hold is written in docs/recordings.md.
 """
 
+from .facts import Jump, RunFacts, facts_of
 from .load import axes_of, load, survey
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run
 
@@ -13,9 +14,12 @@ __all__ = [
     "DeclaredNoise",
     "EarthRate",
     "Exclusion",
+    "Jump",
     "Rows",
     "Run",
+    "RunFacts",
     "axes_of",
+    "facts_of",
     "load",
     "survey",
 ]

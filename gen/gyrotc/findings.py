@@ -1,0 +1,191 @@
+"""What a user should know about a model and the data behind it, computed from the data.
+
+A finding has an id that stays stable, a text, and the numbers behind it. Findings never stop a job. They follow
+from figures alone: no name of a file, folder or serial plays a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .dataset import Dataset, RunFacts
+from .model import Model
+
+__all__ = ["earth_rate_findings", "findings_of", "jump_findings", "temperature_findings"]
+
+Finding = dict[str, Any]
+
+_EARTH_RATE_DPH = 15.05  # largest component of Earth's rate, rounded up
+_LEAST_SPAN_C = 2.0
+_UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
+_UNSEEN_TO_FLOOR = 3.0
+_WEIGHTS_TO_RANGE = 10.0
+_LEAST_COVERAGE = 0.25
+_OUTLIER_SIGMAS = 6.0
+_OUTLIER_SCATTER = 3.0
+_LEAST_RUNS = 4  # fewer runs do not say what a usual run is
+_MAD_TO_SIGMA = 1.4826
+
+
+def findings_of(
+    dataset: Dataset,
+    facts: Sequence[RunFacts],
+    model: Model,
+    result: Mapping[str, Any],
+    training: Mapping[str, Any] | None = None,
+) -> list[Finding]:
+    """All findings, the gravest first.
+
+    Args:
+        facts: Of the runs that were evaluated.
+        model: The model that was evaluated.
+        result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
+        training: The object of `training.json`, for figures of spans left out of training.
+    """
+    found = [*temperature_findings(facts)]
+    if not found:
+        found += _unseen(result, training)
+        found += _coverage(model)
+    found += jump_findings(facts)
+    found += earth_rate_findings(dataset, facts)
+    found += _weights(model, facts)
+    found += _outliers(result)
+    return found
+
+
+def temperature_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Nothing can be learnt about temperature where it hardly changes over all training runs."""
+    runs = [f for f in facts if f.role == "train"]
+    if not runs:
+        return
+    low, high = min(f.temperature_c[0] for f in runs), max(f.temperature_c[1] for f in runs)
+    if high - low < _LEAST_SPAN_C:
+        yield _finding(
+            "no_temperature_information",
+            f"Temperature spans {high - low:.3g} C in training: nothing can be learnt about temperature, "
+            "and the model is a constant.",
+            span_c=high - low,
+            required_c=_LEAST_SPAN_C,
+        )
+
+
+def jump_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Changes of temperature from one row to the next that no thermal mass can make."""
+    jumps = [(f.file, jump) for f in facts for jump in f.jumps]
+    if jumps:
+        file, first = jumps[0]
+        yield _finding(
+            "jump_in_temperature",
+            f"Temperature jumps {len(jumps)} times as no thermal mass can, first in {file} at "
+            f"{first.time_s:.6g} s from {first.from_c:.6g} to {first.to_c:.6g} C.",
+            jumps=[
+                {"file": name, "time_s": j.time_s, "from_c": j.from_c, "to_c": j.to_c} for name, j in jumps
+            ],
+        )
+
+
+def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """A mean rate that could be Earth's rate, and no word whether that is still in the data."""
+    if dataset.earth_rate is not None or not facts:
+        return
+    mean = float(np.average([f.mean_dph for f in facts], weights=[f.rows for f in facts]))
+    if abs(mean) <= _EARTH_RATE_DPH:
+        yield _finding(
+            "earth_rate_not_stated",
+            f"The mean rate is {mean:.4g} deg/h, Earth's rate is up to 15.04 deg/h, and the data set does not "
+            "state earth_rate: the model may take Earth's rate for bias.",
+            mean_dph=mean,
+        )
+
+
+def _unseen(result: Mapping[str, Any], training: Mapping[str, Any] | None) -> Iterator[Finding]:
+    """The residual on runs or spans that were not trained on, against that of training and the noise."""
+    seen, floor = _rms(result.get("train")), result.get("noise_floor_dph")
+    left_out = training.get("left_out") if training else None
+    for name, pooled in (("exam runs", result.get("exam")), ("spans left out in turn", left_out)):
+        rms = _rms(pooled)
+        if rms is None or seen is None or rms <= _UNSEEN_TO_SEEN * seen:
+            continue
+        if floor is None or rms > _UNSEEN_TO_FLOOR * floor:
+            yield _finding(
+                "fails_on_unseen_span",
+                f"A static map of temperature and its rate fails on what it has not seen: RMS {rms:.4g} deg/h on "
+                f"{name}, {seen:.4g} deg/h in training. Record more cycles, or see `gyrotc diagnose`.",
+                unseen=name,
+                unseen_rms_dph=rms,
+                train_rms_dph=seen,
+                noise_floor_dph=floor,
+                spans=[_rms(span) for span in training.get("left_out_spans", ())] if training else [],
+            )
+            return
+
+
+def _rms(pooled: Mapping[str, Any] | None) -> float | None:
+    return pooled["after"]["rms_dph"] if pooled else None
+
+
+def _coverage(model: Model) -> Iterator[Finding]:
+    """Share of the envelope in which there was data."""
+    if model.coverage is None:
+        return
+    cells = "".join(model.coverage.rows)
+    share = cells.count("1") / len(cells)
+    if share < _LEAST_COVERAGE:
+        yield _finding(
+            "sparse_coverage",
+            f"Training data lie in {share:.0%} of the envelope of temperature and its rate; between them the map "
+            "is interpolation. Record ramps at further rates.",
+            share=share,
+            required=_LEAST_COVERAGE,
+            envelope=model.envelope.model_dump(),
+        )
+
+
+def _weights(model: Model, facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Weights that cancel one another are a lever for rounding and for every input out of the ordinary."""
+    bias = [model.map_dph(f.temperatures_c, f.slopes_c_per_min) for f in facts if len(f.slopes_c_per_min)]
+    swing = float(np.ptp(np.concatenate(bias))) if bias else 0.0
+    total = model.sum_abs_weights_dph
+    if swing > 0.0 and total > _WEIGHTS_TO_RANGE * swing:
+        yield _finding(
+            "large_weights",
+            f"The weights add up to {total:.4g} deg/h for a correction that swings by {swing:.4g} deg/h: they cancel "
+            "one another, and outside the training data the correction can be anything.",
+            sum_abs_weights_dph=total,
+            swing_dph=swing,
+        )
+
+
+def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:
+    """Runs whose mean residual, or whose scatter, is not that of the others."""
+    runs = [run for run in result["runs"] if run["after"]["rms_dph"] is not None]
+    if len(runs) < _LEAST_RUNS:
+        return
+    mean = np.array([run["after"]["mean_dph"] for run in runs])
+    scatter = np.array([run["after"]["std_dph"] for run in runs])
+    samples = np.array([run["samples"] for run in runs])
+    floor = result.get("noise_floor_dph") or float(np.median(scatter))
+    departure = np.abs(mean - np.median(mean))
+    usual = np.maximum(_MAD_TO_SIGMA * np.median(departure), floor / np.sqrt(samples))
+    off = (departure > _OUTLIER_SIGMAS * usual) & (departure > floor)
+    loud = scatter > _OUTLIER_SCATTER * np.maximum(np.median(scatter), floor)
+    for k in np.flatnonzero(off | loud):
+        what = f"mean {mean[k]:.4g} deg/h" if off[k] else f"standard deviation {scatter[k]:.4g} deg/h"
+        usually = f"{np.median(mean):.4g}" if off[k] else f"{np.median(scatter):.4g}"
+        yield _finding(
+            "run_outlier",
+            f"{runs[k]['file']} differs from the other runs after compensation: {what}, usually {usually}.",
+            file=runs[k]["file"],
+            from_s=runs[k].get("from_s"),
+            mean_dph=float(mean[k]),
+            std_dph=float(scatter[k]),
+            median_mean_dph=float(np.median(mean)),
+            median_std_dph=float(np.median(scatter)),
+        )
+
+
+def _finding(name: str, text: str, **evidence: Any) -> Finding:
+    return {"id": name, "text": text, "evidence": evidence}
