@@ -25,7 +25,15 @@ from .quantise import NUMERICS, Table, quantise
 from .reference import answers
 from .vectors import make_vectors
 
-__all__ = ["Emission", "emit", "emit_texts", "emitted_tables", "quantise_all", "replace_folder"]
+__all__ = [
+    "Emission",
+    "emit",
+    "emit_texts",
+    "emitted_model",
+    "emitted_tables",
+    "quantise_all",
+    "replace_folder",
+]
 
 LAYOUT = 1
 _UNSIGNED, _NUMBER = "unsigned", "number"
@@ -122,16 +130,29 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
     Raises:
         InputError: There is no emitted code of this model.
     """
+    text = _emitted_header(folder, model)
+    numerics = tuple(n for n in NUMERICS if f"gtc_{n}_table_t gtc_{model.symbol}_{n};" in text)
+    return quantise_all(emitted_model(folder, model), numerics).tables
+
+
+def emitted_model(folder: Path, model: Model) -> Model:
+    """The model that an emitted folder computes: with `--zero-at`, the shifted one.
+
+    Raises:
+        InputError: There is no emitted code of this model.
+    """
+    zero_at = re.search(r"Make again: .* --zero-at (\S+)", _emitted_header(folder, model))
+    return model.zeroed_at(float(zero_at[1])) if zero_at else model
+
+
+def _emitted_header(folder: Path, model: Model) -> str:
     header = folder / f"gtc_{model.id}.h"
     try:
-        text = header.read_text(encoding="ascii", errors="replace")
+        return header.read_text(encoding="ascii", errors="replace")
     except OSError as error:
         raise InputError(
             str(header), f"cannot be read ({error.strerror})", "a folder that emit wrote"
         ) from error
-    numerics = tuple(n for n in NUMERICS if f"gtc_{n}_table_t gtc_{model.symbol}_{n};" in text)
-    zero_at = re.search(r"Make again: .* --zero-at (\S+)", text)
-    return quantise_all(model.zeroed_at(float(zero_at[1])) if zero_at else model, numerics).tables
 
 
 def replace_folder(folder: Path, files: dict[str, bytes]) -> None:
@@ -161,7 +182,7 @@ def emit_texts(
     numerics = tuple(emission.tables)
     vectors = make_vectors(model, numerics)
     options = (f" --numeric {','.join(numerics)}" if asked else "") + (
-        f" --zero-at {zero_at:g}" if zero_at is not None else ""
+        f" --zero-at {zero_at!r}" if zero_at is not None else ""
     )
     first = next(iter(emission.tables.values()))
     values: dict[str, Any] = {

@@ -2,13 +2,14 @@
 
 Stage 7 of the house (… → C → **proof** → report). Believes nothing: compiles `DIR/c` for each
 target, runs the board test and compares every result word with what the reference computes from
-`model.json`. The answers in `c/` are not trusted either; they must be the same.
+`model.json`. The answers and images in `c/` are not trusted either; they must be the same.
 """
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -16,50 +17,77 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..emit import emitted_tables
+from ..dataset import Dataset
+from ..emit import emitted_model, emitted_tables
 from ..errors import InputError
-from ..model import load_model
+from ..model import Model, load_model
 from ..reference import answers
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
 from .board import Job, test_target
+from .emitted import c_hash, check_emitted
+from .logs import log_entries
+from .recordings import replay_dataset
 
 __all__ = ["verify"]
 
+SCHEMA = "gyrotc.verify/1"
+Entry = dict[str, Any]
 Progress = Callable[[str], None]
 
 
-def verify(folder: Path, *, targets: Sequence[str] = (), progress: Progress | None = None) -> dict[str, Any]:
+def verify(
+    folder: Path,
+    *,
+    targets: Sequence[str] = (),
+    dataset: Dataset | None = None,
+    log: Path | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
     """Verifies `folder/c` against `folder/model.json`; the JSON object of `gyrotc verify`.
 
     Args:
         folder: What `build` or `emit` wrote.
-        targets: Names of targets, or `all`; empty for the default ones.
+        targets: Names of targets, or `all`; empty for the default ones, with `log` for none.
+        dataset: Recordings to replay on every target besides.
+        log: Output of a board test that ran elsewhere. Its entries join those of an earlier
+            `verify.json` of the same model and code; later calls keep them.
         progress: Called with the name of each target before it is tried.
 
     Raises:
-        InputError: No emitted code, or an unknown target.
+        InputError: No emitted code, an unknown target, an unreadable log.
+        CheckFailed: The log is not whole, or of another model.
     """
+    say = progress or (lambda _: None)
     model = load_model(folder / "model.json")
-    chosen = _choose(targets)
+    chosen = _choose(targets) if targets or log is None else []
     tables = emitted_tables(folder / "c", model)
     vectors = make_vectors(model, tuple(tables))
     job = Job(folder / "c", model, tables, {n: answers(table, vectors) for n, table in tables.items()})
-    entries = list(_test_all(job, chosen, progress or (lambda _: None)))
-    named = set(targets) - {"all"}
-    status = [e["status"] for e in entries]
+    identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
+    entries = log_entries(job, vectors, log) if log is not None else []
+    entries += _test_all(job, chosen, say)
+    if dataset is not None:
+        replay_dataset(job, entries, chosen, dataset, say)
+    entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
+    emitted = check_emitted(job)
+    exact = emitted_model(folder / "c", model)
+    errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     return {
-        "schema": "gyrotc.verify/1",
+        "schema": SCHEMA,
         "gyrotc_version": __version__,
         "serial": model.serial,
         "axis": model.axis,
-        "passed": status.count("pass"),
-        "failed": status.count("fail")
-        + sum(e["status"] == "missing" and e["name"] in named for e in entries),
-        "missing": status.count("missing"),
+        **identity,
+        **_counts(entries, [*emitted, *errors], set(targets) - {"all"}),
         "targets": entries,
-        "error_bound_dph": max(t.error_bound_dph for t in tables.values()),
-        "worst_error_dph": _worst_error(job, vectors),
+        "emitted": emitted,
+        "errors": errors,
+        "error_bound_dph": max(e["bound_dph"] for e in errors),
+        "worst_error_dph": {
+            "value": max(e["worst_dph"] for e in errors),
+            "inputs_visited": sum(e["inputs_visited"] for e in errors),
+        },
     }
 
 
@@ -73,28 +101,58 @@ def _choose(names: Sequence[str]) -> list[Target]:
     return [t for t in known.values() if "all" in names or t.name in names]
 
 
-def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> Iterator[dict[str, Any]]:
+def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[Entry]:
     """Entries in the order of the targets; compilers and emulators run side by side."""
 
-    def one(target: Target) -> list[dict[str, Any]]:
+    def one(target: Target) -> list[Entry]:
         progress(target.name)
         return test_target(job, target)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
-        for entries in pool.map(one, targets):
-            yield from entries
+        return [entry for entries in pool.map(one, targets) for entry in entries]
 
 
-def _worst_error(job: Job, vectors: Vectors) -> dict[str, Any]:
-    """Largest departure of the emitted map from the float64 model over the map vectors (all arithmetics)."""
-    worst, visited = 0.0, 0
-    for numeric, table in job.tables.items():
-        inputs = table.decode_inputs(vectors.map_inputs(numeric))
-        status, bits = job.expected[numeric][1 : 1 + len(inputs)].T
-        usable = (status < 2**31) & np.all(np.isfinite(inputs), axis=1)
-        got = table.decode_bias(bits.astype(np.uint32))[usable]
-        t, slope = inputs[usable].T
-        exact = job.model.map_dph(t, slope * 60.0 / job.model.block_s)
-        worst = max(worst, float(np.max(np.abs(got - exact), initial=0.0)))
-        visited += int(usable.sum())
-    return {"value": worst, "inputs_visited": visited}
+def _earlier(folder: Path, identity: dict[str, str], *, boards_only: bool) -> list[Entry]:
+    """Entries of an earlier `verify.json` that still hold: same model, same code."""
+    try:
+        earlier = json.loads((folder / "verify.json").read_text(encoding="utf-8"))
+        same = earlier["schema"] == SCHEMA and all(earlier[k] == v for k, v in identity.items())
+        return [e for e in earlier["targets"] if same and ("log" in e or not boards_only)]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def _merged(earlier: list[Entry], entries: list[Entry]) -> list[Entry]:
+    new = {(e["name"], e["numeric"]) for e in entries}
+    return [e for e in earlier if (e["name"], e["numeric"]) not in new] + entries
+
+
+def _counts(entries: list[Entry], checks: list[Entry], named: set[str]) -> dict[str, int]:
+    """Targets passed, failed, missing. A named target that is missing has failed, and so has a check."""
+    status = [e["status"] for e in entries]
+    absent = sum(e["status"] == "missing" and e["name"] in named for e in entries)
+    wrong = sum(check["status"] == "fail" for check in checks)
+    return {
+        "passed": status.count("pass"),
+        "failed": status.count("fail") + absent + wrong,
+        "missing": status.count("missing"),
+    }
+
+
+def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> Entry:
+    """Largest departure of the emitted map from the float64 model over the map vectors, and the bound."""
+    table = job.tables[numeric]
+    inputs = table.decode_inputs(vectors.map_inputs(numeric))
+    status, bits = job.expected[numeric][1 : 1 + len(inputs)].T
+    usable = (status < 2**31) & np.all(np.isfinite(inputs), axis=1)
+    got = table.decode_bias(bits[usable])
+    t, slope = inputs[usable].T
+    exact = model.map_dph(t, slope * 60.0 / model.block_s)
+    worst = float(np.max(np.abs(got - exact), initial=0.0))
+    return {
+        "numeric": numeric,
+        "status": "pass" if worst <= table.error_bound_dph else "fail",
+        "bound_dph": table.error_bound_dph,
+        "worst_dph": worst,
+        "inputs_visited": int(usable.sum()),
+    }

@@ -1,0 +1,96 @@
+"""Recordings replayed on several targets: each file is read once, and kept no longer than needed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..dataset import Dataset
+from ..errors import CheckFailed
+from ..table import Table
+from ..toolchain import Target
+from .board import Job
+from .replay import History, history_of, replay_on, replay_program
+
+__all__ = ["replay_dataset"]
+
+_SHOWN_MISMATCHES = 5
+
+
+@dataclass(slots=True)
+class _Lane:
+    """One table on one target: its program, and what came of it so far."""
+
+    target: Target
+    table: Table
+    program: Path | None = None
+    rows: int = 0
+    runs: int = 0
+    mismatches: int = 0
+    first: list[str] = field(default_factory=list)
+    error: str | None = None
+
+    def run(self, file: str, history: History) -> None:
+        if self.program is None or self.error is not None:
+            return
+        try:
+            replayed = replay_on(self.target, self.program, history)
+        except CheckFailed as error:
+            self.error = f"{file}: {error}"
+            return
+        self.runs += 1
+        self.rows += len(history.missed)
+        self.mismatches += replayed.mismatches
+        room = _SHOWN_MISMATCHES - len(self.first)
+        self.first += [f"{file}, {text}" for text in replayed.first[:room]]
+
+
+def replay_dataset(
+    job: Job,
+    entries: Sequence[dict[str, Any]],
+    targets: Sequence[Target],
+    dataset: Dataset,
+    progress: Callable[[str], None],
+) -> None:
+    """Replays every run on every target whose board test ran; adds `replayed` to its entry."""
+    with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        lanes = {}
+        for entry in entries:
+            target = next((t for t in targets if t.name == entry["name"]), None)
+            if target is not None and entry["status"] != "missing" and target.reads_input:
+                lanes[id(entry)] = _Lane(target, job.tables[entry["numeric"]])
+        for lane in lanes.values():
+            try:
+                lane.program = stack.enter_context(
+                    replay_program(job.c_folder, job.model, lane.table, lane.target)
+                )
+            except CheckFailed as error:
+                lane.error = str(error)
+        for run in dataset.runs:
+            progress(f"replaying {run.file}")
+            rows = run.rows()
+            for table in job.tables.values():
+                history = history_of(rows, run.row_period_s, job.model, table)
+                same = [lane for lane in lanes.values() if lane.table is table]
+                list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
+    for entry in entries:
+        if id(entry) in lanes:
+            _enter(entry, lanes[id(entry)])
+
+
+def _enter(entry: dict[str, Any], lane: _Lane) -> None:
+    entry["replayed"] = {
+        "runs": lane.runs,
+        "rows": lane.rows,
+        "mismatches": lane.mismatches,
+        "first_mismatches": lane.first,
+    }
+    if lane.error is not None:
+        entry["replayed"]["error"] = lane.error
+    if lane.error is not None or lane.mismatches:
+        entry["status"] = "fail"

@@ -1,0 +1,120 @@
+"""Recordings through the compiled code of a target, every step compared with the reference.
+
+A recording goes in as 32-bit words of the target's byte order over standard input (for bare metal: a
+file of the emulator's host), and so come the results out.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..applied import channels_of
+from ..dataset import Rows
+from ..errors import CheckFailed
+from ..frontend import missed_before, samples_per_block
+from ..model import Model
+from ..reference import Replay, replay
+from ..table import Table, Words
+from ..toolchain import Target, compile_c, run_program
+
+__all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
+
+_SHOWN_MISMATCHES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """A recording as the runtime sees it, and what it must answer.
+
+    Bits of every row's channels, shape (n, n_channels); samples missed before each row, shape (n,).
+    """
+
+    channels: Words
+    missed: NDArray[np.int64]
+    samples_per_block: int
+    reference: Replay
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What the compiled code answered, every row of the file.
+
+    Bits of the bias and status in force after each row, the number of rows that differ from the
+    reference in any bit, and the first of them with all bits.
+    """
+
+    bits: Words
+    status: NDArray[np.int32]
+    mismatches: int
+    first: tuple[str, ...]
+
+
+def history_of(rows: Rows, row_period_s: float, model: Model, table: Table) -> History:
+    """Bits and answers of a recording.
+
+    Raises:
+        InputError: It lacks a channel that a term of the model needs.
+    """
+    channels = channels_of(rows, model, table)
+    missed = missed_before(rows.time_s, row_period_s)
+    per_block = samples_per_block(model.block_s, row_period_s)
+    answers = replay(table, channels, missed=missed, samples_per_block=per_block)
+    return History(channels, missed, per_block, answers)
+
+
+@contextmanager
+def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -> Iterator[Path]:
+    """The replay program of a table, compiled for a target.
+
+    Raises:
+        CheckFailed: The compiler refused.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=False
+    )
+    text = environment.get_template("replay.c.j2").render(
+        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    )
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        source = Path(work) / "replay.c"
+        source.write_text(text, encoding="ascii")
+        program = Path(work) / "replay"
+        sources = [source, c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"]
+        compile_c(target, sources, program, include=c_folder)
+        yield program
+
+
+def replay_on(target: Target, program: Path, history: History) -> Replayed:
+    """Feeds a recording to the compiled code and compares every step with the reference.
+
+    Raises:
+        CheckFailed: The program did not run to its end.
+    """
+    word = np.dtype("<u4" if target.byte_order == "little" else ">u4")
+    stream = np.concatenate([history.missed[:, None].astype(word), history.channels.astype(word)], axis=1)
+    head = np.array([history.samples_per_block, len(stream)], dtype=word)
+    done = run_program(target, program, data=head.tobytes() + stream.astype(word).tobytes())
+    if done.returncode != 0 or len(done.stdout) != 12 * len(stream):
+        raise CheckFailed(
+            f"the replay ended with status {done.returncode} after {len(done.stdout) // 12} "
+            f"of {len(stream)} rows {done.stderr[:200]}"
+        )
+    got = np.frombuffer(done.stdout, dtype=word).astype(np.uint32).reshape(-1, 3)
+    answers = history.reference
+    want = np.stack([answers.sample_status, answers.status, answers.bits.view(np.int32)], axis=1)
+    wrong = np.flatnonzero(np.any(got != want.view(np.uint32), axis=1))
+    first = tuple(_difference(int(k), got[k], want.view(np.uint32)[k]) for k in wrong[:_SHOWN_MISMATCHES])
+    return Replayed(got[:, 2], got[:, 1].view(np.int32), int(wrong.size), first)
+
+
+def _difference(row: int, got: Words, want: Words) -> str:
+    texts = [" ".join(f"{word:08x}" for word in words) for words in (got, want)]
+    return f"row {row}: statuses and bits {texts[0]}, reference {texts[1]}"
