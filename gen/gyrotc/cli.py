@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table as RichTable
 
@@ -217,21 +218,32 @@ def verify(
     target: Annotated[
         list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
     ] = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", help="Replay these recordings on every target besides.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Compile DIR/c for each target and compare bit for bit with the reference.
 
     Example: gyrotc verify result --target all
     """
+    from .dataset import load
+    from .model import load_model
     from .verify import verify as run
 
+    recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
     with _progress() as say:
-        result = run(folder, targets=target or (), progress=say)
+        result = run(folder, targets=target or (), dataset=recordings, log=log, progress=say)
     write_atomically(folder / "verify.json", json_text(result))
     _write_json(json_file, result)
     _OUT.print(verify_table(result))
+    for line in verify_failures(result):
+        _OUT.print(line, highlight=False, soft_wrap=True)
     if result["failed"]:
-        raise CheckFailed(f"{result['failed']} of {len(result['targets'])} targets failed")
+        raise CheckFailed(f"{result['failed']} checks failed; {len(result['targets'])} targets")
 
 
 @app.command()
@@ -350,16 +362,41 @@ def evaluation_table(result: dict[str, Any]) -> RichTable:
 
 
 def verify_table(result: dict[str, Any]) -> RichTable:
-    table = RichTable(title="Bit for bit against the reference")
-    for name in ("target", "arithmetic", "status", "vectors", "mismatches"):
-        table.add_column(name, justify="right" if name in ("vectors", "mismatches") else "left")
+    table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD)
+    for name in ("target", "", "status"):
+        table.add_column(name, no_wrap=True)
+    for name in ("vectors", "rows", "differ", "a map call", "code", "stack"):
+        table.add_column(name, justify="right", no_wrap=True)
     for entry in result["targets"]:
-        note = f" (package {entry['package']})" if entry["status"] == "missing" else ""
+        if entry["status"] == "missing":
+            table.add_row(entry["name"], entry["numeric"], f"missing: {entry['package']}")
+            continue
+        replayed = entry.get("replayed") or {}
+        counted = next((n for n in ("instructions", "cycles", "ticks") if n in entry), None)
         table.add_row(
-            entry["name"], entry["numeric"], entry["status"] + note, str(entry.get("vectors", "-")),
-            str(entry.get("mismatches", "-")),
+            entry["name"], entry["numeric"], entry["status"], str(entry.get("vectors", "-")),
+            str(replayed.get("rows", "-")),
+            str(entry["mismatches"] + replayed.get("mismatches", 0)) if "mismatches" in entry else "-",
+            f"{entry[counted]['mean']:.0f} {counted[:5]}" if counted else "-",
+            str(entry.get("code_bytes", "-")), str(entry.get("stack_bytes", "-")),
         )  # fmt: skip
     return table
+
+
+def verify_failures(result: dict[str, Any]) -> Iterator[str]:
+    """What differs, with all bits; one line each."""
+    for entry in result["targets"]:
+        replayed = entry.get("replayed") or {}
+        found = [entry.get("error"), replayed.get("error"), *entry.get("first_mismatches", ())]
+        for text in [*found, *replayed.get("first_mismatches", ())]:
+            if text:
+                yield f"{entry['name']} {entry['numeric']}: {text}"
+    for file in result["emitted"]:
+        if file["status"] == "fail":
+            yield f"{file['file']}: {file['mismatches']} lines or words differ from what the model gives"
+    for error in result["errors"]:
+        if error["status"] == "fail":
+            yield f"{error['numeric']}: error {error['worst_dph']:.3e} deg/h above {error['bound_dph']:.3e}"
 
 
 def summary(result: dict[str, Any]) -> str:

@@ -6,32 +6,28 @@ noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where 
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from . import __version__
-from .applied import channels_of
 from .dataset import Dataset, Rows, Run, RunFacts, facts_of
 from .emit import emitted_tables
 from .errors import CheckFailed, GyrotcError
 from .findings import findings_of
-from .frontend import missed_before, samples_per_block
 from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
 from .quantise import Table
-from .reference import replay
 from .simulate.truth import simulated_floor
-from .toolchain import Target, all_targets, compile_c, run_program
+from .toolchain import Target, all_targets
+from .verify.replay import history_of, replay_on, replay_program
 
 __all__ = ["Replayed", "evaluate"]
 
@@ -113,43 +109,22 @@ def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Targe
     target = all_targets()[_HOST]
     if target.missing():
         raise GyrotcError(f"no C compiler: install {target.package}")
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=False
-    )
-    text = environment.get_template("replay.c.j2").render(
-        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
-    )
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        source = Path(work) / "replay.c"
-        source.write_text(text, encoding="ascii")
-        program = Path(work) / "replay"
-        sources = [source, c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"]
-        compile_c(target, sources, program, include=c_folder)
+    with replay_program(c_folder, model, table, target) as program:
         yield target, program
 
 
 def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path]) -> Replayed:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
-    missed = missed_before(rows.time_s, run.row_period_s)
-    per_block = samples_per_block(model.block_s, run.row_period_s)
-    channels = channels_of(rows, model, table)
-    stream = np.concatenate([missed[:, None].astype(np.uint32), channels], axis=1)
-    head = np.array([per_block, len(stream)], dtype=np.uint32)
-    done = run_program(*program, data=head.tobytes() + stream.astype(np.uint32).tobytes())
-    if done.returncode != 0:
-        raise CheckFailed(f"{run.file}: the replay ended with status {done.returncode} {done.stderr[:200]}")
-    got = np.frombuffer(done.stdout, dtype=np.uint32).reshape(-1, 3)
-    want = replay(table, channels, missed=missed, samples_per_block=per_block)
-    same = (
-        (got[:, 0].astype(np.int32) == want.sample_status)
-        & (got[:, 1].astype(np.int32) == want.status)
-        & (got[:, 2] == want.bits)
-    )
+    history = history_of(rows, run.row_period_s, model, table)
+    try:
+        replayed = replay_on(*program, history)
+    except CheckFailed as error:
+        raise CheckFailed(f"{run.file}: {error}") from error
     return Replayed(
-        bias_dph=table.decode_bias(got[:, 2]),
-        status=got[:, 1].astype(np.int64),
-        scored=want.block_valid,
-        mismatches=int(np.count_nonzero(~same)),
+        bias_dph=table.decode_bias(replayed.bits),
+        status=replayed.status.astype(np.int64),
+        scored=history.reference.block_valid,
+        mismatches=replayed.mismatches,
     )
 
 
