@@ -40,6 +40,7 @@ ORDER = [
     "diagnose",
     "plots",
     "report",
+    "paper",
     "triad",
     "build",
     "cli",

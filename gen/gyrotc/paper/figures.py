@@ -1,0 +1,100 @@
+"""Figures 5 to 11 of the paper again, from simulated recordings: SVG files. Draws; computes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..plots import AFTER, BEFORE, svg
+from .experiment import Cell, Experiment
+from .published import ENVIRONMENTS
+
+__all__ = ["FIGURES", "draw"]
+
+_STYLE: Any = {
+    "svg.hashsalt": "gyrotc",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+_ZOOM = slice(50, 101)
+_CONSTANT, _VARIABLE = ENVIRONMENTS[:3], ENVIRONMENTS[3:]
+
+_Panel = Callable[[Axes, Cell, slice], None]
+
+
+def _measured(ax: Axes, cell: Cell, part: slice) -> None:
+    ax.plot(_samples(cell, part), 1e3 * cell.before[part], color=BEFORE, linewidth=0.7, label="zero bias")
+
+
+def _identified(ax: Axes, cell: Cell, part: slice) -> None:
+    _measured(ax, cell, part)
+    ax.plot(_samples(cell, part), 1e3 * cell.predicted[part], color=AFTER, linewidth=1.2, label="model")
+
+
+def _compensated(ax: Axes, cell: Cell, part: slice) -> None:
+    ax.axhline(0.0, color="#222222", linewidth=0.6)
+    ax.plot(_samples(cell, part), 1e3 * cell.after[part], color=AFTER, linewidth=0.7, label="compensated")
+
+
+def _samples(cell: Cell, part: slice) -> Any:
+    return np.arange(len(cell.before))[part]
+
+
+FIGURES: dict[int, tuple[str, str, _Panel, bool]] = {
+    5: ("mlr", "Filtered zero bias", _measured, False),
+    6: ("mlr", "Forecasting by MLR", _identified, False),
+    7: ("rbf_random", "Identification by the RBFNN with random centers", _identified, True),
+    8: ("mrbf_paper", "Identification by the modified RBFNN", _identified, True),
+    9: ("mlr", "Compensated zero bias, MLR", _compensated, False),
+    10: ("rbf_random", "Compensated zero bias, RBFNN with random centers", _compensated, False),
+    11: ("mrbf_paper", "Compensated zero bias, modified RBFNN", _compensated, False),
+}
+"""Number in the paper: method, title, what a panel shows, whether samples 50 to 100 are enlarged."""
+
+
+def draw(result: Experiment, folder: Path) -> list[Path]:
+    """Writes `figure-05.svg` to `figure-11.svg` into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for number in FIGURES:
+        path = folder / f"figure-{number:02d}.svg"
+        path.write_text(_figure(result, number), "utf-8")
+        written.append(path)
+    return written
+
+
+def _figure(result: Experiment, number: int) -> str:
+    method, title, panel, enlarged = FIGURES[number]
+    cells = result.cells[method]
+    whole = slice(None)
+    rows = [(_CONSTANT, whole), (_VARIABLE, whole)]
+    if enlarged:
+        rows += [(_CONSTANT, _ZOOM), (_VARIABLE, _ZOOM)]
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(10.0, 0.6 + 1.8 * len(rows)), layout="constrained")
+        axes = figure.subplots(len(rows), 3, sharey=True, squeeze=False)
+        for letter, line, (environments, part) in zip("abcd", axes, rows, strict=False):
+            _line(line, letter, [(name, cells[name]) for name in environments], panel, part)
+        for ax in axes[-1]:
+            ax.set_xlabel("time, 100 s")
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
+        return svg(figure)
+
+
+def _line(
+    axes: Sequence[Axes], letter: str, cells: Sequence[tuple[str, Cell]], panel: _Panel, part: slice
+) -> None:
+    for ax, (name, cell) in zip(axes, cells, strict=True):
+        panel(ax, cell, part)
+        ax.set_title(f"({letter}) {name}", fontsize=8.5, loc="left")
+    axes[0].set_ylabel("1e-3 deg/h")
