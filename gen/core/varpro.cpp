@@ -259,10 +259,17 @@ std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_s
         Network next = grow(sizes.back(), candidates, tolerance, steps);
         if (!(next.cost < sizes.back().cost)) break;
         sizes.push_back(std::move(next));
-        for (std::size_t m = sizes.size() - 1; m > 1 && steps > 0; --m) {
+        std::size_t m = sizes.size() - 1;
+        for (; m > 1 && steps > 0; --m) {
             Network fewer = prune(sizes[m], tolerance);
             if (!(fewer.cost < sizes[m - 1].cost)) break;
             sizes[m - 1] = std::move(fewer);
+        }
+        // A deletion may beat even the larger network that it came from: that one is grown anew.
+        for (; m < sizes.size(); ++m) {
+            if (m == 0 || sizes[m].cost < sizes[m - 1].cost) continue;
+            sizes[m] = grow(sizes[m - 1], candidates, tolerance, steps);
+            if (!(sizes[m].cost < sizes[m - 1].cost)) sizes.resize(m);
         }
         if (reached) break;
     }
