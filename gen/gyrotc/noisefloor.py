@@ -1,0 +1,126 @@
+"""Noise and thermal sensitivity of a gyro in the terms of IEEE Std 647 and 952, from rates and residuals.
+
+The Allan variance of a rate ω averaged over τ is, as a sum of independent noises (IEEE Std 952-2020, annex C):
+
+    σ²(τ) = 3 Q²/τ² + N²/τ + (2 ln 2/π) B² + K² τ/3
+
+with quantisation Q, angle random walk N, bias instability B and rate random walk K.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import allantools
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+__all__ = ["AllanPoint", "allan_variance", "noise_terms", "sensitivities", "stretches"]
+
+Floats = NDArray[np.float64]
+
+_FLICKER = 2.0 * np.log(2.0) / np.pi
+_LEAST_PAIRS = 8
+_LEAST_SPAN_C = 2.0
+_LEAST_SPAN_C_PER_MIN = 0.1
+_S_PER_H = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class AllanPoint:
+    """Allan deviation (deg/h) at an averaging time (s), and about how many independent differences it rests on."""
+
+    tau_s: float
+    deviation_dph: float
+    freedom: float
+
+
+def stretches(values: Floats, time_s: Floats, run: NDArray[np.int64], step_s: float) -> list[Floats]:
+    """Values of gap-free stretches: cut where the run changes or a step of time is longer than 1.5 `step_s`."""
+    cuts = np.flatnonzero((np.diff(run) != 0) | (np.diff(time_s) > 1.5 * step_s)) + 1
+    return list(np.split(values, cuts))
+
+
+def allan_variance(residuals: Sequence[Floats], step_s: float) -> list[AllanPoint]:
+    """Overlapping Allan deviation at octaves of the step, pooled over gap-free stretches.
+
+    Args:
+        residuals: Mean rates over `step_s`, one array for each stretch, deg/h.
+        step_s: Length of a mean, s.
+    """
+    total: dict[int, tuple[float, float]] = {}
+    for stretch in residuals:
+        factors = [2**k for k in range(32) if 2 ** (k + 1) <= len(stretch) // 2]
+        if not factors:
+            continue
+        taus, deviation, _, pairs = allantools.oadev(
+            stretch, rate=1.0 / step_s, data_type="freq", taus=[f * step_s for f in factors]
+        )
+        for tau, value, n in zip(taus, deviation, pairs, strict=True):
+            factor = round(tau / step_s)
+            square, count = total.get(factor, (0.0, 0.0))
+            total[factor] = (square + n * value**2, count + n)
+    return [
+        AllanPoint(factor * step_s, float(np.sqrt(square / count)), count / factor)
+        for factor, (square, count) in sorted(total.items())
+        if count / factor >= _LEAST_PAIRS
+    ]
+
+
+def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
+    """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
+
+    Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
+    not show is 0; all are None where the record is too short.
+
+    Args:
+        residuals: As for `allan_variance`.
+        step_s: Length of a mean, s.
+    """
+    points = allan_variance(residuals, step_s)
+    names = (
+        "quantisation_arcsec",
+        "arw_deg_per_sqrt_h",
+        "bias_instability_dph",
+        "rate_random_walk_dph_per_sqrt_h",
+    )
+    terms: dict[str, Any] = dict.fromkeys(names)
+    if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
+        tau = np.array([p.tau_s for p in points])
+        square = np.array([p.deviation_dph for p in points]) ** 2
+        weight = np.sqrt(np.array([p.freedom for p in points]) / 2.0) / square
+        # 1 arcsec/s is 1 deg/h, so that Q in arcsec goes with τ in s, and N, K with τ in h.
+        shapes = np.stack(
+            [3.0 / tau**2, _S_PER_H / tau, np.full(len(tau), _FLICKER), tau / _S_PER_H / 3.0], axis=1
+        )
+        scale = shapes.max(axis=0)
+        squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
+        terms = dict(zip(names, (float(v) for v in np.sqrt(squares / scale)), strict=True))
+    allan = [{"tau_s": p.tau_s, "deviation_dph": p.deviation_dph, "freedom": p.freedom} for p in points]
+    return terms | {"allan": allan}
+
+
+def sensitivities(
+    temperature_c: Floats, slope_c_per_min: Floats, bias_dph: Floats, weight: Floats
+) -> dict[str, float | None]:
+    """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane.
+
+    Returns:
+        `bias_dph_per_c`, `bias_dph_per_c_per_min` (None where the input hardly changes) and what remains,
+        `residual_rms_dph`.
+    """
+    root = np.sqrt(weight)
+    inputs = {"bias_dph_per_c": temperature_c, "bias_dph_per_c_per_min": slope_c_per_min}
+    least = {"bias_dph_per_c": _LEAST_SPAN_C, "bias_dph_per_c_per_min": _LEAST_SPAN_C_PER_MIN}
+    used = [name for name, values in inputs.items() if len(values) and np.ptp(values) >= least[name]]
+    columns = [np.ones(len(bias_dph)), *(inputs[name] - inputs[name].mean() for name in used)]
+    design = np.stack(columns, axis=1)
+    solution, *_ = np.linalg.lstsq(design * root[:, None], bias_dph * root, rcond=None)
+    residual = bias_dph - design @ solution
+    result: dict[str, float | None] = dict.fromkeys(inputs)
+    result |= {name: float(value) for name, value in zip(used, solution[1:], strict=True)}
+    result["residual_rms_dph"] = float(np.sqrt(np.average(residual**2, weights=weight)))
+    return result
