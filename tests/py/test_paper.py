@@ -1,5 +1,4 @@
-"""The paper repeated: its page has a place for everything that is made, and the experiment shows what it
-says."""
+"""The paper repeated: its page has a place for all that is made, and the experiment shows what it says."""
 
 from __future__ import annotations
 
@@ -8,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from gyrotc.errors import InputError
 from gyrotc.paper.experiment import METHODS, Experiment, experiment
 from gyrotc.paper.figures import FIGURES, draw
@@ -25,8 +23,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 
 def test_the_published_figures_are_those_of_table_1() -> None:
     """The improvements that the paper prints follow from its before and after."""
-    printed = {"mlr": (5.17, 4.87, 5.15, 4.77, 4.80, 4.82), "mrbf_paper": (10.43, 9.82, 10.39, 9.818, 9.832,
-    9.847)} for method, improvements in printed.items():
+    printed = {
+        "mlr": (5.17, 4.87, 5.15, 4.77, 4.80, 4.82),
+        "mrbf_paper": (10.43, 9.82, 10.39, 9.818, 9.832, 9.847),
+    }
+    for method, improvements in printed.items():
         for name, improvement in zip(ENVIRONMENTS, improvements, strict=True):
             assert BEFORE_DPH[name] / AFTER_DPH[method][name] == pytest.approx(improvement, abs=0.01)
 
