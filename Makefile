@@ -27,6 +27,7 @@ endif
 ## all tests (CTest for the C library, pytest for the generator); installs its own tools
 test:
 	@tools/setup.sh test
+	@mkdir -p build
 	@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@ctest --test-dir build/ctest --output-on-failure

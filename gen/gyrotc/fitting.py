@@ -19,7 +19,6 @@ from .errors import InputError
 from .frontend import Blocks, run_blocks
 from .metrics import Averages, pooled
 from .model import Model
-from .noisefloor import noise_terms, sensitivities
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 from .train import Fit, TrainingData, coverage, fit, predict, uncertainty
@@ -230,13 +229,6 @@ def _model(
     )
 
 
-def _stretches(data: TrainingData, fitted: Fit, block_s: float) -> list[NDArray[np.float64]]:
-    """Residuals of the compensated training blocks, cut where the run changes or a block is missing, deg/h."""
-    residual = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
-    cuts = (np.diff(data.run) != 0) | (np.diff(data.time_s) > 1.5 * block_s)
-    return np.split(residual, np.flatnonzero(cuts) + 1)
-
-
 def _data_file(run: Run) -> dict[str, Any]:
     span = None if run.from_s is None and run.to_s is None else (run.from_s, run.to_s)
     return {"file": run.file, "sha256": run.sha256, "span": span, "role": run.role}
@@ -267,8 +259,6 @@ def _training(
         "predicted_rms_ratio": fitted.predicted_rms_ratio,
         "prediction_withheld": fitted.withheld,
         "noise_floor_dph": fitted.noise_floor_dph,
-        "noise": noise_terms(_stretches(data, fitted, front.block_s), front.block_s),
-        "sensitivity": sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
         "spans": [span.to_dict() for span in spans],
         "left_out": pooled(left_out) if left_out else None,
         "left_out_spans": [pooled([a]) for a in left_out or []],

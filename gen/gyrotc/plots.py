@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from .metrics import Averages
 from .model import Model
 
-__all__ = ["bias_over_time", "curve_by_size", "map_with_centers", "svg"]
+__all__ = ["allan_deviation", "bias_over_time", "curve_by_size", "map_with_centers", "svg"]
 
 BEFORE, AFTER, COVERED, ACCENT = "#b4552d", "#1f6f8b", "#7a7a7a", "#222222"
 _STYLE: Any = {
@@ -166,3 +166,33 @@ _CURVES = (
     ("departure", "squared departure from the smooth estimate ÷ noise variance"),
     ("misfit", "cost of the fit"),
 )
+
+
+def allan_deviation(noise: dict[str, Any]) -> str | None:
+    """Allan deviation over averaging time, with its uncertainty and the line of the angle random walk."""
+    points = noise["allan"]
+    if len(points) < 2:
+        return None
+    tau = np.array([p["tau_s"] for p in points])
+    value = np.array([p["deviation_dph"] for p in points])
+    spread = value / np.sqrt(2.0 * np.array([p["freedom"] for p in points]))
+    with mpl.rc_context(_STYLE):
+        figure = _figure(10.0, 2.8)
+        ax = figure.subplots()
+        low = np.minimum(spread, 0.9 * value)
+        ax.errorbar(
+            tau, value, yerr=(low, spread), fmt="o-", color=AFTER, markersize=3.5, linewidth=1.0, capsize=2
+        )
+        walk = noise["arw_deg_per_sqrt_h"]
+        if walk:
+            ax.plot(
+                tau,
+                walk * 60.0 / np.sqrt(tau),
+                "--",
+                color=BEFORE,
+                linewidth=1.0,
+                label=f"N = {walk:.2e} deg/√h",
+            )
+            ax.legend(fontsize=8)
+        ax.set(xscale="log", yscale="log", xlabel="averaging time, s", ylabel="deg/h")
+        return svg(figure)

@@ -13,7 +13,7 @@ import pyarrow.csv as pacsv
 from .errors import InputError
 from .metrics import Averages, average
 from .model import Model, load_model, write_atomically
-from .plots import bias_over_time, curve_by_size, map_with_centers
+from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 
 __all__ = ["write_report"]
 
@@ -85,6 +85,7 @@ def _pictures(
         "bias": bias_over_time(runs) if runs else None,
         "map": map_with_centers(model),
         "curve": curve_by_size(training) if training else None,
+        "allan": allan_deviation(training["noise"]) if training.get("noise") else None,
     }
 
 
