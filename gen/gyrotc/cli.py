@@ -240,7 +240,7 @@ def verify(
     write_atomically(folder / "verify.json", json_text(result))
     _write_json(json_file, result)
     _OUT.print(verify_table(result))
-    for line in verify_failures(result):
+    for line in verify_notes(result):
         _OUT.print(line, highlight=False, soft_wrap=True)
     if result["failed"]:
         raise CheckFailed(f"{result['failed']} checks failed; {len(result['targets'])} targets")
@@ -342,9 +342,12 @@ def _e(value: float | None, digits: int = 2) -> str:
 
 
 def evaluation_table(result: dict[str, Any]) -> RichTable:
-    table = RichTable(title=f"{result['serial']}: means over {result['average_s']:g} s, deg/h")
-    for name in ("run", "role", "environment", "RMS before", "RMS after", "std after", "samples"):
-        table.add_column(name, justify="right" if name[:3] in ("RMS", "std", "sam") else "left")
+    title = f"{result['serial']}: means over {result['average_s']:g} s, deg/h"
+    table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("run", "role", "environment"):
+        table.add_column(name, no_wrap=True)
+    for name in ("before", "after", "std after", "samples"):
+        table.add_column(name, justify="right", no_wrap=True)
     for run in result["runs"]:
         table.add_row(
             run["file"] + (f"@{run['from_s']:g}" if run.get("from_s") is not None else ""),
@@ -362,15 +365,12 @@ def evaluation_table(result: dict[str, Any]) -> RichTable:
 
 
 def verify_table(result: dict[str, Any]) -> RichTable:
-    table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD)
+    table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("target", "", "status"):
         table.add_column(name, no_wrap=True)
-    for name in ("vectors", "rows", "differ", "a map call", "code", "stack"):
+    for name in ("vectors", "rows", "differ", "map call", "code", "stack"):
         table.add_column(name, justify="right", no_wrap=True)
     for entry in result["targets"]:
-        if entry["status"] == "missing":
-            table.add_row(entry["name"], entry["numeric"], f"missing: {entry['package']}")
-            continue
         replayed = entry.get("replayed") or {}
         counted = next((n for n in ("instructions", "cycles", "ticks") if n in entry), None)
         table.add_row(
@@ -383,9 +383,11 @@ def verify_table(result: dict[str, Any]) -> RichTable:
     return table
 
 
-def verify_failures(result: dict[str, Any]) -> Iterator[str]:
-    """What differs, with all bits; one line each."""
+def verify_notes(result: dict[str, Any]) -> Iterator[str]:
+    """What is missing, and what differs, with all bits; one line each."""
     for entry in result["targets"]:
+        if entry["status"] == "missing":
+            yield f"{entry['name']} {entry['numeric']}: missing; it needs the packages {entry['package']}"
         replayed = entry.get("replayed") or {}
         found = [entry.get("error"), replayed.get("error"), *entry.get("first_mismatches", ())]
         for text in [*found, *replayed.get("first_mismatches", ())]:
