@@ -71,21 +71,21 @@ class Vectors:
     def n_direct(self) -> int:
         return len(next(iter(self.direct.values())))
 
-    def map_inputs(self, numeric: str, n_random: int | None = None) -> NDArray[np.uint32]:
+    def map_inputs(self, numeric: str) -> NDArray[np.uint32]:
         """Bits of (temperature, slope) of all map vectors, shape (n, 2)."""
         draw = _Draw(self.seed)
-        random = [
-            (draw.between(self.t_low, self.t_span), draw.between(self.s_low, self.s_span))
-            for _ in range(self.n_random if n_random is None else n_random)
-        ]
-        drawn = np.array(random, dtype=np.int64).reshape(-1, 2)
-        bits = _bits(numeric, drawn, np.array([2.0**-12, 2.0**-16]), np.array([16, 1]))
-        return np.concatenate([np.array(self.direct[numeric], dtype=np.uint32).reshape(-1, 2), bits])
+        words = []
+        to_bits = _BITS[numeric]
+        for _ in range(self.n_random):
+            t, s = draw.between(self.t_low, self.t_span), draw.between(self.s_low, self.s_span)
+            words.append((to_bits(t, 12), to_bits(s, 16)))
+        return np.array([*self.direct[numeric], *words], dtype=np.uint32).reshape(-1, 2)
 
-    def events(self, numeric: str, n_random: int | None = None) -> Iterator[Event]:
+    def events(self, numeric: str) -> Iterator[Event]:
         """The calls of the step functions, in order (the draws go on after those of the map)."""
         draw = _Draw(self.seed)
-        for _ in range(2 * (self.n_random if n_random is None else n_random)):
+        to_bits = _BITS[numeric]
+        for _ in range(2 * self.n_random):
             draw.next()
         for segment in self.segments:
             if segment.kind == "MISSED":
@@ -93,13 +93,10 @@ class Vectors:
                 continue
             for j in range(segment.count):
                 noise = draw.between(-segment.noise, 2 * segment.noise + 1)
-                t = np.array([segment.start + j * segment.step + noise])
-                extra = [draw.between(-4096, 8192) for _ in range(1, self.n_channels)]
-                words = _bits(numeric, np.concatenate([t, np.array(extra, dtype=np.int64)]), 2.0**-12, 16)
-                channels = [int(w) for w in words]
-                if segment.kind == "BITS":
-                    channels[0] = segment.bits[numeric]
-                yield Event(tuple(channels))
+                others = [to_bits(draw.between(-4096, 8192), 12) for _ in range(1, self.n_channels)]
+                t = segment.start + j * segment.step + noise
+                held = segment.kind == "BITS"
+                yield Event((segment.bits[numeric] if held else to_bits(t, 12), *others))
 
 
 class _Draw:
@@ -120,13 +117,16 @@ class _Draw:
         return low + ((self.next() * span) >> 32)
 
 
-def _bits(
-    numeric: str, n: NDArray[np.int64], unit: float | NDArray[np.float64], step: int | NDArray[np.int64]
-) -> NDArray[np.uint32]:
-    """Bits of integers as the arithmetic takes them; both forms are exact."""
-    if numeric == "f32":
-        return (n * unit).astype(np.float32).view(np.uint32)
-    return (n * step).astype(np.int32).view(np.uint32)
+def _f32_bits(n: int, fraction_bits: int) -> int:
+    """Bits of n 2^-fraction_bits, rounded to nearest even where n has more than 24 bits."""
+    return int(struct.unpack("<I", struct.pack("<f", n * 2.0**-fraction_bits))[0])
+
+
+def _q31_bits(n: int, fraction_bits: int) -> int:
+    return (n << (16 - fraction_bits)) & 0xFFFFFFFF
+
+
+_BITS = {"f32": _f32_bits, "q31": _q31_bits}
 
 
 def make_vectors(model: Model, numerics: tuple[str, ...]) -> Vectors:
@@ -135,7 +135,10 @@ def make_vectors(model: Model, numerics: tuple[str, ...]) -> Vectors:
     per_block = model.block_s / 60.0
     t_low, t_high = round((t0 - 0.1 * (t1 - t0) - 1.0) * 4096), round((t1 + 0.1 * (t1 - t0) + 1.0) * 4096)
     s_margin = 0.1 * (r1 - r0) + 0.01
-    s_low, s_high = (round(r * per_block * 65536) for r in (r0 - s_margin, r1 + s_margin))
+    steepest = 2**30  # 2^-16 C per block; more does not fit a fixed-point slope
+    s_low, s_high = (
+        min(max(round(r * per_block * 65536), -steepest), steepest) for r in (r0 - s_margin, r1 + s_margin)
+    )
     return Vectors(
         model=int(model.hash[:8], 16),
         seed=zlib.crc32(model.hash.encode("ascii")) | 1,
@@ -189,7 +192,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:
     (t0, t1) = (round(t * 4096) for t in model.envelope.temperature_c)
     rate = max(model.envelope.slope_c_per_min[1], -model.envelope.slope_c_per_min[0], 0.1)
     # A ramp at the envelope's rate, but with at most 1500 samples.
-    step = max(round(rate * model.block_s / 60.0 / n * 4096), (t1 - t0) // 1500, 1)
+    step = max(min(round(rate * model.block_s / 60.0 / n * 4096), t1 - t0), (t1 - t0) // 1500, 1)
     span = (t1 - t0) // step + 1
     window = n * (model.slope_blocks + 2)
     t = (t0 + t1) // 2
