@@ -40,8 +40,15 @@ check:
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
 	@cd gen && ../.venv/bin/mypy gyrotc
 
+## the picture of a report in README.md, by a headless browser
+picture: demo
+	@tools/setup.sh picture
+	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1240 \
+	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/report.html" >/dev/null 2>&1
+	@rm -rf build/browser
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test check clean
+.PHONY: help setup demo test check picture clean

@@ -5,6 +5,7 @@
 #   tools/setup.sh test       besides, what `make test` uses
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
+#   tools/setup.sh picture    besides, the browser of `make picture`
 #   tools/setup.sh bench      besides, the peers of `make bench`
 #
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
@@ -24,7 +25,8 @@ case $level in
   test) packages=("${base[@]}" "${test[@]}") ;;
   targets) packages=("${base[@]}" "${test[@]}" "${targets[@]}") ;;
   prove) packages=("${base[@]}" "${test[@]}" "${prove[@]}") ;;
-  *) echo "setup: unknown level '$level' (demo, test, targets, prove, bench)" >&2; exit 2 ;;
+  picture) packages=("${base[@]}" chromium) ;;
+  *) echo "setup: unknown level '$level' (demo, test, targets, prove, picture, bench)" >&2; exit 2 ;;
 esac
 
 install_missing() {
@@ -55,7 +57,7 @@ fi
 
 # The environment is made again when what it is made of has changed.
 extras=""
-[ "$level" = demo ] || extras="[test]"
+case $level in demo | picture) ;; *) extras="[test]" ;; esac
 [ "$level" = bench ] && extras="[test,bench]"
 stamp=.venv/.gyrotc$extras
 fingerprint=$({ cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
@@ -64,5 +66,5 @@ if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
   echo "setup: installing gyrotc into .venv (builds the C++ core)"
   .venv/bin/python -m pip install -q --disable-pip-version-check -e "gen$extras"
   echo "$fingerprint" >"$stamp"
-  [ "$level" = demo ] || echo "$fingerprint" >.venv/.gyrotc
+  [ -z "$extras" ] || echo "$fingerprint" >.venv/.gyrotc
 fi
