@@ -14,7 +14,8 @@ def true_bias(temperature_c: NDArray[np.float64], slope: NDArray[np.float64]) ->
     """A map without Gaussians: rational in T, saturating in dT/dt. deg/h, C, C/min."""
     t = temperature_c / 40.0
     flow = slope / np.sqrt(1.0 + (slope / 3.0) ** 2)
-    return np.asarray(7e-3 + 1.2e-3 * t / (1.0 + t * t) + 4e-4 * t * t / (1.0 + 0.3 * t * t) + 1e-4 * flow)
+    well = 1.0 / (1.0 + ((temperature_c - 15.0) / 18.0) ** 2)
+    return np.asarray(7e-3 + 1.2e-3 * t / (1.0 + t * t) - 1e-3 * well + 1e-4 * flow)
 
 
 def samples(seed: int, *, noise_dph: float = NOISE_DPH, hours: float = 4.0) -> TrainingData:

@@ -1,0 +1,128 @@
+"""The methods of the paper: size rules, what each is, and banks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gyrotc.model import Model
+from gyrotc.train import SIZE_RULES, fit, predict
+from training_data import NOISE_DPH, rms, samples, true_bias
+
+
+def error_of(found: object, seed: int = 0) -> float:
+    """RMS of the map's error over the samples, in units of the paper's noise of 100-s means."""
+    data = samples(seed)
+    truth = true_bias(data.temperature_c, data.slope_c_per_min)
+    return rms(predict(found, data.temperature_c, data.slope_c_per_min) - truth) / NOISE_DPH  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ["rbf_ols", "mrbf_paper"])
+@pytest.mark.parametrize("rule", SIZE_RULES)
+def test_every_size_rule_gives_a_map(method: str, rule: str) -> None:
+    found = fit(samples(0), method=method, size_rule=rule)
+    assert found.curves["size_rule"] == rule
+    assert found.n_centers >= 1
+    assert error_of(found) < 0.8
+
+
+def test_the_default_beats_what_it_is_compared_with() -> None:
+    """At a fifth of the paper's noise, where the shape of the map decides; the same samples for every method."""
+    errors = {
+        method: np.median([error_of(fit(samples(k, noise_dph=1.4e-4), method=method), k) for k in range(5)])
+        for method in ("mlr", "poly", "rbf_random", "mrbf_paper", "mrbf")
+    }
+    best = errors.pop("mrbf")
+    assert all(best < e for e in errors.values()), (best, errors)
+
+
+def test_rho_counts_down_to_the_threshold() -> None:
+    """Eq. (16): the chosen size is the first at which 1 − Σ [err] is below ρ."""
+    found = fit(samples(1), method="mrbf_paper", rho=0.0127)
+    reductions = np.array(found.curves["error_reduction"])
+    rest = 1.0 - np.cumsum(reductions)
+    assert rest[-1] < 0.0127
+    assert np.all(rest[:-1] >= 0.0127)
+    assert found.n_centers == len(reductions) - 1
+    assert fit(samples(1), method="mrbf_paper", rho=0.5).n_centers == 0
+
+
+@pytest.mark.parametrize("method", ["rbf_random", "rbf_ols", "mrbf_paper"])
+def test_a_number_of_centers_asked_for_is_given(method: str) -> None:
+    found = fit(samples(2), method=method, centers=9)
+    assert found.n_centers == 9
+    assert len({w for pair in found.networks[0]["widths"] for w in pair}) == 1
+
+
+def test_candidates_are_what_the_method_says() -> None:
+    data = samples(3)
+    random = fit(data, method="rbf_random", centers=12, average_s=10.0)
+    points = {
+        (round(t, 6), round(r, 6)) for t, r in zip(data.temperature_c, data.slope_c_per_min, strict=True)
+    }
+    assert all((round(t, 6), round(r, 6)) in points for t, r in random.networks[0]["centers"])
+    grid = fit(data, method="rbf_ols", centers=12)
+    t, r = np.array(grid.networks[0]["centers"]).T
+    step = np.ptp(data.temperature_c) / 20
+    assert len(np.unique(np.round(t, 6))) <= 21
+    assert np.ptp(t) <= 20.001 * step
+    assert len(np.unique(np.round(r, 6))) <= 13
+
+
+def test_linear_regression_takes_constant_t_and_rate_first() -> None:
+    found = fit(samples(4), method="mlr")
+    assert found.curves["powers"][:3] == [[0, 0], [1, 0], [0, 1]]
+    assert np.all(np.diff(found.curves["bic"]) < 0.0)
+    assert found.n_centers == 0
+
+
+def test_a_polynomial_is_found_exactly() -> None:
+    data = samples(5)
+    z = (data.temperature_c - 10.0) / 50.0
+    truth = 1e-3 + 2e-3 * z - 1e-3 * z**3
+    found = fit(
+        type(data)(**{**{k: getattr(data, k) for k in data.__slots__}, "bias_dph": truth}), method="poly"
+    )
+    value = predict(found, data.temperature_c, data.slope_c_per_min)
+    assert rms(value - truth) < 1e-6
+
+
+def test_a_bank_has_three_regions_and_blends_as_the_model_does() -> None:
+    data = samples(6)
+    found = fit(data, method="bank")
+    assert len(found.networks) == 3
+    assert error_of(found, 6) < 0.3
+    model = Model.from_dict(
+        {
+            "schema": "gyrotc.model/1",
+            "serial": "BANK",
+            "axis": None,
+            "method": "bank",
+            "block_s": 10.0,
+            "slope_blocks": 10,
+            "scale": found.scale,
+            "envelope": found.envelope,
+            "coverage": None,
+            "networks": [dict(n) for n in found.networks],
+            "fallback_dph": found.fallback_dph,
+            "hold_blocks": 30,
+            "stuck_samples": 0,
+            "max_step_c": 1.0,
+            "max_rate_c_per_min": 30.0,
+            "noise_floor_dph": found.noise_floor_dph,
+            "noise_floor_source": "estimated",
+            "data": [],
+            "seed": 0,
+            "meta": {},
+        }
+    )
+    rng = np.random.default_rng(6)
+    t, r = rng.uniform(-60.0, 80.0, 2000), rng.uniform(-6.0, 6.0, 2000)
+    np.testing.assert_allclose(predict(found, t, r), model.map_dph(t, r), rtol=1e-12)
+
+
+def test_a_bank_without_ramps_is_one_network() -> None:
+    data = samples(7)
+    slow = data.select(np.abs(data.slope_c_per_min) < 0.1)
+    found = fit(slow, method="bank")
+    assert len(found.networks) in (1, 3)
+    assert fit(data.select(data.slope_c_per_min > -0.1), method="bank").networks[0]["region"] is None
