@@ -33,15 +33,20 @@
 #define GTC_TERM_HARMONIC 4  /* harmonic in T: path_length_periodicity */
 #define GTC_TERM_AUXILIARY 5 /* linear in an auxiliary channel */
 
-/* One 32-bit word: a float32 value or an unsigned integer. */
+#if (UINT_LEAST32_MAX != 4294967295U) || (INT_LEAST32_MIN + 1 != -2147483647)
+#error "gtc needs least-width 32-bit integers of just 32 bits, in two's complement"
+#endif
+
+/* One 32-bit word: an unsigned integer, a float32 value, or a signed integer. */
 typedef union {
     uint_least32_t bits;
     float value;
+    int_least32_t integer;
 } gtc_word_t;
 
 /* Sizes of the records in the arrays below, in words. */
 #define GTC_NETWORK_WORDS 8 /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
-#define GTC_CENTER_WORDS 5  /* T: center, gain; slope: center, gain; weight (q31: s1, k1, s2, k2, w) */
+#define GTC_CENTER_WORDS 5  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
 #define GTC_TERM_WORDS 8    /* kind, channel, then six parameters of the kind */
 #define GTC_PROBE_WORDS 4   /* temperature, slope, bias, status */
 
@@ -94,7 +99,8 @@ typedef struct {
     int_least32_t max_step;        /* 2^-16 C */
     int_least32_t max_slope;       /* 2^-16 C per block */
     int_least32_t fallback;        /* 2^-bias_frac_bits deg/h */
-    int_least32_t scale[6];        /* maps T and slope onto 16 bits, see docs/numerics.md */
+    int_least32_t scale[6];        /* T: offset, gain; slope: offset, gain (docs/numerics.md);
+                                      bits by which squares are in larger units; 0 */
     int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
     uint_least32_t n_networks;
     uint_least32_t n_centers;

@@ -11,7 +11,7 @@ static int FN(probes_agree)(const TABLE *table)
     for (i = 0U; i < table->n_probes; i++) {
         const gtc_word_t *const probe = &table->probes[i * GTC_PROBE_WORDS];
         NUM bias = NUM_ZERO;
-        const int status = FN(map)(table, FROM_WORD(probe[0]), FROM_WORD(probe[1]), &bias);
+        const int status = FN(map)(table, ELEMENT(probe[0]), ELEMENT(probe[1]), &bias);
 
         if ((status < 0) || ((uint_least32_t)status != probe[3].bits)
             || (FN(bits)(bias) != probe[2].bits)) {

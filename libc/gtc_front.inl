@@ -95,7 +95,7 @@ static void FN(bridge)(STATE *state)
         state->held_blocks++;
     }
     if (state->held_blocks > table->hold_blocks) {
-        state->bias = FROM_WORD(table->fallback);
+        state->bias = MEMBER(table->fallback);
         state->status = GTC_HELD | GTC_FALLBACK;
     } else {
         state->status |= GTC_HELD;

@@ -49,14 +49,14 @@ static void FN(header)(const TABLE *table, uint_least32_t words[HEADER_WORDS])
     uint_least32_t *const numbers = &words[9];
     uint_least32_t i;
 
-    numbers[0] = (uint_least32_t)TO_WORD(table->max_step);
-    numbers[1] = (uint_least32_t)TO_WORD(table->max_slope);
-    numbers[2] = (uint_least32_t)TO_WORD(table->fallback);
+    numbers[0] = MEMBER_BITS(table->max_step);
+    numbers[1] = MEMBER_BITS(table->max_slope);
+    numbers[2] = MEMBER_BITS(table->fallback);
     for (i = 0U; i < N_SCALE; i++) {
-        numbers[3U + i] = (uint_least32_t)TO_WORD(table->scale[i]);
+        numbers[3U + i] = MEMBER_BITS(table->scale[i]);
     }
     for (i = 0U; i < 4U; i++) {
-        numbers[3U + N_SCALE + i] = (uint_least32_t)TO_WORD(table->envelope[i]);
+        numbers[3U + N_SCALE + i] = MEMBER_BITS(table->envelope[i]);
     }
     for (i = 0U; i < 9U; i++) {
         words[i] = integers[i];

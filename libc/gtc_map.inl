@@ -23,14 +23,14 @@ static int FN(clamp)(NUM *x, NUM low, NUM high)
 }
 
 /* GTC_OK or GTC_UNCOVERED. */
-static int FN(coverage)(const TABLE *table, NUM temp, NUM slope)
+static int FN(coverage)(const TABLE *table, const POINT *in)
 {
     uint_least32_t cell[2];
     uint_least32_t index;
     int status = GTC_OK;
 
     if (table->coverage != NULL) {
-        FN(cells)(table, temp, slope, table->coverage_cells, cell);
+        FN(cells)(table, in, table->coverage_cells, cell);
         index = (cell[1] * table->coverage_cells[0]) + cell[0];
         if (((table->coverage[index >> 5].bits >> (index & 31U)) & 1U) == 0U) {
             status = GTC_UNCOVERED;
@@ -47,10 +47,10 @@ int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     if ((table == NULL) || (bias == NULL) || FN(is_missing)(temp) || FN(is_missing)(slope)) {
         return GTC_E_ARG;
     }
-    status = FN(clamp)(&temp, FROM_WORD(table->envelope[0]), FROM_WORD(table->envelope[1]));
-    status |= FN(clamp)(&slope, FROM_WORD(table->envelope[2]), FROM_WORD(table->envelope[3]));
-    status |= FN(coverage)(table, temp, slope);
+    status = FN(clamp)(&temp, MEMBER(table->envelope[0]), MEMBER(table->envelope[1]));
+    status |= FN(clamp)(&slope, MEMBER(table->envelope[2]), MEMBER(table->envelope[3]));
     in = FN(normalise)(table, temp, slope);
-    *bias = FN(network)(table->networks, table->centers, &in);
+    status |= FN(coverage)(table, &in);
+    *bias = FN(network)(table, table->networks, table->centers, &in);
     return status;
 }

@@ -31,9 +31,10 @@
 
 #define N_SCALE 3U     /* members `scale` of a table */
 
-/* A table member or array element as a number, and a member as the word of an image. */
-#define FROM_WORD(word) ((word).value)
-#define TO_WORD(member) ((member).bits)
+/* A table member as a number and as the word of an image; an array element as a number. */
+#define MEMBER(member) ((member).value)
+#define MEMBER_BITS(member) ((member).bits)
+#define ELEMENT(word) ((word).value)
 
 static inline uint_least32_t FN(bits)(float x)
 {
@@ -93,8 +94,10 @@ static inline float FN(gauss)(float u)
     return e.value;
 }
 
-/* The inputs of a network, normalised. */
+/* The inputs of a network, as they are and normalised. */
 typedef struct {
+    float temp;
+    float slope;
     float z_temp;
     float z_slope;
 } FN(point_t);
@@ -106,6 +109,8 @@ static inline POINT FN(normalise)(const TABLE *table, float temp, float slope)
 {
     POINT in;
 
+    in.temp = temp;
+    in.slope = slope;
     in.z_temp = temp - table->scale[0].value;
     in.z_temp = in.z_temp * table->scale[1].value;
     in.z_temp = in.z_temp + 8.0F;
@@ -117,12 +122,14 @@ static inline POINT FN(normalise)(const TABLE *table, float temp, float slope)
 }
 
 /* One network: w0 + linear part + its Gaussians. */
-static inline float FN(network)(const gtc_word_t *network, const gtc_word_t *center, const POINT *in)
+static inline float FN(network)(const TABLE *table, const gtc_word_t *network,
+                                const gtc_word_t *center, const POINT *in)
 {
     const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
     float acc = network[1].value;
     float term;
 
+    (void)table;
     term = network[2].value * in->z_temp;
     acc = acc + term;
     term = network[3].value * in->z_slope;
@@ -164,12 +171,12 @@ static inline uint_least32_t FN(cell)(float x, const gtc_word_t *range, uint_lea
     return (position < last_edge) ? (uint_least32_t)position : last;
 }
 
-/* Cells of the inputs, T and slope. */
-static inline void FN(cells)(const TABLE *table, float temp, float slope, const uint_least32_t n[2],
-                      uint_least32_t cell[2])
+/* Cells of the inputs, T and slope, among n each. */
+static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_least32_t n[2],
+                             uint_least32_t cell[2])
 {
-    cell[0] = FN(cell)(temp, &table->envelope[0], n[0]);
-    cell[1] = FN(cell)(slope, &table->envelope[2], n[1]);
+    cell[0] = FN(cell)(in->temp, &table->envelope[0], n[0]);
+    cell[1] = FN(cell)(in->slope, &table->envelope[2], n[1]);
 }
 
 /* ---- the front end ---------------------------------------------------------------------- */

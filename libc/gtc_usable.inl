@@ -65,8 +65,8 @@ static int FN(centers_fit)(const TABLE *table)
 /* The envelope is a range (false for a NaN, too). */
 static int FN(envelope_fits)(const TABLE *table)
 {
-    return ((FROM_WORD(table->envelope[0]) <= FROM_WORD(table->envelope[1]))
-            && (FROM_WORD(table->envelope[2]) <= FROM_WORD(table->envelope[3]))) ? 1 : 0;
+    return ((MEMBER(table->envelope[0]) <= MEMBER(table->envelope[1]))
+            && (MEMBER(table->envelope[2]) <= MEMBER(table->envelope[3]))) ? 1 : 0;
 }
 
 int FN(is_usable)(const TABLE *table)

@@ -83,6 +83,10 @@ class Runtime:
         )
         return status, bits
 
+    def out_of_range(self) -> int:
+        """Claims about ranges that did not hold so far, in a build with `libc_counted.h`."""
+        return ctypes.c_long.in_dll(self.library, "shim_out_of_range").value
+
     def struct(self, table: Table) -> tuple[ctypes.Structure, list[Any]]:
         """The C struct of a table, and what must be kept alive with it."""
         struct = _table_struct(table.numeric)()
@@ -121,9 +125,7 @@ def runtime(compiler: str = "gcc", options: tuple[str, ...] = ("-O2",)) -> Runti
     folder = Path(tempfile.mkdtemp(prefix="gyrotc-test-"))
     library = folder / "libgtc.so"
     sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "py" / "libc_shim.c"]
-    command = [
-        compiler, *FLAGS, *options, "-shared", "-fPIC", "-I", str(ROOT / "include"), "-I", str(ROOT / "libc"),
-        "-o", str(library), *map(str, sources),
-    ]  # fmt: skip
-    subprocess.run(command, check=True)
+    folders = [f"-I{ROOT / name}" for name in ("include", "libc", "tests/py")]
+    command = [compiler, *FLAGS, *options, "-shared", "-fPIC", *folders, "-o", str(library)]
+    subprocess.run([*command, *map(str, sources)], check=True)
     return Runtime(ctypes.CDLL(str(library)))

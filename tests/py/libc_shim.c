@@ -34,3 +34,8 @@
     }
 
 SHIM(f32, float)
+SHIM(q31, int_least32_t)
+
+/* Claims of GTC_ASSERT_RANGE that did not hold; see libc_counted.h. */
+extern long shim_out_of_range;
+long shim_out_of_range;

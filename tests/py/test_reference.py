@@ -9,11 +9,18 @@ import numpy as np
 import pytest
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference import evaluate_map, replay
+from gyrotc.reference.q31 import GAUSS_ERROR, exp2
 from gyrotc.table import f32_words
 from libc_build import runtime
 from models import random_history, random_model
 
-BUILDS = [("gcc", ("-O2",)), ("clang", ("-O3",)), ("gcc", ("-O0",))]
+COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
+BUILDS = [
+    ("gcc", ("-O2",)),
+    ("clang", ("-O3",)),
+    ("gcc", ("-O0", COUNTED)),
+    ("gcc", ("-O2", COUNTED, "-DGTC_HALF_MULTIPLY=1")),
+]
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
@@ -28,10 +35,11 @@ def test_maps_agree_bit_for_bit(numeric: str, build: tuple[str, tuple[str, ...]]
     inside = rng.uniform(1.2 * low - 0.2 * high, 1.2 * high - 0.2 * low, (3000, 2))
     inputs = np.concatenate([table.encode_inputs(inside), rng.integers(0, 2**32, (3000, 2), dtype=np.uint32)])
     status, bits = evaluate_map(table, inputs)
-    got_status, got_bits = runtime(*build).maps(table, inputs)
+    c = runtime(*build)
+    got_status, got_bits = c.maps(table, inputs)
     np.testing.assert_array_equal(status, got_status)
     np.testing.assert_array_equal(bits, got_bits)
-    assert {0, 2} & set((status & 3).tolist())
+    assert c.out_of_range() == 0
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
@@ -43,11 +51,13 @@ def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> Non
     x, missed = random_history(model, seed, 1500, samples_per_block)
     channels = table.encode_inputs(x[:, None])
     want = replay(table, channels, missed=missed, samples_per_block=samples_per_block)
-    status, bits = runtime().steps(table, channels, missed, samples_per_block)
+    c = runtime("gcc", ("-O2", COUNTED))
+    status, bits = c.steps(table, channels, missed, samples_per_block)
     np.testing.assert_array_equal(want.missed_status, status[:, 0])
     np.testing.assert_array_equal(want.sample_status, status[:, 1])
     np.testing.assert_array_equal(want.status, status[:, 2])
     np.testing.assert_array_equal(want.bits, bits)
+    assert c.out_of_range() == 0
 
 
 def test_every_status_bit_was_seen_in_the_histories() -> None:
@@ -84,6 +94,16 @@ def test_self_test_finds_a_changed_weight_by_its_checksum_and_a_changed_probe_by
 def test_self_test_finds_fused_multiply_add() -> None:
     fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma"))
     assert fused.check(quantise(random_model(0), "f32")) == -3
+
+
+def test_the_fixed_point_gaussian_is_within_its_bound_for_every_argument() -> None:
+    """All u below 1 (2^24 of them), then a stretch of each further octave, at both ends of what truncates to u."""
+    octaves = [np.arange(k << 24, (k << 24) + (1 << 24 if k == 0 else 1 << 16)) for k in range(32)]
+    for u in octaves:
+        e = exp2(u.astype(np.uint64)).astype(np.float64) * 2.0**-31
+        for end in (u, u + 1):
+            worst = float(np.max(np.abs(e - np.exp2(-end / 2.0**24))))
+            assert worst < GAUSS_ERROR
 
 
 def test_a_negative_zero_does_not_reach_a_table() -> None:

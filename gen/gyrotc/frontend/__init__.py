@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from .believe import BELIEVED, HELD, RESTART, believe
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow
-from .numbers import F32, Arithmetic
+from .numbers import F32, Q31, Arithmetic
 from .training import Blocks, missed_before, run_blocks, samples_per_block
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "HELD",
     "KEEP",
     "MAP",
+    "Q31",
     "RESTART",
     "Arithmetic",
     "Blocks",

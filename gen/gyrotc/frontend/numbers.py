@@ -10,9 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["F32", "Arithmetic"]
+__all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
+_MISSING_Q31 = -(2**31)
 
 
 class Arithmetic(Protocol):
@@ -103,4 +104,51 @@ def moments(
     return n, sum_k, sum_kk
 
 
+class _Q31:
+    """Temperatures in 2^-16 C, held in int64; every result fits 32 bits, sums and products 64."""
+
+    plausible = (-90 * 65536, 200 * 65536)
+
+    def numbers(self, x: ArrayLike) -> Numbers:
+        return np.asarray(x, dtype=np.int64)
+
+    def missing(self, n: int) -> Numbers:
+        return np.full(n, _MISSING_Q31, dtype=np.int64)
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+        return np.asarray(x == _MISSING_Q31)
+
+    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any:
+        return divided(max_slope, samples_per_block)
+
+    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
+        return np.abs(a - b) <= max_step + samples * step
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        return np.asarray(np.add.accumulate(d, axis=1)[:, -1])
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers:
+        return np.asarray(a - b)
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+        return np.asarray(base + divided(total, n))
+
+    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
+        sum_d = np.zeros_like(d[0])
+        sum_kd = np.zeros_like(d[0])
+        for one, abscissa, there in zip(d, k, used, strict=True):
+            sum_d = sum_d + one * there
+            sum_kd = sum_kd + abscissa * one * there
+        n, sum_k, sum_kk = moments(k, used)
+        den = n * sum_kk - sum_k * sum_k
+        return divided(n * sum_kd - sum_k * sum_d, np.where(den > 0, den, 1))
+
+
+def divided(num: Any, den: Any) -> NDArray[np.int64]:
+    """num/den rounded to nearest, halves away from zero; den > 0."""
+    magnitude = np.abs(num) + np.asarray(den) // 2
+    return np.asarray(np.sign(num) * (magnitude // den))
+
+
 F32: Arithmetic = _F32()
+Q31: Arithmetic = _Q31()

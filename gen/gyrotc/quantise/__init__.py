@@ -11,16 +11,16 @@ from __future__ import annotations
 from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..table import Numeric, Table
-from . import f32
+from . import f32, q31
 from .probes import with_probes
 
 __all__ = ["NUMERICS", "Table", "quantise"]
 
 #: Arithmetics that the runtime has, the default first.
-NUMERICS: tuple[Numeric, ...] = ("f32",)
+NUMERICS: tuple[Numeric, ...] = ("f32", "q31")
 
 _SHARE_OF_FLOOR = 0.01
-_MAKERS = {"f32": f32.table_of}
+_MAKERS = {"f32": f32.table_of, "q31": q31.table_of}
 
 
 def quantise(model: Model, numeric: str) -> Table:

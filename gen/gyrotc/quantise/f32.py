@@ -15,6 +15,7 @@ from ..errors import CheckFailed
 from ..model import Model, Network
 from ..table import Table, Words, f32_words
 from .common import STEEPEST, max_slope_c, shared
+from .gradient import largest_gradient
 
 __all__ = ["table_of"]
 
@@ -44,7 +45,7 @@ def table_of(model: Model) -> Table:
     network = model.networks[0]
     centers = _centers(network, scale, per_block)
     head = np.concatenate([np.array([len(network.weights)], np.uint32), _head(network), envelope])
-    parts = _bound(network, scale, envelope, centers)
+    parts = _bound(network, scale, envelope, centers, per_block)
     return Table(
         numeric="f32",
         **shared(model),
@@ -111,7 +112,27 @@ def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.flo
     return f32_words(_flushed(records)).view(np.float32).reshape(-1, 5)
 
 
-def _bound(network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32]) -> dict[str, float]:
+def _gradient(
+    network: Network, scale: Words, envelope: Words, margin: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Largest slopes of the network over the envelope and `margin` around it, in normalised inputs."""
+    t0, t1, r0, r1 = _numbers(envelope).tolist()
+    corners = np.array([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
+    positions = [_normalised(scale, c_t, c_r * per_block) for c_t, c_r in network.centers]
+    inverse = [[1.0 / w if w is not None else 0.0 for w in pair] for pair in network.widths]
+    return largest_gradient(
+        np.array(network.linear),
+        np.array(positions).reshape(-1, 2),
+        np.array(inverse).reshape(-1, 2),
+        np.array(network.weights),
+        corners[0] - margin,
+        corners[1] + margin,
+    )
+
+
+def _bound(
+    network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32], per_block: float
+) -> dict[str, float]:
     """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
     t0, t1, r0, r1 = _numbers(envelope).tolist()
     offset = float(_numbers(scale)[0])
@@ -134,7 +155,7 @@ def _bound(network: Network, scale: Words, envelope: Words, centers: NDArray[np.
     kernel = (0.5 + 0.5 + 1.0 + 1.0 + 1.0) * _UNIT + argument + _POLYNOMIAL + 2.0**-32
     sizes = abs(network.w0) + float(linear @ largest) + total
     return {
-        "rounded inputs": float(linear @ z_error + weights @ (steep @ z_error)),
+        "rounded inputs": float(_gradient(network, scale, envelope, per_block, z_error) @ z_error),
         "rounded centers": float(np.sum(weights[:, None] * steep * center_error)),
         "rounded weights": _UNIT * (abs(network.w0) + 2.0 * float(linear @ largest) + total),
         "Gaussian": kernel * total,

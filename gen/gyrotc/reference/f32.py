@@ -6,6 +6,7 @@ made with decimal arithmetic at 60 digits.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from decimal import Context, Decimal
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..table import Table, Words
 
-__all__ = ["CUT", "ENTRIES", "P1", "P2", "cells", "exp2_table", "gauss", "network_bits"]
+__all__ = ["CUT", "ENTRIES", "P1", "P2", "cells", "exp2_table", "gauss", "network_bits", "normalise"]
 
 ENTRIES = 64
 CUT = np.float32(32 * ENTRIES)
@@ -50,20 +51,29 @@ def gauss(u: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(np.where(inside, e, np.float32(0.0)))
 
 
-def normalise(table: Table, x: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Inputs of the network, multiples of 2^-21."""
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Inputs as they are, shape (n, 2), and normalised: multiples of 2^-21."""
+
+    x: NDArray[np.float32]
+    z_t: NDArray[np.float32]
+    z_r: NDArray[np.float32]
+
+
+def normalise(table: Table, x: NDArray[np.float32]) -> Points:
+    """What the network sees of inputs (T, slope per block) that lie inside the envelope."""
     scale = table.numbers(table.scale)
     z_t = x[:, 0] - scale[0]
     z_t = z_t * scale[1]
     z_t = (z_t + _EIGHT) - _EIGHT
     z_r = x[:, 1] * scale[2]
     z_r = (z_r + _EIGHT) - _EIGHT
-    return z_t, z_r
+    return Points(x, z_t, z_r)
 
 
-def network_bits(table: Table, x: NDArray[np.float32]) -> Words:
-    """Bits of the bias at inputs (T, slope per block) that lie inside the envelope, shape (n, 2)."""
-    z_t, z_r = normalise(table, x)
+def network_bits(table: Table, points: Points) -> Words:
+    """Bits of the bias."""
+    z_t, z_r = points.z_t, points.z_r
     network = table.numbers(table.networks)
     acc = network[1] + network[2] * z_t
     acc = acc + network[3] * z_r
@@ -77,10 +87,10 @@ def network_bits(table: Table, x: NDArray[np.float32]) -> Words:
     return np.asarray(acc).view(np.uint32)
 
 
-def cells(table: Table, x: NDArray[np.float32]) -> NDArray[np.int64]:
+def cells(table: Table, points: Points) -> NDArray[np.int64]:
     """Cells of the coverage map, (T, slope), shape (n, 2)."""
     envelope = table.numbers(table.envelope)
-    columns = [_cell(x[:, k], envelope[2 * k : 2 * k + 2], table.coverage_cells[k]) for k in (0, 1)]
+    columns = [_cell(points.x[:, k], envelope[2 * k : 2 * k + 2], table.coverage_cells[k]) for k in (0, 1)]
     return np.stack(columns, axis=1)
 
 

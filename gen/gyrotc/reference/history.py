@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frontend import F32, FALLBACK, KEEP, MAP, Arithmetic, Settings, Steps, expand_missed, follow
+from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, expand_missed, follow
 from ..table import Table, Words
 from .maps import evaluate_map
 
@@ -138,7 +138,7 @@ def _settings(table: Table, samples_per_block: int) -> Settings:
 
 
 def _arithmetic(table: Table) -> Arithmetic:
-    return F32
+    return F32 if table.numeric == "f32" else Q31
 
 
 def _corrections(table: Table, steps: Steps) -> tuple[NDArray[np.int32], Words]:

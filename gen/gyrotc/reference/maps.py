@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import Table, Words
-from . import f32
+from ..table import MISSING_Q31, Table, Words
+from . import f32, q31
 
 __all__ = ["CLAMPED", "E_ARG", "UNCOVERED", "evaluate_map"]
 
@@ -31,19 +31,20 @@ def evaluate_map(table: Table, inputs: Words) -> tuple[NDArray[np.int32], Words]
     low, high = table.numbers(table.envelope).reshape(2, 2).T
     status = np.where(np.any((x < low) | (x > high), axis=1), CLAMPED, 0)
     x = np.minimum(np.maximum(x, low), high)
-    status = status | np.where(_is_covered(table, x), 0, UNCOVERED)
-    bias = f32.network_bits(table, x)
+    kernel = f32 if table.numeric == "f32" else q31
+    points = kernel.normalise(table, x)
+    status = status | np.where(_is_covered(table, kernel.cells(table, points)), 0, UNCOVERED)
+    bias = kernel.network_bits(table, points)
     status = np.where(usable, status, E_ARG).astype(np.int32)
     return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
 
 
 def _is_missing(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray(~np.isfinite(x))
+    return np.asarray(~np.isfinite(x) if table.numeric == "f32" else x == MISSING_Q31)
 
 
-def _is_covered(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:
+def _is_covered(table: Table, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
     if table.coverage.size == 0:
-        return np.ones(len(x), dtype=np.bool_)
-    cell = f32.cells(table, x)
+        return np.ones(len(cell), dtype=np.bool_)
     index = cell[:, 1] * table.coverage_cells[0] + cell[:, 0]
     return np.asarray((table.coverage[index >> 5] >> (index & 31).astype(np.uint32)) & 1).astype(np.bool_)

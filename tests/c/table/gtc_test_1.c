@@ -13,40 +13,43 @@
 #error "gtc_test_1.c was written for table layout 1: emit it again with the gyrotc of this runtime"
 #endif
 
+#define V(x) { .value = (x) } /* a float32 number */
+#define B(x) { .bits = (x) }  /* an integer */
+
 /* ---- float32 ---- */
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[8] = {
-    { .bits = 0x3UL }, { .value = 0.125F }, { .value = 0.5F }, { .value = -0.25F }, { .value = -20.0F }, { .value = 60.0F }, { .value = -0.5F }, { .value = 0.5F },
+    B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t f32_centers[15] = {
-    { .value = -0.75F }, { .value = 24.0224476F }, { .value = 0.166666985F }, { .value = 9.60897923F }, { .value = 0.75F },
-    { .value = 0.0F }, { .value = 16.0149651F }, { .value = 0.0F }, { .value = 0.0F }, { .value = -1.25F },
-    { .value = 0.0F }, { .value = 0.0F }, { .value = -0.5F }, { .value = 13.7271128F }, { .value = 0.3125F },
+    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
 static const gtc_word_t f32_coverage[1] = {
-    { .bits = 0xfc7f0fUL },
+    B(0xfc7f0fUL),
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t f32_sigma[2] = {
-    { .value = 0.00999999978F }, { .value = 0.0199999996F },
+    V(0.00999999978F), V(0.0199999996F),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
-    { .value = 40.390213F }, { .value = 0.0698402897F }, { .value = -0.12677373F }, { .bits = 0x0UL },
-    { .value = 20.780426F }, { .value = -0.360319406F }, { .value = -0.642388165F }, { .bits = 0x4UL },
-    { .value = 1.17063987F }, { .value = 0.209520876F }, { .value = -0.402597129F }, { .bits = 0x0UL },
-    { .value = -18.439146F }, { .value = -0.220638841F }, { .value = 0.361409187F }, { .bits = 0x0UL },
-    { .value = 41.9510651F }, { .value = 0.349201441F }, { .value = -0.300033271F }, { .bits = 0x0UL },
-    { .value = 22.34128F }, { .value = -0.0809582546F }, { .value = -0.784616113F }, { .bits = 0x0UL },
-    { .value = -40.0F }, { .value = -0.75F }, { .value = 0.115000188F }, { .bits = 0x2UL },
-    { .value = 80.0F }, { .value = 0.75F }, { .value = 0.300446272F }, { .bits = 0x2UL },
+    V(40.390213F), V(0.0698402897F), V(-0.12677373F), B(0x0UL),
+    V(20.780426F), V(-0.360319406F), V(-0.642388165F), B(0x4UL),
+    V(1.17063987F), V(0.209520876F), V(-0.402597129F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(0.361409187F), B(0x0UL),
+    V(41.9510651F), V(0.349201441F), V(-0.300033271F), B(0x0UL),
+    V(22.34128F), V(-0.0809582546F), V(-0.784616113F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
+    V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
 };
 
 const gtc_f32_table_t gtc_test_1_f32 = {
@@ -58,11 +61,11 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .hold_blocks = 2UL,
     .stuck_samples = 12UL,
     .bias_frac_bits = 0UL,
-    .max_step = { .value = 0.5F },
-    .max_slope = { .value = 1.0F },
-    .fallback = { .value = 0.375F },
-    .scale = { { .value = 20.0F }, { .value = 0.0250000004F }, { .value = 2.0F } },
-    .envelope = { { .value = -20.0F }, { .value = 60.0F }, { .value = -0.5F }, { .value = 0.5F } },
+    .max_step = V(0.5F),
+    .max_slope = V(1.0F),
+    .fallback = V(0.375F),
+    .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
+    .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
     .n_centers = 3UL,
     .n_channels = 1UL,
@@ -77,6 +80,74 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .sigma = f32_sigma,
     .probes = f32_probes,
     .crc = 0x7b3f8558UL,
+    .term_code = { NULL },
+    .serial = "TEST-1",
+};
+
+/* ---- fixed point ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t q31_networks[8] = {
+    B(0x3UL), B(0x03ffd38bUL), B(0x1fffa694UL), B(0xf0002324UL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t q31_centers[15] = {
+    B(0x0000300cUL), B(0x12048331UL), B(0x00001338UL), B(0xfe66019aUL), B(0x17ffaaa3UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x00002008UL), B(0x00000882UL), B(0x00000000UL), B(0x00000000UL), B(0xd8000faeUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x00001b74UL), B(0x06dcf923UL), B(0x0a002a0fUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* one bit for each cell of T (fastest) and slope, low bit first */
+static const gtc_word_t q31_coverage[1] = {
+    B(0xfc7f0fUL),
+};
+
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t q31_sigma[2] = {
+    B(0x0051eb85UL), B(0x00a3d70aUL),
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t q31_probes[32] = {
+    B(0x002863e5UL), B(0x000011e1UL), B(0xfbf17823UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xeb717a60UL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xf31dcbcbUL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x0b90b221UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xf6663f34UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xe6e486feUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x03ae1323UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x099d0059UL), B(0x2UL),
+};
+
+const gtc_q31_table_t gtc_test_1_q31 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0x362c9816UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 12UL,
+    .bias_frac_bits = 29UL,
+    .max_step = 32768L,
+    .max_slope = 65536L,
+    .fallback = 201326592L,
+    .scale = { -1310760L, 838854L, -32769L, 67107840L, 2L, 0L },
+    .envelope = { -1310720L, 3932160L, -32768L, 32768L },
+    .n_networks = 1UL,
+    .n_centers = 3UL,
+    .n_channels = 1UL,
+    .n_terms = 0UL,
+    .coverage_cells = { 8UL, 3UL },
+    .sigma_cells = { 2UL, 1UL },
+    .n_probes = 8UL,
+    .networks = q31_networks,
+    .centers = q31_centers,
+    .terms = NULL,
+    .coverage = q31_coverage,
+    .sigma = q31_sigma,
+    .probes = q31_probes,
+    .crc = 0xa2be866aUL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };

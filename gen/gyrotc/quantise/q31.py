@@ -1,0 +1,211 @@
+"""Fixed-point tables: (s, k) of every Gaussian rounded first, the linear weights solved again with them.
+
+The weights are solved against the model over the whole envelope, in closed form: the Gaussians are
+products of functions of one input, so the Gram matrix of a grid is the product of two small ones. The
+bound is proved from a grid of the difference and what its derivative allows between grid points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CheckFailed
+from ..model import Model
+from ..reference.q31 import GAUSS_ERROR
+from ..table import Table
+from .common import max_slope_c, shared
+from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
+from .solve import gram, solve
+
+__all__ = ["table_of"]
+
+_INPUT = 65536.0  # units of a temperature in C
+_MAX_SPAN = 2**26
+_FINEST = 28  # largest number of fraction bits of an argument
+_LARGEST_ARGUMENT = 2**31 - 1
+_MAX_FACTOR = 65535  # of s: its product with a position keeps within 32 bits
+_SOLVE_POINTS = 256
+_RIDGE = 1e-6
+_GRID_CELLS = 512
+
+Floats = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Gaussians:
+    """Rounded Gaussians: arguments s x + k in 2^-fraction."""
+
+    factor: NDArray[np.int64]  # s, shape (n, 2)
+    offset: NDArray[np.int64]  # k
+    fraction: int
+
+    def on(self, surface: Surface) -> Surface:
+        """The surface with these Gaussians in place of its own."""
+        alpha = self.factor * 2.0**-self.fraction
+        center = np.divide(-self.offset, self.factor, out=np.zeros(alpha.shape), where=self.factor > 0)
+        return replace(surface, alpha=alpha, center=center)
+
+
+def table_of(model: Model) -> Table:
+    """The table, without known answers.
+
+    Raises:
+        CheckFailed: The model cannot be held in fixed point, with the reason.
+    """
+    if len(model.networks) > 1 or model.terms:
+        raise CheckFailed("q31: this version has no model banks and no extension terms")
+    per_block = model.block_s / 60.0
+    envelope = _envelope(model, per_block)
+    inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
+    exact = surface_of(model.networks[0], model.scale, per_block, inputs)
+    felt = _felt(exact)
+    lost = float(np.add.accumulate([0.0, *np.abs(exact.weights[~felt])])[-1])
+    exact = _chosen(exact, felt)
+    gaussians = _rounded(exact)
+    solved = _solved(exact, gaussians.on(exact))
+    frac_bits = _frac_bits(solved, model.fallback_dph)
+    whole = _whole(solved, frac_bits)
+    final = _in_dph(gaussians.on(solved), whole, frac_bits)
+    parts = {
+        "rounded inputs": _input_error(exact, inputs),
+        "rounded parameters": difference(exact, final, _GRID_CELLS),
+        "Gaussian": (GAUSS_ERROR + 2.0**-31) * math.fsum(abs(w) for w in final.weights) + lost * 2.0**-32,
+        "rounded result": 2.0 ** -(frac_bits + 1),
+    }
+    return _table(model, envelope, inputs, gaussians, whole, frac_bits, parts)
+
+
+def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
+    """T min, T max, slope min, slope max in 2^-16 C and 2^-16 C per block."""
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    low_t, high_t, low_r, high_r = (round(v * _INPUT) for v in (t0, t1, r0 * per_block, r1 * per_block))
+    if max(high_t - low_t, high_r - low_r) >= _MAX_SPAN - 1024:
+        raise CheckFailed("q31: the envelope spans more than 1023 C, or 1023 C per block")
+    return low_t, high_t, low_r, high_r
+
+
+def _felt(surface: Surface) -> NDArray[np.bool_]:
+    """Gaussians that reach 2^-32 somewhere in the envelope."""
+    beyond = np.maximum(np.abs(surface.center) - POSITIONS / 2, 0.0) * surface.alpha
+    return np.asarray(beyond[:, 0] ** 2 + beyond[:, 1] ** 2 < 32.0)
+
+
+def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
+    return replace(
+        surface, alpha=surface.alpha[keep], center=surface.center[keep], weights=surface.weights[keep]
+    )
+
+
+def _rounded(surface: Surface) -> _Gaussians:
+    """s and k of every Gaussian, with as many fraction bits as the farthest argument leaves."""
+    farthest = (np.abs(surface.center) + POSITIONS / 2) * surface.alpha
+    largest = float(np.max(farthest, initial=1.0))
+    fraction = min(_FINEST, 30 - math.frexp(largest)[1])
+    while True:
+        factor = np.rint(surface.alpha * 2.0**fraction).astype(np.int64)
+        offset = np.rint(-factor * surface.center).astype(np.int64)
+        reach = np.abs(offset) + factor * (POSITIONS // 2)
+        if np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(factor, initial=0) <= _MAX_FACTOR:
+            return _Gaussians(factor, offset, fraction)
+        fraction -= 1
+
+
+def _columns(surface: Surface) -> tuple[Floats, Floats]:
+    """Factors of constant, linear parts and Gaussians on the grid: for T and for the slope."""
+    x = -POSITIONS / 2 + (np.arange(_SOLVE_POINTS) + 0.5) * (POSITIONS / _SOLVE_POINTS)
+    one, ramp = np.ones((x.size, 1)), x[:, None] / POSITIONS
+    first = np.concatenate([one, ramp, one, surface.factors(0, x)], axis=1)
+    second = np.concatenate([one, one, ramp, surface.factors(1, x)], axis=1)
+    return first, second
+
+
+def _solved(exact: Surface, rounded: Surface) -> Surface:
+    """Weights for the rounded Gaussians that come nearest to the exact surface, close to its own."""
+    old_t, old_r = _columns(exact)
+    new_t, new_r = _columns(rounded)
+    normal = gram(new_t, new_t) * gram(new_r, new_r)
+    cross = gram(new_t, old_t) * gram(new_r, old_r)
+    values = np.array([exact.w0, *exact.linear, *exact.weights])
+    right = np.zeros(len(values))
+    for k, value in enumerate(values):
+        right = right + value * (cross[:, k] - normal[:, k])
+    diagonal = np.arange(len(values))
+    normal[diagonal, diagonal] += _RIDGE * _SOLVE_POINTS**2
+    values = values + solve(normal, right)
+    return replace(exact, w0=float(values[0]), linear=values[1:3], weights=values[3:])
+
+
+def _frac_bits(surface: Surface, fallback: float) -> int:
+    """Most fraction bits of a bias with which no sum leaves its word."""
+    parts = [surface.w0, *surface.linear, *surface.weights]
+    largest = max(math.fsum(abs(p) for p in parts), abs(fallback), 2.0**-30)
+    bits = 30 - math.frexp(largest)[1]
+    if bits < 0:
+        raise CheckFailed(f"q31: weights of {largest:.3g} deg/h in all leave the range of 32 bits")
+    return min(bits + 1, 60) if largest * 2.0 ** (bits + 1) < 2**31 - 1024 else bits
+
+
+def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:
+    """w0, linear parts and weights as integers."""
+    values = np.array([surface.w0, *surface.linear, *surface.weights])
+    return np.rint(values * 2.0**frac_bits).astype(np.int64)
+
+
+def _in_dph(surface: Surface, whole: NDArray[np.int64], frac_bits: int) -> Surface:
+    values = whole * 2.0**-frac_bits
+    return replace(surface, w0=float(values[0]), linear=values[1:3], weights=values[3:])
+
+
+def _input_error(exact: Surface, inputs: Inputs) -> float:
+    """Largest effect of an input that is moved to the middle of its cell, deg/h."""
+    moved = [0.5 + 0.5 * i.per_unit for i in inputs]  # the second: edges of the envelope are rounded, too
+    return math.fsum(moved[k] * exact.steepest(k, _GRID_CELLS) for k in (0, 1))
+
+
+def _table(
+    model: Model,
+    envelope: tuple[int, int, int, int],
+    inputs: Inputs,
+    gaussians: _Gaussians,
+    whole: NDArray[np.int64],
+    frac_bits: int,
+    parts: dict[str, float],
+) -> Table:
+    unit = 2.0**frac_bits
+    narrow = 2 * (_FINEST - gaussians.fraction)
+    records = np.stack(
+        [*np.stack([gaussians.factor, gaussians.offset], axis=2).reshape(len(whole) - 3, 4).T, whole[3:]],
+        axis=1,
+    )
+    scale = [v for i in inputs for v in (i.zero, i.gain)]
+    return Table(
+        numeric="q31",
+        **shared(model),
+        bias_frac_bits=frac_bits,
+        max_step=_word(min(round(model.max_step_c * _INPUT), 2**31 - 1)),
+        max_slope=_word(min(round(max_slope_c(model) * _INPUT), 2**31 - 1)),
+        fallback=_word(round(model.fallback_dph * unit)),
+        scale=tuple(_word(v) for v in (*scale, narrow, 0)),
+        envelope=tuple(_word(v) for v in envelope),
+        networks=_words(np.concatenate([[len(whole) - 3], whole[:3], envelope])),
+        centers=_words(records),
+        terms=np.zeros(0, dtype=np.uint32),
+        sigma=_words(np.rint(np.array(model.uncertainty_dph.rows) * unit) if model.uncertainty_dph else []),
+        probes=np.zeros(0, dtype=np.uint32),
+        error_bound_dph=math.fsum(parts.values()),
+        bound_parts_dph=parts,
+    )
+
+
+def _word(value: int) -> int:
+    return int(value) & 0xFFFFFFFF
+
+
+def _words(values: object) -> NDArray[np.uint32]:
+    whole = np.asarray(values).reshape(-1).astype(np.int64)
+    return (whole & 0xFFFFFFFF).astype(np.uint32)

@@ -1,0 +1,100 @@
+"""The map in fixed point: docs/numerics.md, section 3, in numpy integers of 64 bits.
+
+Every product fits: inputs have 16 bits, arguments 31, entries of the table 31, weights 31.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..table import Table, Words
+
+__all__ = [
+    "CUT",
+    "ENTRIES",
+    "GAUSS_ERROR",
+    "POSITION_BITS",
+    "Points",
+    "cells",
+    "exp2",
+    "exp2_table",
+    "network_bits",
+    "normalise",
+]
+
+ENTRIES = 64
+CUT = 32 << 24  # u in 2^-24
+POSITION_BITS = 26  # gain of an input: position = offset * gain * 2^-26
+_TOP = 2147483603  # just under 2^31, so that truncating u errs to both sides alike
+_B = np.uint64(2977018596)  # 2^-38
+_C = np.uint64(979)  # 2^-24
+#: |2^-31 exp2(u) - 2^-v| for every v that truncates to u, from visiting every u (tests/py/test_reference.py)
+GAUSS_ERROR = 3.05e-8
+
+Integers = NDArray[np.int64]
+
+
+def exp2_table() -> NDArray[np.uint64]:
+    """round(2147483603 · 2^(-i/64)), i = 0 ... 63."""
+    context = Context(prec=60)
+    exact = [_TOP * context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
+    return np.array([int(e.to_integral_value(ROUND_HALF_EVEN)) for e in exact], dtype=np.uint64)
+
+
+_TABLE = exp2_table()
+
+
+def exp2(u: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """2^-u in 2^-31, for u in 2^-24, 0 <= u < CUT."""
+    t = (u << np.uint64(14)) & np.uint64(0xFFFFFFFF)
+    slope = _B - _C * ((u >> np.uint64(4)) & np.uint64(0x3FFF))
+    drop = (t * slope) >> np.uint64(32)
+    entry = _TABLE[((u >> np.uint64(18)) & np.uint64(63)).astype(np.int64)]
+    fall = ((entry * drop) >> np.uint64(32)) >> np.uint64(6)
+    return np.asarray((entry - fall) >> (u >> np.uint64(24)))
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Inputs over the envelope, -2^15 ... 2^15 - 1."""
+
+    x_t: Integers
+    x_r: Integers
+
+
+def normalise(table: Table, x: Integers) -> Points:
+    """What the network sees of inputs (T, slope per block in 2^-16 C) inside the envelope, shape (n, 2)."""
+    scale = [int(s) for s in table.numbers(table.scale)]
+    return Points(_position(x[:, 0], scale[0], scale[1]), _position(x[:, 1], scale[2], scale[3]))
+
+
+def _position(x: Integers, zero: int, gain: int) -> Integers:
+    offset = (x - zero).astype(np.uint64) << np.uint64(6)
+    position = (offset * np.uint64(gain & 0xFFFFFFFF)) >> np.uint64(32)
+    return np.asarray(position.astype(np.int64) - 32768)
+
+
+def network_bits(table: Table, points: Points) -> Words:
+    """Bits of the bias."""
+    narrow = int(table.scale[4])
+    _, w0, linear_t, linear_r, *_ = (int(n) for n in table.numbers(table.networks))
+    acc = (linear_t * points.x_t + linear_r * points.x_r) * 32768
+    acc = acc + w0 * 2**31 + 2**30
+    for s_t, k_t, s_r, k_r, weight in table.numbers(table.centers).reshape(-1, 5):
+        a = (s_t * points.x_t + k_t).astype(np.uint64)  # squares are those of the signed number, mod 2^64
+        b = (s_r * points.x_r + k_r).astype(np.uint64)
+        u = (a * a + b * b) >> np.uint64(32 - narrow)
+        inside = u < CUT
+        e = exp2(np.where(inside, u, np.uint64(0))).astype(np.int64)
+        acc = acc + np.where(inside, weight * e, 0)
+    return np.asarray(acc >> 31).astype(np.int32).view(np.uint32)
+
+
+def cells(table: Table, points: Points) -> Integers:
+    """Cells of the coverage map, (T, slope), shape (n, 2)."""
+    n_t, n_r = table.coverage_cells
+    return np.stack([((points.x_t + 32768) * n_t) >> 16, ((points.x_r + 32768) * n_r) >> 16], axis=1)

@@ -1,0 +1,22 @@
+/* gtc_selftest_q31.h - the fixed-point operations that a compiler could get wrong.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_SELFTEST_Q31_H_INCLUDED
+#define GTC_SELFTEST_Q31_H_INCLUDED
+
+/* 1 if long products come out whole; the operands are read where the compiler cannot foresee them. */
+static int FN(primitives_work)(void)
+{
+    static const uint_least32_t operands[3] = {0xFFFFFFFFUL, 0x80000001UL, 0x7FFFFFFFUL};
+    const volatile uint_least32_t *const operand = operands;
+    const uint_least32_t a = operand[0];
+    const uint_least32_t b = operand[1];
+    const int_least32_t c = (int_least32_t)operand[2];
+
+    return ((FN(high)(a, b) == 0x80000000UL) && (FN(high)(a, a) == 0xFFFFFFFEUL)
+            && (FN(high_of_squares)(c, -c) == 0x7FFFFFFEUL)
+            && (FN(accumulate)(1, -c, (uint_least32_t)c) == -4611686014132420608LL)) ? 1 : 0;
+}
+
+#endif /* GTC_SELFTEST_Q31_H_INCLUDED */
