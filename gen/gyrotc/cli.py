@@ -132,6 +132,38 @@ def simulate(
 
 
 @app.command()
+def check(
+    dataset: DatasetArg,
+    axis: AxisOption = None,
+    envelope: Annotated[
+        str | None,
+        typer.Option("--envelope", help="What training should cover, C and C/min, e.g. -40:60,-5:5."),
+    ] = None,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Tell everything that is wrong or doubtful about recordings, at once; also while they still grow.
+
+    Example: gyrotc check recordings
+    """
+    from .applied import applied_of
+    from .check import check as run
+    from .check import envelope_of
+
+    result = run(
+        dataset,
+        axis=axis,
+        envelope=envelope_of(envelope) if envelope is not None else None,
+        applied=applied_of(applied) if applied else None,
+    )
+    _write_json(json_file, result.to_dict())
+    for line in result.lines():
+        _OUT.print(line, highlight=False, soft_wrap=True, markup=False)
+    if result.problems:
+        raise typer.Exit(2)
+
+
+@app.command()
 def fit(
     dataset: DatasetArg,
     out: OutOption,

@@ -79,7 +79,7 @@ def jump_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
         file, first = jumps[0]
         yield _finding(
             "jump_in_temperature",
-            f"Temperature jumps {len(jumps)} times as no thermal mass can, first in {file} at "
+            f"Temperature jumps as no thermal mass can ({len(jumps)} places), first in {file} at "
             f"{first.time_s:.6g} s from {first.from_c:.6g} to {first.to_c:.6g} C.",
             jumps=[
                 {"file": name, "time_s": j.time_s, "from_c": j.from_c, "to_c": j.to_c} for name, j in jumps

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .records import Floats, Rows, Run
+from .records import EarthRate, Floats, Rows, Run
 
 __all__ = ["Jump", "RunFacts", "facts_of"]
 
@@ -60,6 +60,7 @@ class RunFacts:
         outliers: Rows whose rate departs from both neighbours by more than 8 times that.
         stuck_s: Longest stretch of one identical rate.
         constant: Columns that hold one value only.
+        earth: Earth's rate that was taken off, None where there was nothing to take off.
     """
 
     file: str
@@ -86,6 +87,7 @@ class RunFacts:
     outliers: int
     stuck_s: float
     constant: tuple[str, ...]
+    earth: EarthRate | None
 
 
 def facts_of(run: Run, rows: Rows) -> RunFacts:
@@ -125,6 +127,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         outliers=_outliers(rate, float(noise)),
         stuck_s=_longest_stretch(rate) * run.row_period_s,
         constant=_constant(rows, inside, rate),
+        earth=run.earth,
     )
 
 
