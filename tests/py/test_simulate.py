@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import secrets
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
+import allantools
 import numpy as np
 import pytest
 from gyrotc.dataset import load
@@ -270,6 +273,59 @@ def test_every_scenario_that_is_shipped_runs_and_loads(tmp_path: Path) -> None:
         assert {run.role for run in dataset.runs} == {"train", "exam"}, name
         hours = sum(len(run.rows().time_s) for run in dataset.runs) / 36.0
         assert hours == (96.0 if len(dataset.runs) == 12 else 16.0), name
+
+
+LONG = """
+title = "Two days at rest"
+
+[noise]
+arw_deg_per_sqrt_h = 1e-3
+bias_instability_dph = 1e-3
+rate_random_walk_dph_per_sqrt_h = 5e-3
+quantum_arcsec = 0.5
+
+[profile.hold]
+start_c = 20.0
+record_from_min = 240
+record_min = 2880
+steps = [{hold_min = 60}]
+
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = ["hold", "hold", "hold", "hold"]
+"""
+
+
+def test_allantools_finds_the_declared_noise_in_a_recording(tmp_path: Path) -> None:
+    """Allan variance of whole recordings: the sum of the four declared terms, each of which rules somewhere."""
+    seed = secrets.randbits(32)
+    print(f"seed {seed}")
+    path = tmp_path / "long.toml"
+    path.write_text(LONG, "utf-8")
+    folder = made(path, tmp_path / "data", seed=seed, row_s=1.0, format="parquet")
+    taus = np.array([1.0, 10.0, 100.0, 1000.0, 5000.0])
+    rates = [run.rows().rate_dph for run in load(folder).runs]
+    found = [allantools.oadev(rate, rate=1.0, data_type="freq", taus=taus)[1] for rate in rates]
+    quantum = 0.25 * 0.5**2 / taus**2
+    white = 1e-3**2 * 3600.0 / taus
+    flicker = 2.0 * np.log(2.0) / np.pi * 1e-3**2
+    walk = 5e-3**2 * taus / 3600.0 / 3.0
+    expected = np.sqrt(quantum + white + flicker + walk)
+    assert np.sqrt(np.mean(np.square(found), axis=0))[:4] == pytest.approx(expected[:4], rel=0.15)
+    assert np.sqrt(np.mean(np.square(found), axis=0))[4] == pytest.approx(expected[4], rel=0.5)
+    assert (quantum > white)[0] and (white > quantum + flicker + walk)[2] and (walk > white + flicker)[4]
+
+
+def test_the_memory_does_not_grow_with_the_rows(short: Path, tmp_path: Path) -> None:
+    """2.4 million rows a run in less than 80 MB; held at once they would take some 200."""
+    tracemalloc.start()
+    try:
+        made(short, tmp_path / "data", raw_hz=2000.0, format="parquet")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert load(tmp_path / "data").runs[0].row_period_s == pytest.approx(5e-4)
+    assert peak < 80e6
 
 
 def test_class_noise_is_that_of_an_ordinary_unit() -> None:

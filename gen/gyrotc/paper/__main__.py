@@ -1,4 +1,4 @@
-"""`python -m gyrotc.paper docs/paper.md`: every table and figure of the page made again."""
+"""`python -m gyrotc.paper docs`: every table and figure of docs/paper.md made again, and the run in simulation.md."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ..simulate.campaign import Noise
+from ..simulate import read
+from ..simulate.campaign import Noise, campaign, with_noise
 from .experiment import Experiment, experiment
-from .figures import draw
+from .figures import draw, draw_run
 from .page import filled, gyros_table, scatter_table, table_1, times_table
 
 _GYROS = range(1, 11)
+_RUN = "5 C/min"
 
 
 def _experiments(noise: Noise) -> list[Experiment]:
@@ -19,8 +21,7 @@ def _experiments(noise: Noise) -> list[Experiment]:
         return [experiment(seed, noise, Path(folder) / "data") for seed in _GYROS]
 
 
-def main(page: Path) -> None:
-    """Writes the tables into `page` and the figures into the folder of the same name beside it."""
+def _write_paper(page: Path) -> None:
     paper, ordinary = _experiments("paper"), _experiments("class")
     parts = {
         "table-1": table_1(paper[0], published=True),
@@ -30,8 +31,16 @@ def main(page: Path) -> None:
         "times": times_table(paper[0]),
     }
     page.write_text(filled(page.read_text("utf-8"), parts), "utf-8")
-    figures = draw(paper[0], page.with_suffix(""))
-    print(f"{page} and {len(figures)} figures in {page.with_suffix('')}")
+    draw(paper[0], page.with_suffix(""))
+
+
+def main(docs: Path) -> None:
+    """Writes tables into `docs/paper.md`, figures into `docs/paper/`, one run into `docs/simulation/`."""
+    _write_paper(docs / "paper.md")
+    plan = with_noise(read("paper-5C-min")[1], "paper")
+    run = next(iter(campaign(plan, _GYROS[0])))
+    draw_run(run, f"Chamber at {_RUN}", docs / "simulation" / "run.svg")
+    print(f"{docs / 'paper.md'} and the figures beside it")
 
 
 if __name__ == "__main__":

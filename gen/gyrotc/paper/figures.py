@@ -1,4 +1,4 @@
-"""Figures 5 to 11 of the paper again, from simulated recordings: SVG files. Draws; computes nothing."""
+"""Figures 5 to 11 of the paper again, and one simulated run as a chamber record: SVG files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots import AFTER, BEFORE, svg
-from .experiment import Cell, Experiment
+from ..plots import AFTER, BEFORE, COVERED, svg
+from ..simulate.instrument import Record
+from ..simulate.noise import CELL_S
+from .experiment import AVERAGE_S, Cell, Experiment
 from .published import ENVIRONMENTS
 
-__all__ = ["FIGURES", "draw"]
+__all__ = ["FIGURES", "draw", "draw_run"]
 
 _STYLE: Any = {
     "svg.hashsalt": "gyrotc",
@@ -98,3 +100,30 @@ def _line(
         panel(ax, cell, part)
         ax.set_title(f"({letter}) {name}", fontsize=8.5, loc="left")
     axes[0].set_ylabel("1e-3 deg/h")
+
+
+def draw_run(record: Record, title: str, path: Path) -> None:
+    """Writes one simulated run: temperatures, and the bias under its noise, over hours."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    hours = CELL_S * np.arange(len(record.cavity_c)) / 3600.0
+    average = round(AVERAGE_S / CELL_S)
+    measured, true = (
+        np.diff(angle[::average]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec)
+    )
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True)
+        above.plot(hours, record.air_c, color=COVERED, linewidth=0.8, label="air in the chamber")
+        above.plot(hours[:-1], record.reading_c, color=BEFORE, linewidth=1.2, label="sensor on the block")
+        above.plot(hours, record.cavity_c, color=AFTER, linewidth=0.8, linestyle="--", label="cavity")
+        above.set_ylabel("C")
+        below.plot(
+            hours[average::average], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s"
+        )
+        below.plot(hours[average::average], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
+        below.set_ylabel("1e-3 deg/h")
+        below.set_xlabel("time since power-on, h")
+        for ax in (above, below):
+            ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
+        path.write_text(svg(figure), "utf-8")

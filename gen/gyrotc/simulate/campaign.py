@@ -22,7 +22,7 @@ from .truth import FILE as TRUTH_FILE
 from .truth import SCHEMA
 from .write import Format, RunFile, complete_folder, dataset_toml
 
-__all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate"]
+__all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
 
 Noise = Literal["paper", "class"]
 
@@ -81,7 +81,7 @@ def simulate(
     """
     name, plan = read(scenario)
     length = RowLength.of(row_s, raw_hz)
-    plan = _with_noise(plan, noise)
+    plan = with_noise(plan, noise)
     weight = _pulse_weight(plan.noise) if pulses else None
     runs = _planned(plan)
     report = progress or (lambda share: None)
@@ -123,7 +123,7 @@ def _seeds(seed: int) -> list[np.random.SeedSequence]:
     return np.random.SeedSequence(seed).spawn(2)
 
 
-def _with_noise(plan: Scenario, noise: Noise) -> Scenario:
+def with_noise(plan: Scenario, noise: Noise) -> Scenario:
     """The scenario with the chosen levels wherever it does not give its own."""
     if noise not in NOISE:
         raise InputError("noise", str(noise), ", ".join(NOISE))
