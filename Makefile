@@ -47,8 +47,12 @@ picture: demo
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/report.html" >/dev/null 2>&1
 	@rm -rf build/browser
 
+## the paper's table and figures again: docs/paper.md
+paper: setup
+	@$(PYTHON) -m gyrotc.paper docs
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test check picture clean
+.PHONY: help setup demo test check picture paper clean
