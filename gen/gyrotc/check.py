@@ -160,15 +160,19 @@ def _doubts(dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | No
     for warning in dataset.warnings:
         where, _, text = warning.partition(": ")
         yield Doubt("left_out", where, text)
-    findings = (*temperature_findings(facts), *jump_findings(facts), *earth_rate_findings(dataset, facts))
-    for finding in findings:
+    isothermal = list(temperature_findings(facts))
+    for finding in (*isothermal, *jump_findings(facts), *earth_rate_findings(dataset, facts)):
         yield Doubt(finding["id"], "data set", finding["text"])
     for f in facts:
         yield from _doubts_of_temperature(f)
         yield from _doubts_of_rate(f)
         yield from _doubts_of_time(f)
     yield from _doubts_between_runs(facts)
-    yield from _doubts_of_coverage([f for f in facts if f.role == "train"], envelope)
+    training = [f for f in facts if f.role == "train" and len(f.slopes_c_per_min)]
+    if training and not isothermal:
+        yield from _doubts_of_holds(training)
+    if envelope is not None:
+        yield from _doubts_of_coverage(training, envelope)
 
 
 def _doubts_of_temperature(f: RunFacts) -> Iterator[Doubt]:
@@ -221,18 +225,17 @@ def _doubts_between_runs(facts: Sequence[RunFacts]) -> Iterator[Doubt]:
         yield Doubt("row_periods_differ", "data set", text)
 
 
-def _doubts_of_coverage(facts: Sequence[RunFacts], envelope: Envelope | None) -> Iterator[Doubt]:
-    """What the training runs do not show of the requested envelope, or of the movement that a map needs."""
-    slopes = np.concatenate([f.slopes_c_per_min for f in facts]) if facts else np.zeros(0)
-    temperatures = np.concatenate([f.temperatures_c for f in facts]) if facts else np.zeros(0)
-    cells = [len(f.slopes_c_per_min) for f in facts]
-    if sum(cells):
-        holds = float(np.average([f.hold_share for f in facts], weights=cells))
-        if holds > _HOLDS:
-            text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
-            yield Doubt("mostly_holds", "data set", text)
-    if envelope is None:
-        return
+def _doubts_of_holds(facts: Sequence[RunFacts]) -> Iterator[Doubt]:
+    holds = float(np.average([f.hold_share for f in facts], weights=[len(f.slopes_c_per_min) for f in facts]))
+    if holds > _HOLDS:
+        text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
+        yield Doubt("mostly_holds", "data set", text)
+
+
+def _doubts_of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[Doubt]:
+    """What the training runs do not show of the requested envelope."""
+    slopes = np.concatenate([f.slopes_c_per_min for f in facts] or [np.zeros(0)])
+    temperatures = np.concatenate([f.temperatures_c for f in facts] or [np.zeros(0)])
     for name, unit, values, (low, high) in (
         ("temperature", "C", temperatures, envelope[0]),
         ("temperature rate", "C/min", slopes, envelope[1]),
