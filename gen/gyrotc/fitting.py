@@ -6,7 +6,7 @@ block, window and limits, and the refits with spans left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +33,7 @@ _MAX_STEP_C = 1.0
 _COVERAGE_CELLS = (32, 12)
 _UNCERTAINTY_CELLS = (6, 4)
 _MIN_SAMPLES = 8
+_CENTER_GRID = 2.0**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +213,7 @@ def _model(
             "scale": fitted.scale,
             "envelope": fitted.envelope,
             "coverage": coverage(data, fitted, _COVERAGE_CELLS),
-            "networks": [dict(n) for n in fitted.networks],
+            "networks": [_snapped(n, fitted.scale) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
             "stuck_samples": front.stuck_samples,
@@ -227,6 +228,23 @@ def _model(
             "meta": meta,
         }
     )
+
+
+def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, Any]:
+    """Centers on multiples of 2^-20 of the scale, so that tables hold them without further rounding.
+
+    It moves a center by less than 5e-7 half ranges, far below what the data can tell; the model is what is stored.
+    """
+    (center, half), slope = scale["temperature_c"], scale["slope_c_per_min"]
+    centers = [
+        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)]
+        for t, r in network["centers"]
+    ]
+    return dict(network) | {"centers": centers}
+
+
+def _on_grid(z: float) -> float:
+    return round(z * _CENTER_GRID) / _CENTER_GRID
 
 
 def _data_file(run: Run) -> dict[str, Any]:

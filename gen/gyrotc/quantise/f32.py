@@ -99,10 +99,10 @@ def _check_range(scale: Words, envelope: Words) -> None:
 def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.float32]:
     """Records of the centers, shape (n, 5): c_T, g_T, c_r, g_r, weight."""
     records = np.zeros((len(network.weights), 5))
-    for record, (c_t, c_r), widths, weight in zip(
-        records, network.centers, network.widths, network.weights, strict=True
+    positions = _positions(network, scale, per_block)
+    for record, position, widths, weight in zip(
+        records, positions, network.widths, network.weights, strict=True
     ):
-        position = _normalised(scale, c_t, c_r * per_block)
         for k in (0, 1):
             width = widths[k]
             if width is not None:
@@ -112,17 +112,22 @@ def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.flo
     return f32_words(_flushed(records)).view(np.float32).reshape(-1, 5)
 
 
+def _positions(network: Network, scale: Words, per_block: float) -> NDArray[np.float64]:
+    """Centers as the table's scale normalises them, shape (n, 2)."""
+    found = [_normalised(scale, c_t, c_r * per_block) for c_t, c_r in network.centers]
+    return np.array(found, dtype=np.float64).reshape(-1, 2)
+
+
 def _gradient(
-    network: Network, scale: Words, envelope: Words, margin: NDArray[np.float64]
+    network: Network, scale: Words, envelope: Words, per_block: float, margin: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Largest slopes of the network over the envelope and `margin` around it, in normalised inputs."""
     t0, t1, r0, r1 = _numbers(envelope).tolist()
     corners = np.array([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
-    positions = [_normalised(scale, c_t, c_r * per_block) for c_t, c_r in network.centers]
     inverse = [[1.0 / w if w is not None else 0.0 for w in pair] for pair in network.widths]
     return largest_gradient(
         np.array(network.linear),
-        np.array(positions).reshape(-1, 2),
+        _positions(network, scale, per_block),
         np.array(inverse).reshape(-1, 2),
         np.array(network.weights),
         corners[0] - margin,
@@ -147,17 +152,19 @@ def _bound(
     steep = np.zeros((len(weights), 2))
     for row, record in zip(steep, centers.astype(np.float64), strict=True):
         row[:] = STEEPEST * np.array([record[1], record[3]]) / _GAIN
-    center_error = _GRID / 2.0 + np.maximum(np.abs(centers[:, [0, 2]]).astype(np.float64) - 8.0, 0.0) * _UNIT
+    finite = centers[:, [1, 3]] != 0.0
+    center_error = np.where(finite, np.abs(centers[:, [0, 2]] - _positions(network, scale, per_block)), 0.0)
     total = float(weights.sum())
     # u: gain, product, square (twice the error of its root), sum: 2 (1 + 1 + 1) + 1 + 1 roundings at most,
     # and x exp(-x) <= 1/e.
     argument = 8.0 * _UNIT / math.e
     kernel = (0.5 + 0.5 + 1.0 + 1.0 + 1.0) * _UNIT + argument + _POLYNOMIAL + 2.0**-32
-    sizes = abs(network.w0) + float(linear @ largest) + total
+    start = abs(network.w0) + float(linear @ largest)
+    partial = start + np.cumsum(weights)  # largest magnitude of each partial sum
     return {
         "rounded inputs": float(_gradient(network, scale, envelope, per_block, z_error) @ z_error),
         "rounded centers": float(np.sum(weights[:, None] * steep * center_error)),
-        "rounded weights": _UNIT * (abs(network.w0) + 2.0 * float(linear @ largest) + total),
+        "rounded weights": _UNIT * (start + float(linear @ largest) + total),
         "Gaussian": kernel * total,
-        "summation": (len(weights) + 2) * _UNIT * sizes,
+        "summation": _UNIT * (2.0 * start + float(partial.sum())),
     }
