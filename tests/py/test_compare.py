@@ -1,0 +1,96 @@
+"""Methods side by side: the numbers are those that training and scoring give one by one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.compare import CompareOptions, compare
+from gyrotc.dataset import load
+from gyrotc.errors import InputError
+from gyrotc.fitting import FitOptions, fit_dataset, front_end, samples_of
+from gyrotc.simulate import simulate
+from gyrotc.simulate.truth import simulated_floor
+from gyrotc.train import METHODS, TrainingData, fit, predict
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("compare") / "data"
+    simulate("paper", seed=5, out=out)
+    return out
+
+
+def test_every_method_is_judged_on_every_environment(folder: Path) -> None:
+    dataset = load(folder)
+    result = compare(dataset)
+    assert [m["id"] for m in result["methods"]] == list(METHODS)
+    names = ["20 C", "-40 C", "60 C", "1 C/min", "3 C/min", "5 C/min"]
+    for method in result["methods"]:
+        assert [g["environment"] for g in method["groups"]] == names
+        n = sum(g["samples"] for g in method["groups"])
+        rms = np.sqrt(sum(g["samples"] * g["after_rms_dph"] ** 2 for g in method["groups"]) / n)
+        assert method["exam_rms_dph"] == pytest.approx(float(rms), rel=1e-9)
+        for g in method["groups"]:
+            assert g["improvement"] == pytest.approx(g["before_rms_dph"] / g["after_rms_dph"])
+            assert g["after_std_dph"] <= g["after_rms_dph"] * (1.0 + 1e-12)
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_makes(folder: Path) -> None:
+    dataset = load(folder)
+    result = compare(dataset)
+    rms = {m["id"]: m["exam_rms_dph"] for m in result["methods"]}
+    assert rms["mrbf"] < min(rms["mlr"], rms["poly"], rms["rbf_random"], rms["mrbf_paper"])
+    row = next(m for m in result["methods"] if m["id"] == "mrbf")
+    model = fit_dataset(dataset, FitOptions()).model
+    assert row["centers"] == model.n_centers
+    runs = [run for run in dataset.runs if run.role == "exam"]
+    front = front_end(runs, 10.0)
+    squares, count = 0.0, 0
+    for k, run in enumerate(runs):
+        s = samples_of(front.blocks(run), 10.0, k)
+        after = s.bias_dph - model.map_dph(s.temperature_c, s.slope_c_per_min)
+        means = after[: len(after) // 10 * 10].reshape(-1, 10).mean(axis=1)
+        squares, count = squares + float(np.sum(means**2)), count + len(means)
+    assert row["exam_rms_dph"] == pytest.approx(np.sqrt(squares / count), rel=1e-3)
+    floor = simulated_floor(folder, [run.file for run in runs], 100.0)
+    assert floor is not None
+    assert row["exam_rms_dph"] < 1.02 * floor
+
+
+def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
+    folder: Path, tmp_path: Path
+) -> None:
+    for path in folder.glob("run-0[1-6].csv"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    dataset = load(tmp_path)
+    result = compare(dataset, CompareOptions(methods=("mlr", "mrbf")))
+    assert result["judged_on"] == "left_out"
+    front = front_end(dataset.runs, 10.0)
+    parts = [samples_of(front.blocks(run), 10.0, k) for k, run in enumerate(dataset.runs)]
+    for row in result["methods"]:
+        for k, held in enumerate(parts):
+            rest = parts[:k] + parts[k + 1 :]
+            seen = TrainingData(
+                **{
+                    n: np.concatenate([getattr(p, n) for p in rest])
+                    for n in TrainingData.__dataclass_fields__
+                }
+            )
+            found = fit(seen, method=row["id"])
+            after = held.bias_dph - predict(found, held.temperature_c, held.slope_c_per_min)
+            means = after[: len(after) // 10 * 10].reshape(-1, 10).mean(axis=1)
+            group = row["groups"][k]
+            assert group["after_rms_dph"] == pytest.approx(float(np.sqrt(np.mean(means**2))), rel=1e-3)
+
+
+def test_without_training_runs_it_is_refused(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "run-01.csv").write_bytes((folder / "run-01.csv").read_bytes())
+    (tmp_path / "dataset.toml").write_text(
+        'schema = 1\nserial = "X"\nearth_rate = "removed"\n[[run]]\nfile = "run-01.csv"\nrole = "exam"\n'
+    )
+    with pytest.raises(InputError, match="train"):
+        compare(load(tmp_path))
