@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Network, Scale
+from .common import STEEPEST
+from .gradient import largest_gradient
 from .solve import exp2_of_minus
 
 __all__ = ["POSITIONS", "InputScale", "Inputs", "Surface", "difference", "position_scale", "surface_of"]
@@ -22,8 +24,9 @@ POSITIONS = 65536
 _UNITS_PER_C = 65536.0
 _GAIN_BITS = 26
 _SQRT_LOG2E = 1.2011224087864498
-# Largest values of |2y e^{-y²}|, |2 - 4y²| e^{-y²} (y = α x √ln 2 ...), as factors of α and α² in base 2.
-_SLOPE = 0.8577638849607068 * 0.8325546111576977
+_SQRT_LN2 = 0.8325546111576977
+# Largest |d/dx| and |d²/dx²| of 2^-(α x)², as factors of α and α².
+_SLOPE = STEEPEST * _SQRT_LN2
 _CURVE = 2.0 * 0.6931471805599453
 
 Floats = NDArray[np.floating[Any]]
@@ -77,24 +80,11 @@ class Surface:
         total = self.w0 + scaled / POSITIONS
         return _add_products(total, self.weights, self.factors(0, x_t), self.factors(1, x_r))
 
-    def slope_on_grid(self, axis: int, x_t: Floats, x_r: Floats) -> Floats:
-        """Derivative by one position, at every pair of positions."""
-        total = np.full((len(x_t), len(x_r)), self.linear[axis] / POSITIONS)
-        factors = [self.factors(0, x_t), self.factors(1, x_r)]
-        x = (x_t, x_r)[axis]
-        d = x[:, None] - self.center[None, :, axis]
-        factors[axis] = factors[axis] * d * (self.alpha[:, axis] ** 2 * -_CURVE)
-        return _add_products(total, self.weights, *factors)
-
-    def steepest(self, axis: int, cells: int) -> float:
-        """Bound of the derivative by one position over the whole envelope, from a grid and the curvature."""
-        x, half_step = _grid(cells)
-        largest = float(np.max(np.abs(self.slope_on_grid(axis, x, x))))
-        other = 1 - axis
-        size = np.abs(self.weights)
-        along = size * _CURVE * self.alpha[:, axis] ** 2
-        across = size * _SLOPE**2 * self.alpha[:, axis] * self.alpha[:, other]
-        return largest + half_step * float(np.add.accumulate([0.0, *(along + across)])[-1])
+    def steepest(self) -> Floats:
+        """Bounds of the derivatives by one position over the whole envelope, shape (2,)."""
+        low = np.full(2, -POSITIONS / 2.0)
+        inverse = self.alpha * _SQRT_LN2
+        return largest_gradient(self.linear / POSITIONS, self.center, inverse, self.weights, low, -low)
 
 
 def _add_products(total: Floats, weights: Floats, a: Floats, b: Floats) -> Floats:
@@ -103,18 +93,13 @@ def _add_products(total: Floats, weights: Floats, a: Floats, b: Floats) -> Float
     return total
 
 
-def _grid(cells: int) -> tuple[Floats, float]:
-    """Positions that divide the range into equal cells, and half a cell."""
-    step = (POSITIONS - 1) / cells
-    return -POSITIONS / 2 + np.arange(cells + 1) * step, step / 2.0
-
-
 def difference(first: Surface, second: Surface, cells: int) -> float:
     """Bound of |first - second| over the whole envelope: largest on a grid, and what may lie between.
 
     Both must have the same Gaussians in the same order, nearly the same each.
     """
-    x, half_step = _grid(cells)
+    step = POSITIONS / cells
+    x = -POSITIONS / 2 + np.arange(cells + 1) * step
     largest = float(np.max(np.abs(first.on_grid(x, x) - second.on_grid(x, x))))
     between = np.abs(first.linear - second.linear) / POSITIONS
     size = np.abs(first.weights)[:, None]
@@ -128,7 +113,7 @@ def difference(first: Surface, second: Surface, cells: int) -> float:
     mixed = size * _SLOPE * alpha * others[:, ::-1]
     for row in own + mixed:
         between = between + row
-    return largest + half_step * float(between[0] + between[1])
+    return largest + step / 2.0 * float(between[0] + between[1])
 
 
 def surface_of(network: Network, scale: Scale, per_block: float, inputs: Inputs) -> Surface:

@@ -164,7 +164,8 @@ def _in_dph(surface: Surface, whole: NDArray[np.int64], frac_bits: int) -> Surfa
 def _input_error(exact: Surface, inputs: Inputs) -> float:
     """Largest effect of an input that is moved to the middle of its cell, deg/h."""
     moved = [0.5 + 0.5 * i.per_unit for i in inputs]  # the second: edges of the envelope are rounded, too
-    return math.fsum(moved[k] * exact.steepest(k, _GRID_CELLS) for k in (0, 1))
+    steepest = exact.steepest()
+    return math.fsum(moved[k] * float(steepest[k]) for k in (0, 1))
 
 
 def _table(
