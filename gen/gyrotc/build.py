@@ -34,10 +34,13 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What `build` made: the JSON objects of its stages, and the checks that failed (none: exit 0)."""
+    """What `build` made: the JSON objects of its stages, the arithmetics that were refused (with the reason), and the
+    checks that failed (none: exit 0).
+    """
 
     evaluation: dict[str, Any]
     verification: dict[str, Any]
+    refused: dict[str, str]
     failures: tuple[str, ...]
 
 
@@ -104,7 +107,7 @@ def _build_axis(
     _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
     say("drawing the report")
     write_report(work)
-    return Built(evaluation, verification, tuple(_failures(evaluation, verification)))
+    return Built(evaluation, verification, emission.refused, tuple(_failures(evaluation, verification)))
 
 
 def _of_axis(axis: str, say: Progress) -> Progress:

@@ -350,6 +350,8 @@ def build(
 def _print_built(result: Built) -> None:
     _OUT.print(evaluation_table(result.evaluation))
     _OUT.print(verify_table(result.verification))
+    for name, reason in result.refused.items():
+        _OUT.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     for finding in result.evaluation["findings"]:
         _OUT.print(f"finding {finding['id']}: {finding['text']}", highlight=False, soft_wrap=True)
     _OUT.print(summary(result.evaluation), highlight=False, soft_wrap=True)
