@@ -78,7 +78,10 @@ def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -
         CheckFailed: The compiler refused.
     """
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=False
+        loader=jinja2.PackageLoader("gyrotc", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,
     )
     text = environment.get_template("replay.c.j2").render(
         id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
