@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
@@ -76,13 +77,14 @@ def survey(
         return None
     check_description(description, applied, exam_only, problems)
     check_spans(description, problems)
-    recordings = of_axis(_recordings(folder, description, problems), axis, problems)
+    opened, with_rows = _recordings(folder, description, problems)
+    recordings = of_axis(opened, axis, problems)
     if not recordings:
         return None
     channels, warnings = common_channels(recordings)
     runs = []
     for index, entry in enumerate(description.run):
-        if entry.file in recordings:
+        if entry.file in recordings and index in with_rows:
             recording = recordings[entry.file]
             reader = Reader(
                 file=recording.file,
@@ -126,9 +128,12 @@ def _description(folder: Path, problems: Problems) -> Description | None:
     return Description(serial=serial, run=runs)
 
 
-def _recordings(folder: Path, description: Description, problems: Problems) -> dict[str, Recording]:
-    """Every file that is in order, by name; of their times only the first and the last are kept."""
-    recordings = {}
+def _recordings(
+    folder: Path, description: Description, problems: Problems
+) -> tuple[dict[str, Recording], set[int]]:
+    """Every file that is in order, by name, without its times; and which runs have rows in them."""
+    recordings: dict[str, Recording] = {}
+    with_rows: set[int] = set()
     for name in dict.fromkeys(entry.file for entry in description.run):
         recording = open_recording(
             name, folder / name, description.columns, description.pulse_weight_arcsec, problems
@@ -137,12 +142,16 @@ def _recordings(folder: Path, description: Description, problems: Problems) -> d
             continue
         first, last = recording.time_s[[0, -1]]
         for index, entry in enumerate(description.run):
-            if entry.file == name and not in_entry(entry, recording.time_s).any():
+            if entry.file != name:
+                continue
+            if in_entry(entry, recording.time_s).any():
+                with_rows.add(index)
+            else:
                 expected = f"one that meets the rows of the file, {first:.10g} ... {last:.10g} s"
                 where = place_of(description, index)
                 problems.add(InputError(where, "a span without rows", expected))
-        recordings[name] = replace(recording, time_s=recording.time_s[[0, -1]])
-    return recordings
+        recordings[name] = replace(recording, time_s=np.zeros(0))
+    return recordings, with_rows
 
 
 def _earth(description: Description, index: int, axis: str | None, problems: Problems) -> EarthRate | None:

@@ -1,0 +1,116 @@
+"""Every accepted and refused recording through the installed command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Command
+from recordings import ACCEPTED, REFUSED, columns, described, write_csv
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_check_refuses_with_one_message(case: str, tmp_path: Path, gyrotc: Command) -> None:
+    refused = REFUSED[case]
+    folder = tmp_path / refused.folder
+    refused.make(folder)
+    done = gyrotc("check", folder)
+    assert done.returncode == 2, done.stderr
+    problems = [line for line in done.stdout.splitlines() if line.startswith("problem: ")]
+    assert any(all(part in line for part in refused.message) for line in problems), done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("case", ACCEPTED)
+def test_check_accepts(case: str, tmp_path: Path, gyrotc: Command) -> None:
+    folder = tmp_path / "RLG-1"
+    ACCEPTED[case](folder)
+    done = gyrotc("check", folder, "--json", tmp_path / "check.json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((tmp_path / "check.json").read_text())
+    assert result["schema"] == "gyrotc.check/1"
+    assert result["problems"] == []
+    assert len(result["runs"]) >= 1
+
+
+@pytest.mark.parametrize(
+    ("command", "case"),
+    [("fit", "text cell"), ("fit", "unknown key"), ("build", "kelvin"), ("build", "no training run")],
+)
+def test_what_is_refused_writes_nothing(case: str, command: str, tmp_path: Path, gyrotc: Command) -> None:
+    refused = REFUSED[case]
+    folder = tmp_path / refused.folder
+    refused.make(folder)
+    before = sorted(tmp_path.rglob("*"))
+    done = gyrotc(command, folder, "--out", tmp_path / "out")
+    assert done.returncode == 2, done.stdout
+    assert all(part in done.stderr for part in refused.message)
+    assert done.stderr.count("\n") == 1, "one message"
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_refused_build_leaves_an_older_result_alone(tmp_path: Path, gyrotc: Command) -> None:
+    described(tmp_path / "RLG-1")
+    small = columns() | {"rate_dph": columns()["rate_dph"] - 20.0}
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", small)
+    assert gyrotc("build", tmp_path / "RLG-1", "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", columns(4))
+    assert gyrotc("build", tmp_path / "RLG-1", "--out", tmp_path / "out").returncode == 2
+    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
+
+
+@pytest.mark.parametrize("case", ["pulses", "several runs", "one constant temperature"])
+def test_fit_takes_what_check_accepts(case: str, tmp_path: Path, gyrotc: Command) -> None:
+    ACCEPTED[case](tmp_path / "RLG-1")
+    done = gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    model = json.loads((tmp_path / "out" / "model.json").read_text())
+    assert model["data"]
+
+
+def test_meta_and_warnings_travel_into_the_model(tmp_path: Path, gyrotc: Command) -> None:
+    described(tmp_path / "RLG-1", tail='[meta]\noperator = "A. B."\nchamber = "K 3"')
+    assert gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "out").returncode == 0
+    meta = json.loads((tmp_path / "out" / "model.json").read_text())["meta"]
+    assert meta["operator"] == "A. B."
+    assert meta["chamber"] == "K 3"
+
+
+def test_axes_are_named_where_none_is_chosen(tmp_path: Path, gyrotc: Command) -> None:
+    base = columns()
+    table = {name: base[name] for name in ("time_s", "temperature_c")}
+    write_csv(tmp_path / "IMU" / "a.csv", table | {f"rate_{a}_dph": base["rate_dph"] for a in "xyz"})
+    for command in (["check"], ["fit", "--out", tmp_path / "out"]):
+        done = gyrotc(command[0], tmp_path / "IMU", *command[1:])
+        assert done.returncode == 2
+        assert "--axis x|y|z|all" in done.stdout + done.stderr
+    assert gyrotc("check", tmp_path / "IMU", "--axis", "all").returncode == 0
+    assert gyrotc("check", tmp_path / "IMU", "--axis", "y").returncode == 0
+
+
+def test_an_envelope_is_checked_against(tmp_path: Path, gyrotc: Command) -> None:
+    described(tmp_path / "RLG-1")
+    done = gyrotc("check", tmp_path / "RLG-1", "--envelope=-40:60,-5:5")
+    assert done.returncode == 0
+    assert "of -40 ... 60 C" in done.stdout
+    assert gyrotc("check", tmp_path / "RLG-1", "--envelope", "wide").returncode == 2
+
+
+def test_the_model_does_not_depend_on_the_form_of_a_recording(tmp_path: Path, gyrotc: Command) -> None:
+    """The same numbers give the same model, but for name and hash of the file."""
+    models = []
+    for case in ("no dataset.toml", "byte order mark, CRLF", "Parquet"):
+        folder = tmp_path / case.replace(" ", "-").replace(",", "")
+        ACCEPTED[case](folder)
+        (folder / "dataset.toml").write_text(
+            f'schema = 1\nserial = "A"\n[[run]]\nfile = "{next(folder.glob("a.*")).name}"\n'
+        )
+        assert gyrotc("fit", folder, "--out", tmp_path / "out").returncode == 0
+        model = json.loads((tmp_path / "out" / "model.json").read_text())
+        del model["data"]
+        models.append(model)
+    assert all(model == models[0] for model in models)
+    assert np.isfinite(models[0]["networks"][0]["w0"])
