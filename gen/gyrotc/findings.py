@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .dataset import Dataset, RunFacts
 from .model import Model
@@ -51,7 +52,7 @@ def findings_of(
         found += _coverage(model)
     found += jump_findings(facts)
     found += earth_rate_findings(dataset, facts)
-    found += _weights(model, facts)
+    found += _weights(model)
     found += _outliers(result)
     return found
 
@@ -144,10 +145,9 @@ def _coverage(model: Model) -> Iterator[Finding]:
         )
 
 
-def _weights(model: Model, facts: Sequence[RunFacts]) -> Iterator[Finding]:
+def _weights(model: Model) -> Iterator[Finding]:
     """Weights that cancel one another are a lever for rounding and for every input out of the ordinary."""
-    bias = [model.map_dph(f.temperatures_c, f.slopes_c_per_min) for f in facts if len(f.slopes_c_per_min)]
-    swing = float(np.ptp(np.concatenate(bias))) if bias else 0.0
+    swing = float(np.ptp(_trained_map(model)))
     total = model.sum_abs_weights_dph
     if swing > 0.0 and total > _WEIGHTS_TO_RANGE * swing:
         yield _finding(
@@ -157,6 +157,19 @@ def _weights(model: Model, facts: Sequence[RunFacts]) -> Iterator[Finding]:
             sum_abs_weights_dph=total,
             swing_dph=swing,
         )
+
+
+def _trained_map(model: Model) -> NDArray[np.float64]:
+    """The map at the middles of the cells of its envelope that held training data, deg/h."""
+    columns, rows = model.coverage.cells if model.coverage else (32, 12)
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    t = t0 + (t1 - t0) * (np.arange(columns) + 0.5) / columns
+    r = r0 + (r1 - r0) * (np.arange(rows) + 0.5) / rows
+    bias = model.map_dph(*np.meshgrid(t, r))
+    if model.coverage is None:
+        return bias
+    seen = np.array([list(row) for row in model.coverage.rows]) == "1"
+    return np.asarray(bias[seen]) if seen.any() else bias
 
 
 def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:

@@ -1,0 +1,160 @@
+"""Findings follow the data: a new name changes nothing, other numbers do."""
+
+from __future__ import annotations
+
+import copy
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.dataset import Dataset, facts_of, load
+from gyrotc.findings import findings_of
+from gyrotc.model import Model
+from recordings import Columns, columns, toml, write_csv
+
+
+def dataset_of(folder: Path, *tables: Mapping[str, np.ndarray], head: str | None = None) -> Dataset:
+    """A data set of training runs."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for index, table in enumerate(tables):
+        write_csv(folder / f"{index}.csv", table)
+    if head is not None:
+        runs = [f'file = "{index}.csv"' for index in range(len(tables))]
+        (folder / "dataset.toml").write_text(toml(*runs, head=head))
+    return load(folder)
+
+
+def statistics(rms: float, mean: float = 0.0) -> dict[str, Any]:
+    return {"mean_dph": mean, "std_dph": rms, "rms_dph": rms, "max_abs_dph": 3.0 * rms}
+
+
+def result_of(*runs: tuple[float, float], train: float = 0.001, exam: float | None = None) -> dict[str, Any]:
+    """Figures as `evaluate` makes them; a run is (mean, standard deviation) after compensation."""
+    return {
+        "noise_floor_dph": 0.001,
+        "runs": [
+            {"file": f"{k}.csv", "samples": 100, "after": statistics(std, mean)}
+            for k, (mean, std) in enumerate(runs or [(0.0, 0.001)])
+        ],
+        "train": {"after": statistics(train)},
+        "exam": {"after": statistics(exam)} if exam is not None else None,
+    }
+
+
+def ids(
+    dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: dict[str, Any] | None = None
+) -> set[str]:
+    facts = [facts_of(run, run.rows()) for run in dataset.runs]
+    return {f["id"] for f in findings_of(dataset, facts, Model.from_dict(model), result, training)}
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> Dataset:
+    return dataset_of(tmp_path / "RLG-1", columns(600))
+
+
+def test_nothing_is_found_where_nothing_is_wrong(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    assert ids(plain, model_dict, result_of()) == set()
+
+
+def test_names_play_no_part(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    before = ids(plain, model_dict, result_of(exam=0.5))
+    other = plain.folder.parent / "mpu6050-isothermal"
+    plain.folder.rename(other)
+    (other / "0.csv").rename(other / "isothermal.csv")
+    assert ids(load(other), model_dict, result_of(exam=0.5)) == before == {"fails_on_unseen_span"}
+
+
+def test_constant_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    def told(swing: float) -> set[str]:
+        table = columns(600)
+        table["temperature_c"] = 25.0 + swing * np.linspace(-0.5, 0.5, 600)
+        return ids(dataset_of(tmp_path / "R", table), model_dict, result_of(exam=0.5))
+
+    assert told(1.9) == {"no_temperature_information"}, "and nothing about a map that is not there"
+    assert told(2.1) == {"fails_on_unseen_span"}
+
+
+def test_what_a_map_has_not_seen(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    def told(exam: float | None, left_out: float | None = None, train: float = 0.001) -> set[str]:
+        training = None if left_out is None else {"left_out": {"after": statistics(left_out)}}
+        return ids(plain, model_dict, result_of(exam=exam, train=train), training)
+
+    assert told(0.0011) == set()
+    assert told(0.004) == {"fails_on_unseen_span"}
+    assert told(None, 0.004) == {"fails_on_unseen_span"}
+    assert told(None, 0.0029) == set(), "within three times the noise floor"
+    assert told(None, 0.0050, train=0.003) == set(), "no worse than what it has seen"
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.0, True), (1e-3, True), (2.0, False), (1e4, False)])
+def test_earth_rate_follows_the_rate(
+    factor: float, found: bool, tmp_path: Path, model_dict: dict[str, Any]
+) -> None:
+    table = columns(600)
+    table["rate_dph"] = factor * (table["rate_dph"] - 10.0)
+    told = ids(dataset_of(tmp_path / "R", table), model_dict, result_of())
+    assert told == ({"earth_rate_not_stated"} if found else set())
+    for stated in ("removed", "none"):
+        head = f'schema = 1\nserial = "A"\nearth_rate = "{stated}"'
+        assert ids(dataset_of(tmp_path / "R", table, head=head), model_dict, result_of()) == set()
+
+
+def _jump(table: Columns, size: float) -> Columns:
+    return table | {"temperature_c": table["temperature_c"] + size * (np.arange(600) >= 300)}
+
+
+def test_jumps_of_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    for size, found in ((0.0, False), (0.5, False), (-3.0, True), (10.0, True)):
+        told = ids(dataset_of(tmp_path / "R", _jump(columns(600), size)), model_dict, result_of())
+        assert told == ({"jump_in_temperature"} if found else set())
+
+
+def test_a_noisy_thermometer_does_not_jump(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    table = columns(600)
+    table["temperature_c"] = table["temperature_c"] + np.random.default_rng(6).normal(0.0, 1.0, 600)
+    assert ids(dataset_of(tmp_path / "R", table), model_dict, result_of()) == set()
+    rounded = columns(600)
+    rounded["temperature_c"] = np.round(rounded["temperature_c"])
+    assert ids(dataset_of(tmp_path / "R", rounded), model_dict, result_of()) == set()
+
+
+def test_weights_that_cancel(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    large = copy.deepcopy(model_dict)
+    large["networks"][0] |= {
+        "centers": [[30.0, 0.0], [30.5, 0.0]],
+        "widths": [[1.0, None], [1.0, None]],
+        "weights": [10.0, -10.0],
+    }
+    assert ids(plain, large, result_of()) == {"large_weights"}
+
+
+def test_sparse_coverage(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    sparse = model_dict | {"coverage": {"cells": [4, 2], "rows": ["1000", "0000"]}}
+    assert ids(plain, sparse, result_of()) == {"sparse_coverage"}
+    assert ids(plain, model_dict | {"coverage": None}, result_of()) == set()
+
+
+def test_a_run_that_differs_from_the_others(plain: Dataset, model_dict: dict[str, Any]) -> None:
+    usual = [(1e-5, 0.001), (-1e-5, 0.001), (2e-5, 0.001), (-2e-5, 0.001), (0.0, 0.001)]
+    assert ids(plain, model_dict, result_of(*usual)) == set()
+    assert ids(plain, model_dict, result_of(*usual, (0.01, 0.001))) == {"run_outlier"}
+    assert ids(plain, model_dict, result_of(*usual, (0.0, 0.01))) == {"run_outlier"}
+    assert ids(plain, model_dict, result_of((0.0, 0.001), (0.01, 0.001))) == set(), "two runs tell nothing"
+
+
+def test_findings_are_json(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    table = _jump(columns(600), 10.0) | {"rate_dph": np.full(600, 3.0)}
+    dataset = dataset_of(tmp_path / "R", table)
+    facts = [facts_of(run, run.rows()) for run in dataset.runs]
+    usual = [(0.0, 0.001)] * 5
+    model = Model.from_dict(model_dict | {"coverage": {"cells": [4, 2], "rows": ["1000", "0000"]}})
+    found = findings_of(dataset, facts, model, result_of(*usual, (1.0, 0.001), exam=0.5))
+    assert len(found) == 5
+    for finding in json.loads(json.dumps(found, allow_nan=False)):
+        assert set(finding) == {"id", "text", "evidence"}
+        assert finding["text"].endswith(".")
