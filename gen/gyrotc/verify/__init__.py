@@ -24,7 +24,7 @@ from ..model import Model, load_model
 from ..reference import answers
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
-from .board import Job, test_target
+from .board import Job, board_entries
 from .emitted import c_hash, check_emitted
 from .logs import log_entries
 from .recordings import replay_dataset
@@ -106,7 +106,7 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[E
 
     def one(target: Target) -> list[Entry]:
         progress(target.name)
-        return test_target(job, target)
+        return board_entries(job, target)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         return [entry for entries in pool.map(one, targets) for entry in entries]

@@ -17,7 +17,7 @@ from ..table import Table
 from ..toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
 from .boardlog import BoardOutput, compare, read_output
 
-__all__ = ["Job", "checked_output", "test_target"]
+__all__ = ["Job", "board_entries", "checked_output"]
 
 _CODE = "tT"
 
@@ -32,7 +32,7 @@ class Job:
     expected: dict[str, NDArray[np.uint32]]
 
 
-def test_target(job: Job, target: Target) -> list[dict[str, Any]]:
+def board_entries(job: Job, target: Target) -> list[dict[str, Any]]:
     """Entries of `verify.json` for one target, one for each arithmetic."""
     numerics = [n for n in job.tables if n in target.numerics]
     package = target.missing()

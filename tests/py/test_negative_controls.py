@@ -1,0 +1,119 @@
+"""Builds that are wrong on purpose. Each must be caught by a program that ran to its end with mismatches.
+
+A proof harness that cannot fail proves nothing. Controls that need further emulators stand in
+tests/targets/.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from emitted import emitted, ran_and_differed, spoil, with_flags
+from gyrotc.toolchain import Target
+from gyrotc.verify.board import Job, board_entries
+from jobs import job_of
+
+SELF_TEST_FAILED = "vector 0: status fffffffd"  # GTC_E_SELF_TEST
+LAYOUT_REFUSED = "vector 0: status fffffffe"  # GTC_E_LAYOUT
+IMAGE_REFUSED = "vector 0: status fffffffc"  # GTC_E_IMAGE
+CONTRACTED = ("-std=gnu99", "-ffp-contract=fast")
+# Macros that gcc sets with -ffast-math, which the runtime refuses to compile with.
+FAST_MATH = ("-ffast-math", "-U__FAST_MATH__")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return emitted(tmp_path)
+
+
+def _entry(job: Job, target: Target, numeric: str) -> dict:
+    return next(e for e in board_entries(job, target) if e["numeric"] == numeric)
+
+
+@pytest.mark.parametrize("name", ["cortex-m4f", "s390x"])
+def test_contracted_build_is_caught_by_vectors_and_by_the_self_test(folder: Path, name: str) -> None:
+    """gcc's own dialect fuses a * b + c across statements wherever the processor can."""
+    job = job_of(folder)
+    entry = _entry(job, with_flags(name, *CONTRACTED), "f32")
+    assert ran_and_differed(entry), entry
+    assert entry["mismatches"] > 100
+    assert entry["first_mismatches"][0].startswith(SELF_TEST_FAILED)
+    assert not ran_and_differed(_entry(job, with_flags(name), "f32"))
+
+
+def test_contracted_build_leaves_fixed_point_exact(folder: Path) -> None:
+    job = job_of(folder)
+    if "q31" in job.tables:
+        assert _entry(job, with_flags("cortex-m4f", *CONTRACTED), "q31")["status"] == "pass"
+
+
+def test_fast_math_is_refused_by_the_compiler_and_caught_where_it_hides(folder: Path) -> None:
+    job = job_of(folder)
+    assert "fast-math" in _entry(job, with_flags("host-gcc-O2", "-ffast-math"), "f32")["error"]
+    entry = _entry(job, with_flags("host-gcc-O2", *FAST_MATH), "f32")
+    assert ran_and_differed(entry), entry
+
+
+def test_natural_expressions_are_caught_where_float_is_computed_in_double(folder: Path) -> None:
+    """s390x evaluates float expressions in double: one expression rounds once where two statements round twice."""
+    natural_expressions(folder)
+    entry = _entry(job_of(folder), with_flags("s390x", "-Wno-unused-variable"), "f32")
+    assert ran_and_differed(entry), entry
+
+
+def natural_expressions(folder: Path) -> None:
+    """Joins product and sum of the float32 map into one expression each."""
+    spoil(
+        folder / "c" / "gtc.c",
+        r"(\w+) = ([^;=\n]+ \* [^;\n]+);\n +acc = acc \+ \1;",
+        r"acc = acc + \2;",
+        count=0,
+    )
+
+
+def test_a_wrong_rounding_shift_is_caught(folder: Path) -> None:
+    """The fixed-point sum cut off instead of rounded: half a unit, seen by the vectors."""
+    job = job_of(folder)
+    if "q31" not in job.tables:
+        pytest.fail("the fixed-point table of the golden model is missing")
+    spoil(folder / "c" / "gtc.c", r"0x4000000040000000LL", "0x4000000000000000LL")
+    entry = _entry(job, with_flags("host-gcc-O2"), "q31")
+    assert ran_and_differed(entry), entry
+    assert entry["first_mismatches"][0].startswith(SELF_TEST_FAILED)
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+def test_a_flipped_bit_in_an_array_of_the_table_is_caught(folder: Path, numeric: str) -> None:
+    path = folder / "c" / "gtc_rlg_0042.c"
+    text = path.read_text()
+    start = text.index(f"{numeric}_coverage[")
+    match = re.compile(r"0x([0-9a-f]+)UL").search(text, start)
+    assert match is not None
+    path.write_text(text[: match.start(1)] + f"{int(match[1], 16) ^ 8:x}" + text[match.end(1) :])
+    entry = _entry(job_of(folder), with_flags("host-gcc-O2"), numeric)
+    assert ran_and_differed(entry), entry
+    assert entry["first_mismatches"][0].startswith(IMAGE_REFUSED)
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+def test_a_table_of_another_layout_is_refused_at_run_time(folder: Path, numeric: str) -> None:
+    spoil(folder / "c" / "gtc_rlg_0042.c", r"\.layout = 1,", ".layout = 2,", count=0)
+    entry = _entry(job_of(folder), with_flags("host-gcc-O2"), numeric)
+    assert entry["status"] == "fail"
+    # `init` refuses it too, so the history is not run: another number of results.
+    assert "results instead of" in entry["error"] or entry["first_mismatches"][0].startswith(LAYOUT_REFUSED)
+
+
+def test_a_table_of_another_layout_is_refused_by_the_compiler(folder: Path) -> None:
+    spoil(folder / "c" / "gtc.h", r"#define GTC_TABLE_LAYOUT 1", "#define GTC_TABLE_LAYOUT 2")
+    for entry in board_entries(job_of(folder), with_flags("host-gcc-O2")):
+        assert entry["status"] == "fail" and "layout" in entry["error"]
+
+
+def test_the_controls_start_from_a_build_that_passes(folder: Path) -> None:
+    copy = Path(shutil.copytree(folder, folder / "copy"))
+    for entry in board_entries(job_of(copy), with_flags("host-gcc-O2")):
+        assert entry["status"] == "pass", entry
