@@ -23,6 +23,7 @@ constexpr double kWidthsT[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
 constexpr double kWidthsR[] = {0.1, 0.25, 0.6, 1.2, 3.0};
 
 constexpr int kMaxRefineSteps = 40;
+constexpr double kRelativeTolerance = 0.01;  // a step that gains less of the objective ends the refinement
 constexpr int kExactGains = 200;  // of so many candidates the gain is computed exactly
 
 double beyond(double x, int k) { return x < kLow[k] ? x - kLow[k] : x > kHigh[k] ? x - kHigh[k] : 0.0; }
@@ -189,7 +190,7 @@ Network VariableProjection::refine(const Network &start, double tolerance, int m
             }
             damping *= 5.0;
         }
-        if (gained <= tolerance) break;
+        if (gained <= std::max(tolerance, kRelativeTolerance * best.cost)) break;
     }
     return best;
 }

@@ -42,7 +42,7 @@ class VariableProjection {
     // Gradient of the objective, kNonlinear x M, at a projected network.
     Shapes gradient(const Network &network) const;
 
-    // Levenberg-Marquardt from `start`, until a step gains less than `tolerance`. Never worse than the start.
+    // Levenberg-Marquardt from `start`, until a step gains less than `tolerance` or 1 %. Never worse than the start.
     Network refine(const Network &start, double tolerance, int max_steps) const;
 
     // Networks of 0, 1, ... Gaussians: forward selection among `centers` (rows: t, r) x a ladder of widths, two
