@@ -48,6 +48,16 @@
 #endif
 #endif
 
+/* 1: two Gaussians in each turn of the loop of the fixed-point map, about 6 % faster and 80 bytes longer;
+ * the bits are the same. */
+#ifndef GTC_UNROLL
+#ifdef __OPTIMIZE_SIZE__
+#define GTC_UNROLL 0
+#else
+#define GTC_UNROLL 1
+#endif
+#endif
+
 #if (GTC_MAX_SLOPE_BLOCKS < 2) || (GTC_MAX_SLOPE_BLOCKS > 32)
 #error "GTC_MAX_SLOPE_BLOCKS must lie in 2 ... 32 (one bit of a 32-bit word each)"
 #endif

@@ -99,8 +99,8 @@ typedef struct {
     int_least32_t max_step;        /* 2^-16 C */
     int_least32_t max_slope;       /* 2^-16 C per block */
     int_least32_t fallback;        /* 2^-bias_frac_bits deg/h */
-    int_least32_t scale[6];        /* T: offset, gain; slope: offset, gain (docs/numerics.md);
-                                      bits by which squares are in larger units; 0 */
+    int_least32_t scale[3];        /* gains of T and slope onto 16 bits, bits by which squares are
+                                      in larger units (docs/numerics.md) */
     int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
     uint_least32_t n_networks;
     uint_least32_t n_centers;

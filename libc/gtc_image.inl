@@ -6,7 +6,7 @@
  */
 
 /* Words between the magic and the arrays. */
-#define HEADER_WORDS (2U + 7U + 3U + N_SCALE + 4U + 4U + 5U)
+#define HEADER_WORDS (2U + 7U + 3U + 3U + 4U + 4U + 5U)
 
 static uint_least32_t FN(coverage_words)(const TABLE *table)
 {
@@ -52,11 +52,11 @@ static void FN(header)(const TABLE *table, uint_least32_t words[HEADER_WORDS])
     numbers[0] = MEMBER_BITS(table->max_step);
     numbers[1] = MEMBER_BITS(table->max_slope);
     numbers[2] = MEMBER_BITS(table->fallback);
-    for (i = 0U; i < N_SCALE; i++) {
+    for (i = 0U; i < 3U; i++) {
         numbers[3U + i] = MEMBER_BITS(table->scale[i]);
     }
     for (i = 0U; i < 4U; i++) {
-        numbers[3U + N_SCALE + i] = MEMBER_BITS(table->envelope[i]);
+        numbers[6U + i] = MEMBER_BITS(table->envelope[i]);
     }
     for (i = 0U; i < 9U; i++) {
         words[i] = integers[i];

@@ -5,23 +5,6 @@
  * SPDX-License-Identifier: MIT
  */
 
-/* Moves x into [low, high]; returns GTC_CLAMPED if it had to, else GTC_OK. */
-static int FN(clamp)(NUM *x, NUM low, NUM high)
-{
-    int status = GTC_OK;
-
-    if (*x < low) {
-        *x = low;
-        status = GTC_CLAMPED;
-    } else if (*x > high) {
-        *x = high;
-        status = GTC_CLAMPED;
-    } else {
-        /* inside */
-    }
-    return status;
-}
-
 /* GTC_OK or GTC_UNCOVERED. */
 static int FN(coverage)(const TABLE *table, const POINT *in)
 {
@@ -44,12 +27,13 @@ int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     POINT in;
     int status;
 
-    if ((table == NULL) || (bias == NULL) || FN(is_missing)(temp) || FN(is_missing)(slope)) {
+    if ((table == NULL) || (bias == NULL)) {
         return GTC_E_ARG;
     }
-    status = FN(clamp)(&temp, MEMBER(table->envelope[0]), MEMBER(table->envelope[1]));
-    status |= FN(clamp)(&slope, MEMBER(table->envelope[2]), MEMBER(table->envelope[3]));
-    in = FN(normalise)(table, temp, slope);
+    status = FN(locate)(table, temp, slope, &in);
+    if (status < 0) {
+        return GTC_E_ARG;
+    }
     status |= FN(coverage)(table, &in);
     *bias = FN(network)(table, table->networks, table->centers, &in);
     return status;

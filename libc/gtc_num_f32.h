@@ -29,7 +29,6 @@
 #define NUM_MISSING_BITS 0x7FC00000UL /* no finite number has these */
 #define ARITHMETIC 1U /* in the second word of an image */
 
-#define N_SCALE 3U     /* members `scale` of a table */
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) ((member).value)
@@ -94,6 +93,21 @@ static inline float FN(gauss)(float u)
     return e.value;
 }
 
+/* Moves x into a range; returns GTC_OK or GTC_CLAMPED. */
+static inline int FN(clamp)(float *x, const gtc_word_t range[2])
+{
+    int status = GTC_CLAMPED;
+
+    if (*x < range[0].value) {
+        *x = range[0].value;
+    } else if (*x > range[1].value) {
+        *x = range[1].value;
+    } else {
+        status = GTC_OK;
+    }
+    return status;
+}
+
 /* The inputs of a network, as they are and normalised. */
 typedef struct {
     float temp;
@@ -105,20 +119,33 @@ typedef struct {
 
 /* Adding and subtracting 8 leaves a multiple of 2^-21; every center is one of 2^-20, so that
  * differences from centers are exact. */
-static inline POINT FN(normalise)(const TABLE *table, float temp, float slope)
+static inline float FN(on_grid)(float z)
 {
-    POINT in;
+    float shifted;
 
-    in.temp = temp;
-    in.slope = slope;
-    in.z_temp = temp - table->scale[0].value;
-    in.z_temp = in.z_temp * table->scale[1].value;
-    in.z_temp = in.z_temp + 8.0F;
-    in.z_temp = in.z_temp - 8.0F;
-    in.z_slope = slope * table->scale[2].value;
-    in.z_slope = in.z_slope + 8.0F;
-    in.z_slope = in.z_slope - 8.0F;
-    return in;
+    shifted = z + 8.0F;
+    shifted = shifted - 8.0F;
+    return shifted;
+}
+
+/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or GTC_E_ARG. */
+static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT *in)
+{
+    int status;
+    float z;
+
+    if (FN(is_missing)(temp) || FN(is_missing)(slope)) {
+        return GTC_E_ARG;
+    }
+    status = FN(clamp)(&temp, &table->envelope[0]) | FN(clamp)(&slope, &table->envelope[2]);
+    in->temp = temp;
+    in->slope = slope;
+    z = temp - table->scale[0].value;
+    z = z * table->scale[1].value;
+    in->z_temp = FN(on_grid)(z);
+    z = slope * table->scale[2].value;
+    in->z_slope = FN(on_grid)(z);
+    return status;
 }
 
 /* One network: w0 + linear part + its Gaussians. */

@@ -22,7 +22,6 @@
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
 #define NUM_MISSING_BITS 0x80000000UL
 #define ARITHMETIC 2U /* in the second word of an image */
-#define N_SCALE 6U    /* members `scale` of a table */
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) (member)
@@ -116,10 +115,10 @@ static inline uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t 
 #endif
 }
 
-/* sum + w * e; 0 <= e < 2^31 */
-static inline int_least64_t FN(accumulate)(int_least64_t sum, int_least32_t w, uint_least32_t e)
+/* sum + w * e, in two's complement; 0 <= e < 2^31 */
+static inline uint_least64_t FN(accumulate)(uint_least64_t sum, int_least32_t w, uint_least32_t e)
 {
-    return sum + ((int_least64_t)w * (int_least32_t)e);
+    return sum + (uint_least64_t)((int_least64_t)w * (int_least32_t)e);
 }
 
 /* 2^-u in 2^-31, u in 2^-24, below Q31_CUT. */
@@ -134,83 +133,37 @@ static inline uint_least32_t FN(exp2)(uint_least32_t u)
     return (entry - (FN(high)(entry, drop) >> 6)) >> (u >> 24);
 }
 
-/* The inputs of a network over the envelope: -2^15 ... 2^15 - 1. */
+/* The inputs of a network: 0 ... 2^16 - 1 over the envelope. */
 typedef struct {
-    int_least32_t x_temp;
-    int_least32_t x_slope;
+    uint_least32_t x_temp;
+    uint_least32_t x_slope;
 } FN(point_t);
 #define POINT FN(point_t)
 
-/* Position of x in 16 bits; scale: where it is 0, and its gain in 2^-26. */
-static inline int_least32_t FN(position)(int_least32_t x, const int_least32_t scale[2])
+/* Position of an input in its range, clamped; gain in 2^-26. Returns GTC_OK, GTC_CLAMPED or, for the
+ * mark of a missing number, which lies below every range, GTC_E_ARG. */
+static inline int FN(position)(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+                               uint_least32_t *position)
 {
-    const uint_least32_t offset = (uint_least32_t)x - (uint_least32_t)scale[0];
+    const uint_least32_t span = (uint_least32_t)range[1] - (uint_least32_t)range[0];
+    uint_least32_t offset = (uint_least32_t)x - (uint_least32_t)range[0];
+    int status = GTC_OK;
 
-    GTC_ASSERT_RANGE(offset < 0x4000000U);
-    return (int_least32_t)FN(high)((offset << 6) & 0xFFFFFFFFU, FN(bits)(scale[1])) - 32768;
-}
-
-static inline POINT FN(normalise)(const TABLE *table, int_least32_t temp, int_least32_t slope)
-{
-    POINT in;
-
-    in.x_temp = FN(position)(temp, &table->scale[0]);
-    in.x_slope = FN(position)(slope, &table->scale[2]);
-    return in;
-}
-
-/* u = (s x + k)^2 of both inputs, in 2^-24; `narrow`: bits by which the square is in larger units. */
-static inline uint_least32_t FN(distance)(const gtc_word_t *center, const POINT *in,
-                                          uint_least32_t narrow)
-{
-    const int_least32_t a = (center[0].integer * in->x_temp) + center[1].integer;
-    const int_least32_t b = (center[2].integer * in->x_slope) + center[3].integer;
-    uint_least64_t sum;
-
-    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(((int_least64_t)center[0].integer * in->x_temp) + center[1].integer));
-    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(((int_least64_t)center[2].integer * in->x_slope) + center[3].integer));
-    GTC_ASSERT_RANGE(narrow <= 32U);
-    if (narrow == 0U) {
-        return FN(high_of_squares)(a, b);
+    GTC_ASSERT_RANGE(span < 0x4000000U);
+    if (offset > span) {
+        status = (x == GTC_TEMP_MISSING) ? GTC_E_ARG : GTC_CLAMPED;
+        offset = (x < range[0]) ? 0U : span;
     }
-    sum = (uint_least64_t)((int_least64_t)a * a) + (uint_least64_t)((int_least64_t)b * b);
-    sum = sum >> (32U - narrow);
-    return (sum < Q31_CUT) ? (uint_least32_t)sum : Q31_CUT;
+    *position = FN(high)(offset << 6, (uint_least32_t)gain);
+    return status;
 }
 
-/* Sum of the Gaussians from `center` to `end`, onto `sum`. */
-static inline int_least64_t FN(gaussians)(const gtc_word_t *center, const gtc_word_t *end,
-                                          const POINT *in, uint_least32_t narrow, int_least64_t sum)
+/* Where the inputs lie. */
+static inline int FN(locate)(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
 {
-    for (; center != end; center = &center[GTC_CENTER_WORDS]) {
-        const uint_least32_t u = FN(distance)(center, in, narrow);
+    const int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
 
-        if (u < Q31_CUT) {
-            sum = FN(accumulate)(sum, center[4].integer, FN(exp2)(u));
-        }
-    }
-    return sum;
-}
-
-/* One network: w0 + linear part + its Gaussians. */
-static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
-                                        const gtc_word_t *center, const POINT *in)
-{
-    const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
-    const uint_least32_t narrow = FN(bits)(table->scale[4]);
-    int_least64_t sum;
-
-    sum = ((int_least64_t)network[2].integer * in->x_temp)
-          + ((int_least64_t)network[3].integer * in->x_slope);
-    /* Half a unit of the result, and 2^62, so that the shift below is one of a positive number. */
-    sum = (sum * 32768) + ((int_least64_t)network[1].integer * 2147483648LL) + 0x4000000040000000LL;
-    if (narrow == 0U) {
-        sum = FN(gaussians)(center, end, in, 0U, sum);
-    } else {
-        sum = FN(gaussians)(center, end, in, narrow, sum);
-    }
-    GTC_ASSERT_RANGE((sum >= 0) && (sum < 0x7FFFFFFFFFFFFFFFLL));
-    return (int_least32_t)((int_least64_t)((uint_least64_t)sum >> 31) - 2147483648LL);
+    return status | FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
 }
 
 /* Cells of the inputs, T and slope, among n each. */
@@ -218,8 +171,69 @@ static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_lea
                              uint_least32_t cell[2])
 {
     (void)table;
-    cell[0] = ((uint_least32_t)(in->x_temp + 32768) * n[0]) >> 16;
-    cell[1] = ((uint_least32_t)(in->x_slope + 32768) * n[1]) >> 16;
+    cell[0] = (in->x_temp * n[0]) >> 16;
+    cell[1] = (in->x_slope * n[1]) >> 16;
+}
+
+/* The argument s x + k of one input; the product may wrap, their sum does not. */
+static inline int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t x)
+{
+    gtc_word_t argument;
+
+    argument.bits = (center[0].bits * x) + center[1].bits;
+    GTC_ASSERT_RANGE(argument.integer
+                     == ((int_least64_t)center[0].bits * x) + center[1].integer);
+    GTC_ASSERT_RANGE(argument.bits != 0x80000000U);
+    return argument.integer;
+}
+
+/* Takes one Gaussian into the sum. */
+static inline uint_least64_t FN(gaussian)(uint_least64_t sum, const gtc_word_t *center, const POINT *in)
+{
+    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
+                                                 FN(argument)(&center[2], in->x_slope));
+
+    return (u < Q31_CUT) ? FN(accumulate)(sum, center[4].integer, FN(exp2)(u)) : sum;
+}
+
+/* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
+ * larger. A file of its own, because few tables need it. */
+uint_least64_t FN(narrow)(uint_least64_t sum, const gtc_word_t *center, const gtc_word_t *end,
+                          POINT in, uint_least32_t narrow);
+
+/* One network: w0 + linear part + its Gaussians. */
+static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
+                                        const gtc_word_t *center, const POINT *in)
+{
+    const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
+    uint_least64_t sum;
+    gtc_word_t bias;
+
+    /* In 2^-31 of the result's unit; half a unit rounds it. */
+    sum = ((uint_least64_t)(int_least64_t)network[1].integer << 31) | 0x40000000U;
+    sum = FN(accumulate)(sum, network[2].integer, in->x_temp << 15);
+    sum = FN(accumulate)(sum, network[3].integer, in->x_slope << 15);
+    if (table->scale[2] != 0) {
+        sum = FN(narrow)(sum, center, end, *in, (uint_least32_t)table->scale[2]);
+    } else {
+#if GTC_UNROLL
+        if ((network[0].bits & 1U) != 0U) {
+            sum = FN(gaussian)(sum, center, in);
+            center = &center[GTC_CENTER_WORDS];
+        }
+        for (; center != end; center = &center[2 * GTC_CENTER_WORDS]) {
+            sum = FN(gaussian)(sum, center, in);
+            sum = FN(gaussian)(sum, &center[GTC_CENTER_WORDS], in);
+        }
+#else
+        for (; center != end; center = &center[GTC_CENTER_WORDS]) {
+            sum = FN(gaussian)(sum, center, in);
+        }
+#endif
+    }
+    GTC_ASSERT_RANGE((sum + 0x4000000000000000ULL) < 0x8000000000000000ULL);
+    bias.bits = (uint_least32_t)((sum >> 31) & 0xFFFFFFFFU);
+    return bias.integer;
 }
 
 /* ---- the front end ---------------------------------------------------------------------- */

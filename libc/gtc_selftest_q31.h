@@ -16,7 +16,7 @@ static int FN(primitives_work)(void)
 
     return ((FN(high)(a, b) == 0x80000000UL) && (FN(high)(a, a) == 0xFFFFFFFEUL)
             && (FN(high_of_squares)(c, -c) == 0x7FFFFFFEUL)
-            && (FN(accumulate)(1, -c, (uint_least32_t)c) == -4611686014132420608LL)) ? 1 : 0;
+            && (FN(accumulate)(1, -c, (uint_least32_t)c) == 0xC000000100000000ULL)) ? 1 : 0;
 }
 
 #endif /* GTC_SELFTEST_Q31_H_INCLUDED */

@@ -293,7 +293,7 @@ def _intel_hex(data: bytes) -> str:
 def _table_text(table: Table, comments: dict[str, list[str]]) -> _TableText:
     """Decodes the image's words into named members; the order is that of gtc_table.h."""
     words = iter(table.words[_HEAD_WORDS:])
-    sizes = {"scale": 3 if table.numeric == "f32" else 6, "envelope": 4}
+    sizes = {"scale": 3, "envelope": 4}
     counts: dict[str, list[int]] = {}
     members = [_Member("layout", str(LAYOUT))]
     for name in _INTEGERS:

@@ -15,18 +15,17 @@ from gyrotc.table import ARRAYS, Table, Words
 ROOT = Path(__file__).resolve().parents[2]
 _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing-declarations shadow error"
 FLAGS = ["-std=c99", "-pedantic", "-ffp-contract=off", *(f"-W{name}" for name in _WARNINGS.split())]
-_N_SCALE = {"f32": 3, "q31": 6}
 
 
-def _table_struct(numeric: str) -> type[ctypes.Structure]:
-    """The layout of gtc_<n>_table_t."""
+def _table_struct() -> type[ctypes.Structure]:
+    """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
     integers = (
         "layout quantity unit id slope_blocks hold_blocks stuck_samples bias_frac_bits "
         "max_step max_slope fallback"
     )
     fields: list[Any] = [(name, u32) for name in integers.split()]
-    fields += [("scale", u32 * _N_SCALE[numeric]), ("envelope", u32 * 4)]
+    fields += [("scale", u32 * 3), ("envelope", u32 * 4)]
     fields += [(name, u32) for name in ("n_networks", "n_centers", "n_channels", "n_terms")]
     fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_probes", u32)]
     fields += [(name, pointer) for name in ARRAYS]
@@ -89,7 +88,7 @@ class Runtime:
 
     def struct(self, table: Table) -> tuple[ctypes.Structure, list[Any]]:
         """The C struct of a table, and what must be kept alive with it."""
-        struct = _table_struct(table.numeric)()
+        struct = _table_struct()()
         struct.layout, struct.crc, struct.serial = 1, table.crc, table.serial.encode()
         for name in ("id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits"):
             setattr(struct, name, getattr(table, name))

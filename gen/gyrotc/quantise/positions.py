@@ -1,6 +1,6 @@
 """A network over the 16-bit positions of the fixed-point runtime, in float64.
 
-A position x = -2^15 ... 2^15 - 1 stands for the middle of its cell of the envelope. In positions a
+A position x = 0 ... 2^16 - 1 stands for the middle of its cell of the envelope. In positions a
 Gaussian is 2^-((α_T (x_T - c_T))² + (α_r (x_r - c_r))²), a product of two functions of one input each; so
 sums over a grid of the envelope need only functions of one input.
 """
@@ -34,19 +34,28 @@ Floats = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, slots=True)
 class InputScale:
-    """position = ((input - zero) · gain) >> 26, minus 2^15; input in 2^-16 C."""
+    """position = ((input - low) · gain) >> 26; input in 2^-16 C."""
 
-    zero: int
+    low: int
     gain: int
 
     def position(self, value: float) -> float:
         """Where an input (2^-16 C) lies among the middles of the cells; not rounded."""
-        return (value - self.zero) * self.per_unit - 0.5 - POSITIONS / 2
+        return (value - self.low) * self.per_unit - 0.5
 
     @property
     def per_unit(self) -> float:
         """Positions per 2^-16 C."""
         return self.gain * 2.0**-_GAIN_BITS
+
+
+Inputs = tuple[InputScale, InputScale]  # T, slope
+
+
+def position_scale(low: int, high: int) -> InputScale:
+    """Scale that spreads an envelope (2^-16 C) over the positions."""
+    gain = (POSITIONS * 2**_GAIN_BITS - 1) // max(high - low, 1)
+    return InputScale(low, min(gain, 2**32 - 1))
 
 
 Inputs = tuple[InputScale, InputScale]  # T, slope
@@ -82,9 +91,9 @@ class Surface:
 
     def steepest(self) -> Floats:
         """Bounds of the derivatives by one position over the whole envelope, shape (2,)."""
-        low = np.full(2, -POSITIONS / 2.0)
+        low, high = np.zeros(2), np.full(2, float(POSITIONS))
         inverse = self.alpha * _SQRT_LN2
-        return largest_gradient(self.linear / POSITIONS, self.center, inverse, self.weights, low, -low)
+        return largest_gradient(self.linear / POSITIONS, self.center, inverse, self.weights, low, high)
 
 
 def _add_products(total: Floats, weights: Floats, a: Floats, b: Floats) -> Floats:
@@ -99,7 +108,7 @@ def difference(first: Surface, second: Surface, cells: int) -> float:
     Both must have the same Gaussians in the same order, nearly the same each.
     """
     step = POSITIONS / cells
-    x = -POSITIONS / 2 + np.arange(cells + 1) * step
+    x = np.arange(cells + 1) * step
     largest = float(np.max(np.abs(first.on_grid(x, x) - second.on_grid(x, x))))
     between = np.abs(first.linear - second.linear) / POSITIONS
     size = np.abs(first.weights)[:, None]

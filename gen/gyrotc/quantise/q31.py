@@ -28,7 +28,7 @@ _INPUT = 65536.0  # units of a temperature in C
 _MAX_SPAN = 2**26
 _FINEST = 28  # largest number of fraction bits of an argument
 _LARGEST_ARGUMENT = 2**31 - 1
-_MAX_FACTOR = 65535  # of s: its product with a position keeps within 32 bits
+_MAX_FACTOR = 65535  # of s
 _SOLVE_POINTS = 256
 _RIDGE = 1e-6
 _GRID_CELLS = 512
@@ -91,7 +91,8 @@ def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
 
 def _felt(surface: Surface) -> NDArray[np.bool_]:
     """Gaussians that reach 2^-32 somewhere in the envelope."""
-    beyond = np.maximum(np.abs(surface.center) - POSITIONS / 2, 0.0) * surface.alpha
+    center = surface.center
+    beyond = np.maximum(np.maximum(-center, center - POSITIONS), 0.0) * surface.alpha
     return np.asarray(beyond[:, 0] ** 2 + beyond[:, 1] ** 2 < 32.0)
 
 
@@ -103,13 +104,14 @@ def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
 
 def _rounded(surface: Surface) -> _Gaussians:
     """s and k of every Gaussian, with as many fraction bits as the farthest argument leaves."""
-    farthest = (np.abs(surface.center) + POSITIONS / 2) * surface.alpha
+    center = surface.center
+    farthest = np.maximum(np.abs(center), np.abs(center - POSITIONS)) * surface.alpha
     largest = float(np.max(farthest, initial=1.0))
-    fraction = min(_FINEST, 30 - math.frexp(largest)[1])
+    fraction = min(_FINEST, 31 - math.frexp(largest)[1])
     while True:
         factor = np.rint(surface.alpha * 2.0**fraction).astype(np.int64)
-        offset = np.rint(-factor * surface.center).astype(np.int64)
-        reach = np.abs(offset) + factor * (POSITIONS // 2)
+        offset = np.rint(-factor * center).astype(np.int64)
+        reach = np.maximum(np.abs(offset), np.abs(offset + factor * (POSITIONS - 1)))
         if np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(factor, initial=0) <= _MAX_FACTOR:
             return _Gaussians(factor, offset, fraction)
         fraction -= 1
@@ -117,7 +119,7 @@ def _rounded(surface: Surface) -> _Gaussians:
 
 def _columns(surface: Surface) -> tuple[Floats, Floats]:
     """Factors of constant, linear parts and Gaussians on the grid: for T and for the slope."""
-    x = -POSITIONS / 2 + (np.arange(_SOLVE_POINTS) + 0.5) * (POSITIONS / _SOLVE_POINTS)
+    x = (np.arange(_SOLVE_POINTS) + 0.5) * (POSITIONS / _SOLVE_POINTS)
     one, ramp = np.ones((x.size, 1)), x[:, None] / POSITIONS
     first = np.concatenate([one, ramp, one, surface.factors(0, x)], axis=1)
     second = np.concatenate([one, one, ramp, surface.factors(1, x)], axis=1)
@@ -183,7 +185,6 @@ def _table(
         [*np.stack([gaussians.factor, gaussians.offset], axis=2).reshape(len(whole) - 3, 4).T, whole[3:]],
         axis=1,
     )
-    scale = [v for i in inputs for v in (i.zero, i.gain)]
     return Table(
         numeric="q31",
         **shared(model),
@@ -191,7 +192,7 @@ def _table(
         max_step=_word(min(round(model.max_step_c * _INPUT), 2**31 - 1)),
         max_slope=_word(min(round(max_slope_c(model) * _INPUT), 2**31 - 1)),
         fallback=_word(round(model.fallback_dph * unit)),
-        scale=tuple(_word(v) for v in (*scale, narrow, 0)),
+        scale=(inputs[0].gain, inputs[1].gain, narrow),
         envelope=tuple(_word(v) for v in envelope),
         networks=_words(np.concatenate([[len(whole) - 3], whole[:3], envelope])),
         centers=_words(records),

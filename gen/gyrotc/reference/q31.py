@@ -60,7 +60,7 @@ def exp2(u: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Inputs over the envelope, -2^15 ... 2^15 - 1."""
+    """Inputs over the envelope, 0 ... 2^16 - 1."""
 
     x_t: Integers
     x_r: Integers
@@ -68,19 +68,18 @@ class Points:
 
 def normalise(table: Table, x: Integers) -> Points:
     """What the network sees of inputs (T, slope per block in 2^-16 C) inside the envelope, shape (n, 2)."""
-    scale = [int(s) for s in table.numbers(table.scale)]
-    return Points(_position(x[:, 0], scale[0], scale[1]), _position(x[:, 1], scale[2], scale[3]))
+    low_t, _, low_r, _ = (int(v) for v in table.numbers(table.envelope))
+    return Points(_position(x[:, 0], low_t, table.scale[0]), _position(x[:, 1], low_r, table.scale[1]))
 
 
-def _position(x: Integers, zero: int, gain: int) -> Integers:
-    offset = (x - zero).astype(np.uint64) << np.uint64(6)
-    position = (offset * np.uint64(gain & 0xFFFFFFFF)) >> np.uint64(32)
-    return np.asarray(position.astype(np.int64) - 32768)
+def _position(x: Integers, low: int, gain: int) -> Integers:
+    offset = (x - low).astype(np.uint64) << np.uint64(6)
+    return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
 
 
 def network_bits(table: Table, points: Points) -> Words:
     """Bits of the bias."""
-    narrow = int(table.scale[4])
+    narrow = int(table.scale[2])
     _, w0, linear_t, linear_r, *_ = (int(n) for n in table.numbers(table.networks))
     acc = (linear_t * points.x_t + linear_r * points.x_r) * 32768
     acc = acc + w0 * 2**31 + 2**30
@@ -97,4 +96,4 @@ def network_bits(table: Table, points: Points) -> Words:
 def cells(table: Table, points: Points) -> Integers:
     """Cells of the coverage map, (T, slope), shape (n, 2)."""
     n_t, n_r = table.coverage_cells
-    return np.stack([((points.x_t + 32768) * n_t) >> 16, ((points.x_r + 32768) * n_r) >> 16], axis=1)
+    return np.stack([(points.x_t * n_t) >> 16, (points.x_r * n_r) >> 16], axis=1)
