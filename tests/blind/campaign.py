@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 ROW_S = 10
 BLOCK_S = 100
 _SENSOR_C = 0.003  # noise of one 10-s temperature row
+_OF_MAP = ("cavity_lag", "time_misalignment", "thermometer_drift")
+_CONTRAST = 30.0
+_TRIES = 30
 _EPOCH = datetime(2026, 3, 1, 8, tzinfo=timezone.utc)
 
 
@@ -144,10 +147,14 @@ def draw_recording(
     total = [np.zeros(r.block_c.size) for r in campaign.runs]
     contrast = 1.0
     for name, k in wanted:
-        shape, parameters = pool[name](scene, rng)
-        d = yardstick.d(shape, level)
-        amplitude = 6.0 * k / max(d, 1e-12)
-        if name in ("cavity_lag", "time_misalignment", "thermometer_drift"):
+        for _ in range(_TRIES):
+            shape, parameters = pool[name](scene, rng)
+            d = yardstick.d(shape, level)
+            amplitude = 6.0 * k / max(d, 1e-12)
+            if name not in _OF_MAP or amplitude <= _CONTRAST:
+                break
+            scene.map = effects.draw_map(rng)  # no gyro has a map so steep that this one could be seen
+        if name in _OF_MAP:
             contrast = amplitude  # these scale the map itself; the sign is the map's own
         else:
             amplitude *= float(rng.choice([-1.0, 1.0]))

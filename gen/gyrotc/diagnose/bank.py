@@ -41,6 +41,7 @@ class Bank:
         basis, map: The static map and its block means, shape (N, m), orthonormal.
         signatures: Columns of all groups, map projected out, shape (N, K); single columns have norm 1.
         scale: Norm that a column of `signatures` had before, shape (K,).
+        on_map: What was taken off the columns, in map functions and over `scale`, shape (m, K).
         groups: Candidates with columns of their own.
         inputs: Candidates that change the map's input.
         replaced: Map of the changed inputs, shape (len(inputs), N, m).
@@ -55,6 +56,7 @@ class Bank:
     map: Array
     signatures: Array
     scale: Array
+    on_map: Array
     groups: tuple[Group, ...]
     inputs: tuple[Candidate, ...]
     replaced: Array
@@ -70,8 +72,8 @@ def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
     basis, static = make_basis(records, level)
     groups, columns, untestable = _columns(records)
     raw = np.column_stack(columns)
-    rest = raw - static @ (static.T @ raw)
-    rest -= static @ (static.T @ rest)
+    on_map = static.T @ raw
+    rest = raw - static @ on_map
     scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
     for group in groups:
         if group.candidate.role == "variance":
@@ -92,6 +94,7 @@ def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
         map=static,
         signatures=signatures,
         scale=scale,
+        on_map=on_map / scale,
         groups=tuple(groups),
         inputs=tuple(inputs),
         replaced=replaced,

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 Role = Literal["columns", "input", "variance", "structure"]
 
 PENALTY: dict[str, int] = {
-    "cavity_lag": 1,
-    "time_misalignment": 1,
+    "cavity_lag": 2,
+    "time_misalignment": 2,
     "thermal_gradient": 2,
     "hysteresis": 2,
     "warm_up": 2,

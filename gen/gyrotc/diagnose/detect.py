@@ -128,12 +128,18 @@ def _variance(projection: Projection, index: Index, a: Array) -> Array:
 
 def variance_ratio(projection: Projection, index: Index, a: Array) -> tuple[Array, Array]:
     """Likelihood ratio 2 Δ log L and the variance (in the unit of the columns' weights) that gives it."""
-    size, vectors = np.linalg.eigh(projection.gram[np.ix_(index, index)])
-    keep = size > _RANK * max(float(projection.before[index].max()), 1e-300)
+    gram = projection.gram[np.ix_(index, index)]
+    return variance_ratio_of(gram, a[..., index], float(projection.before[index].max()))
+
+
+def variance_ratio_of(gram: Array, a: Array, before: float) -> tuple[Array, Array]:
+    """The same from inner products of the columns, shape (k, k), and with the data, shape (..., k)."""
+    size, vectors = np.linalg.eigh(gram)
+    keep = size > _RANK * max(before, 1e-300)
     if not keep.any():
         none = np.zeros(a.shape[:-1])
         return none, none
-    s, energy = size[keep], (a[..., index] @ vectors[:, keep]) ** 2 / size[keep]
+    s, energy = size[keep], (a @ vectors[:, keep]) ** 2 / size[keep]
     gain = np.outer(_LAMBDA / s.mean(), s)
     ratio = energy @ (gain / (1.0 + gain)).T - np.log1p(gain).sum(axis=1)
     best = np.argmax(ratio, axis=-1)

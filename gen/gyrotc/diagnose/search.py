@@ -54,7 +54,7 @@ class Search:
         bank: Their bank.
         y: Block means of the rate, deg/h, shape (N,).
         extras: Further candidate columns, shape (N, e), and their candidates.
-        nuisance: Columns that are in every model beside the map (blocks left out), shape (N, d).
+        nuisance: Columns that are in every model beside the map (blocks left out, causes taken), shape (N, d).
         sigma: Factor of the noise of every block, shape (N,); None: even.
     """
 
@@ -68,6 +68,8 @@ class Search:
         sigma: Array | None = None,
     ) -> None:
         self.records, self.bank, self.sigma = records, bank, sigma
+        self._given = extras
+        self._nuisance = nuisance
         size = records.size
         self.y = y
         added, names = extras if extras is not None else (np.zeros((size, 0)), [])
@@ -75,10 +77,14 @@ class Search:
         first = self.baseline_weights(y)
         moved = [r @ first - bank.map @ first for r in bank.replaced]
         moved = [np.where(k, m, 0.0) for k, m in zip(bank.known, moved, strict=True)]
-        columns = np.column_stack([added, *moved, dropped])
-        rest = columns - bank.map @ (bank.map.T @ columns)
+        columns = np.column_stack([added, *moved])
+        on_map = bank.map.T @ columns
+        rest = columns - bank.map @ on_map
         norm = np.linalg.norm(rest, axis=0)
-        self.extra = rest / np.where(norm > 1e-9 * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
+        norm = np.where(norm > 1e-9 * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
+        self.extra_on_map = on_map / norm
+        length = np.linalg.norm(dropped, axis=0)
+        self.extra = np.column_stack([rest / norm, dropped / np.where(length > 0.0, length, 1.0)])
         m, k = bank.map.shape[1], bank.signatures.shape[1]
         self.n_map, self.n_bank = m, k
         self.base = np.arange(m)
@@ -89,6 +95,11 @@ class Search:
         likelihood = np.array([v.log_likelihood for v in self.views])
         self.best = int(likelihood.argmax())
         self.allowed = [int(k) for k in np.flatnonzero(2 * (likelihood.max() - likelihood) <= _SET_95)]
+
+    def extended(self, columns: Array) -> Search:
+        """The same search with further columns in every model; `base` lists them after the map."""
+        held = columns if self._nuisance is None else np.column_stack([self._nuisance, columns])
+        return Search(self.records, self.bank, self.y, self._given, held, self.sigma)
 
     def baseline_weights(self, y: Array) -> Array:
         """Least-squares weights of the map."""
@@ -159,19 +170,35 @@ class Search:
         return View(gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
 
     def project(self, view: View, out: Index) -> Projection:
-        """Everything after the columns `out` are projected out."""
-        inner = view.gram[np.ix_(out, out)]
+        """Everything after the columns `out` are projected out.
+
+        Where the map itself is not among them (its input is replaced), candidates get back what the map had
+        taken of them, and other inputs are no candidates any more.
+        """
+        if out.size and out[0] == 0:
+            return self._project(view, view.gram, view.b, out)
+        mix = np.eye(len(view.gram))
+        m, k, own = self.n_map, self.n_bank, len(self.extra_candidates) - len(self.bank.inputs)
+        mix[:m, m : m + k] = self.bank.on_map
+        mix[:m, m + k : m + k + own] = self.extra_on_map[:, :own]
+        for i in range(m + k + own, m + k + len(self.extra_candidates)):
+            mix[i, i] = 0.0
+        return self._project(view, mix.T @ view.gram @ mix, mix.T @ view.b, out)
+
+    def _project(self, view: View, full: Array, b: Array, out: Index) -> Projection:
+        inner = full[np.ix_(out, out)]
         size, vectors = np.linalg.eigh(inner)
         keep = size > 1e-10 * size[-1]
         half = vectors[:, keep] / np.sqrt(size[keep])
-        cross = half.T @ view.gram[out]
-        gram = view.gram - cross.T @ cross
-        a = (view.b - cross.T @ (half.T @ view.b[out])) / view.scale
-        common = np.zeros((len(gram), self.bank.common.shape[1]))
+        cross = half.T @ full[out]
+        taken = half.T @ b[out]
+        a = (b - cross.T @ taken) / view.scale
+        common = np.zeros((len(full), self.bank.common.shape[1]))
         common[self.n_map : self.n_map + self.n_bank] = self.bank.common
-        rest = view.yy - float(((half.T @ view.b[out]) ** 2).sum())
+        rest = view.yy - float(taken @ taken)
         log_det = view.log_det + float(np.log(size[keep]).sum())
-        return Projection(a, gram, np.diag(view.gram).copy(), common, rest, log_det, int(keep.sum()))
+        before = np.maximum(np.diag(full), 1e-12)
+        return Projection(a, full - cross.T @ cross, before, common, rest, log_det, int(keep.sum()))
 
     def detect(self, out: Index) -> list[Found]:
         """Candidates by adjusted p-value under the worst colour allowed for each, best first.

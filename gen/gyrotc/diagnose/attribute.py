@@ -1,0 +1,224 @@
+"""Attribution: which causes, how sure, and is anything left?
+
+Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, further
+ones while the search finds something beside them. What the chosen causes leave is held against the whole
+dictionary (lack of fit).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincc
+
+from .catalogue import PENALTY, Candidate
+from .detect import score
+from .likelihood import Gains, Point
+from .refine import Refined, refine
+from .search import Found, Search
+
+__all__ = ["Attribution", "Rival", "attribute"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_LEVEL = 0.01
+_EQUIVALENT = 8.0  # difference of the criterion within which two explanations count as equal
+_PAIR = 10.0  # what a pair must gain over the best single cause
+_MEMBER = 15.0  # what each of a pair must gain beside the other
+_MOST = 3
+_MISFIT = 0.01
+_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another cause in place of a chosen one: its criterion's distance, 0 is equal."""
+
+    id: str
+    distance: float
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What was found.
+
+    Attributes:
+        first: The search before any cause is taken, best first.
+        causes: The chosen causes, strongest first.
+        p_values: Of each, adjusted for the whole search.
+        rivals: For each, other causes in its place, nearest first.
+        gain: Twice the log-likelihood ratio of all causes together.
+        misfit_p: p-value of what is left against the dictionary.
+        share: Share of the detectable structure that the causes explain.
+        last: The search after the last cause.
+    """
+
+    first: list[Found]
+    causes: tuple[Refined, ...]
+    p_values: tuple[float, ...]
+    rivals: tuple[tuple[Rival, ...], ...]
+    gain: float
+    misfit_p: float
+    share: float
+    last: list[Found]
+
+    @property
+    def detected(self) -> bool:
+        return bool(self.first) and self.first[0].p_value <= _LEVEL
+
+
+def attribute(search: Search) -> Attribution:
+    """Runs the search to its end."""
+    first = search.detect(search.base)
+    if first[0].p_value > _LEVEL:
+        return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first)
+    gains = Gains(search)
+    singles = list(gains.single())
+    chosen: tuple[Candidate, ...] = _best(singles, gains.size).members
+    refined = _refined(search, gains, chosen)
+    current, out = _with(search, refined)
+    found = current.detect(out)
+    misfit_p, share = _misfit(current, out, _total(gains, current, out))
+    pairs: list[Point] = []
+    if found[0].p_value <= _LEVEL or misfit_p <= _MISFIT:
+        pairs = [p for p in gains.pairs() if p.members[0].id != p.members[1].id or _twice(p)]
+        pair = _pair(singles, pairs, gains.size)
+        if pair is not None:
+            chosen = pair.members
+            refined = _refined(search, gains, chosen)
+            current, out = _with(search, refined)
+            found = current.detect(out)
+            third = _third(found, chosen)
+            if third is not None and len(chosen) < _MOST:
+                chosen = (*chosen, third)
+                refined = _refined(search, gains, chosen)
+                current, out = _with(search, refined)
+                found = current.detect(out)
+        misfit_p, share = _misfit(current, out, _total(gains, current, out))
+    order = _by_strength(singles, chosen)
+    refined = tuple(refined[k] for k in order)
+    return Attribution(
+        first=first,
+        causes=refined,
+        p_values=tuple(_p_value(first, r.candidate.id) for r in refined),
+        rivals=_rivals(singles, pairs, tuple(chosen[k] for k in order), gains.size),
+        gain=_total(gains, current, out),
+        misfit_p=misfit_p,
+        share=share,
+        last=found,
+    )
+
+
+def _twice(point: Point) -> bool:
+    """Two gradients, or two periods, that differ by more than the grid can confuse."""
+    a, b = point.members
+    if a.id not in ("thermal_gradient", "path_length_periodicity") or a.channel != b.channel:
+        return a.channel != b.channel
+    x, y = (next(iter(m.values.values())) for m in (a, b))
+    return abs(np.log(x / y)) > 0.7
+
+
+def _best(points: list[Point], size: int) -> Point:
+    return max(points, key=lambda p: p.criterion(size))
+
+
+def _pair(singles: list[Point], pairs: list[Point], size: int) -> Point | None:
+    """The best pair if it is clearly better than the best single cause and needs both its members."""
+    best = _best(pairs, size)
+    alone = {id: max(p.gain for p in singles if p.members[0].id == id) for id in {m.id for m in best.members}}
+    if best.criterion(size) < _best(singles, size).criterion(size) + _PAIR:
+        return None
+    if any(best.gain - gain < _MEMBER for gain in alone.values()):
+        return None
+    return best
+
+
+def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | None:
+    top = found[0]
+    taken = {c.id for c in chosen}
+    if top.p_value > _LEVEL or top.candidate.role == "structure" or top.candidate.id in taken:
+        return None
+    if top.candidate.role == "input":
+        return None
+    return top.candidate
+
+
+def _refined(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tuple[Refined, ...]:
+    return refine(search, gains, members)
+
+
+def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Index]:
+    """The search with the causes' columns and tangents as part of every model."""
+    blocks = [b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None]
+    current = search.extended(np.column_stack(blocks))
+    out = current.base
+    if any(c.candidate.role == "input" for c in causes):
+        out = out[search.n_map :]  # the replaced map stands among the added columns
+    return current, out
+
+
+def _total(gains: Gains, current: Search, out: Index) -> float:
+    """Energy that the causes explain beyond the map, at the likeliest colour, over the noise."""
+    view = current.views[gains.search.best]
+    before = current.project(view, np.arange(current.n_map))
+    after = current.project(view, out)
+    return max((before.rest - after.rest) / view.scale**2, 0.0)
+
+
+def _misfit(current: Search, out: Index, gain: float) -> tuple[float, float]:
+    """Lack of fit: p-value of the energy left in the dictionary (worst colour), and the share explained."""
+    best, excess = 0.0, 0.0
+    worst = np.inf
+    for k in current.allowed:
+        projection = current.project(current.views[k], out)
+        energy = float(((projection.a @ projection.structure) ** 2).sum())
+        size = projection.structure.shape[1]
+        log_p = -np.log(max(float(gammaincc(0.5 * size, 0.5 * energy)), 1e-300))
+        if log_p < worst:
+            worst, best, excess = log_p, energy, energy - size
+    del best
+    return float(np.exp(-worst)), gain / max(gain + max(excess, 0.0), 1e-300)
+
+
+def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:
+    alone = [max((p.gain for p in singles if p.members[0].id == c.id), default=0.0) for c in chosen]
+    return sorted(range(len(chosen)), key=lambda k: -alone[k])
+
+
+def _p_value(found: list[Found], cause: str) -> float:
+    return min((f.p_value for f in found if f.candidate.id == cause), default=1.0)
+
+
+def _rivals(
+    singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
+) -> tuple[tuple[Rival, ...], ...]:
+    """Other causes in the place of each chosen one, everything else kept in kind."""
+    ids = [c.id for c in chosen]
+    pool = singles if len(chosen) == 1 else pairs
+    if len(chosen) > 2:
+        return tuple(() for _ in chosen)
+    best: dict[tuple[str, ...], float] = {}
+    for p in pool:
+        key = tuple(sorted(m.id for m in p.members))
+        value = p.criterion(size)
+        if value > best.get(key, -np.inf):
+            best[key] = value
+    own = best[tuple(sorted(ids))]
+    out = []
+    for k in range(len(ids)):
+        others = ids[:k] + ids[k + 1 :]
+        near: dict[str, float] = {}
+        for key, value in best.items():
+            rest = list(key)
+            if any(o not in rest for o in others):
+                continue
+            for o in others:
+                rest.remove(o)
+            if rest != [ids[k]]:
+                near[rest[0]] = max(near.get(rest[0], -np.inf), value)
+        ranked = sorted(near.items(), key=lambda item: -item[1])
+        out.append(tuple(Rival(id, own - v) for id, v in ranked if own - v <= _EQUIVALENT))
+    return tuple(out)

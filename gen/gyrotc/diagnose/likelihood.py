@@ -1,0 +1,165 @@
+"""How much better each cause, and each pair of causes, explains the data: profile likelihoods on the grid.
+
+All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
+change of the map's input the same number of map functions is fitted before and after (equal flexibility),
+on the blocks where the changed input is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .catalogue import PENALTY, Candidate
+from .detect import variance_ratio_of
+from .noise import COLOURS, Whitener
+from .search import Search
+
+__all__ = ["Gains", "Model", "Point"]
+
+Array = NDArray[np.float64]
+
+_INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A model of one or two candidates and its gain."""
+
+    members: tuple[Candidate, ...]
+    gain: float
+
+    def criterion(self, size: int) -> float:
+        """Gain less the price of the parameters: half the difference of BIC, times two."""
+        return self.gain - sum(PENALTY[m.id] for m in self.members) * float(np.log(size))
+
+
+Model = tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class _Base:
+    """What is left when a map (plain or of another input) is projected out.
+
+    `columns`: all bank columns and channel columns, whitened and projected, over the noise scale.
+    """
+
+    candidate: Candidate | None
+    gain: float
+    gram: Array
+    a: Array
+
+
+class Gains:
+    """Gains of all candidates and pairs for one search."""
+
+    def __init__(self, search: Search) -> None:
+        self.search = search
+        view = search.views[search.best]
+        self.scale = view.scale
+        self.whiten = Whitener(
+            COLOURS[search.best], search.records.kept, search.records.block_s, search.sigma
+        )
+        bank = search.bank
+        own = len(search.extra_candidates) - len(bank.inputs)
+        columns = np.column_stack([bank.signatures, search.extra[:, :own]])
+        taken = np.column_stack([bank.on_map, search.extra_on_map[:, :own]])
+        self._columns = self.whiten(columns)
+        self._whole = self._columns + self.whiten(bank.map) @ taken
+        self._y = self.whiten(search.y) / self.scale
+        self._dropped = self.whiten(search.extra[:, len(search.extra_candidates) :])
+        self._map = self.whiten(bank.map)
+        self.size = search.y.size
+        names: list[tuple[Candidate, slice]] = [(g.candidate, g.columns) for g in bank.groups]
+        k = bank.signatures.shape[1]
+        names += [(search.extra_candidates[i], slice(k + i, k + i + 1)) for i in range(own)]
+        self.plain = [(c, s) for c, s in names if c.role == "columns"]
+        self.random = [(c, s) for c, s in names if c.role == "variance"]
+        self.base = self._project(None, self._map, None)
+        self._bases: list[_Base] | None = None
+
+    def bases(self) -> list[_Base]:
+        """The map of every changed input, projected out."""
+        if self._bases is None:
+            bank = self.search.bank
+            flat = bank.replaced.transpose(1, 0, 2).reshape(self.size, -1)
+            white = self.whiten(flat).reshape(self.size, len(bank.inputs), -1)
+            self._bases = [
+                self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)
+            ]
+        return self._bases
+
+    def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
+        blocks = [self._dropped]
+        if known is not None and not known.all():
+            blocks.append(self.whiten(np.eye(self.size)[:, ~known]))
+        q, r = np.linalg.qr(np.column_stack([*blocks, design]))
+        size = np.abs(np.diag(r))
+        q = q[:, size > 1e-9 * size.max()]
+        columns = self._columns if candidate is None else self._whole
+        cross, c = q.T @ columns, q.T @ self._y
+        energy = float(c @ c)
+        gain = 0.0
+        if candidate is not None:
+            p, _ = np.linalg.qr(np.column_stack([*blocks, self._map]))
+            gain = energy - float(((p.T @ self._y) ** 2).sum())
+        gram = (self._gram if candidate is None else self._whole_gram) - cross.T @ cross
+        return _Base(candidate, gain, gram, columns.T @ self._y - cross.T @ c)
+
+    @cached_property
+    def _gram(self) -> Array:
+        return np.asarray(self._columns.T @ self._columns)
+
+    @cached_property
+    def _whole_gram(self) -> Array:
+        return np.asarray(self._whole.T @ self._whole)
+
+    def single(self) -> Iterator[Point]:
+        """All models of one candidate."""
+        yield from self._on(self.base, ())
+        for base in self.bases():
+            assert base.candidate is not None
+            yield Point((base.candidate,), base.gain)
+
+    def pairs(self) -> Iterator[Point]:
+        """All models of two candidates of which at most one changes the input."""
+        for candidate, at in self.plain:
+            taken = _take(self.base, at)
+            if taken is not None:
+                yield from self._on(taken, (candidate,))
+        for base in self.bases():
+            assert base.candidate is not None
+            yield from self._on(base, (base.candidate,))
+
+    def _on(self, base: _Base, members: Model) -> Iterator[Point]:
+        """Every candidate with columns of its own, added to what `base` holds already."""
+        before = np.diag(self._gram)
+        for candidate, at in self.plain:
+            own = base.gram[at, at]
+            a = base.a[at]
+            if a.size == 1:
+                gain = float(a[0] ** 2 / own[0, 0]) if own[0, 0] > _INDEPENDENT * before[at][0] else 0.0
+            else:
+                det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
+                flat = det <= _INDEPENDENT * before[at][0] * before[at][1]
+                raw = own[1, 1] * a[0] ** 2 - 2 * own[0, 1] * a[0] * a[1] + own[0, 0] * a[1] ** 2
+                gain = 0.0 if flat else float(raw / det)
+            yield Point((*members, candidate), base.gain + gain)
+        for candidate, at in self.random:
+            gain = float(variance_ratio_of(base.gram[at, at], base.a[at], float(before[at].max()))[0])
+            yield Point((*members, candidate), base.gain + gain)
+
+
+def _take(base: _Base, at: slice) -> _Base | None:
+    """`base` with further columns projected out; None if they have nothing of their own."""
+    own = base.gram[at, at]
+    values, vectors = np.linalg.eigh(own)
+    if values[0] <= _INDEPENDENT * max(float(values[-1]), 1e-3):
+        return None
+    half = vectors / np.sqrt(values)
+    cross, c = half.T @ base.gram[at], half.T @ base.a[at]
+    return _Base(base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c)

@@ -1,0 +1,290 @@
+"""Parameters of chosen causes: the optimum between the grid's points, amplitudes, 95 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import terms
+from .bank import replaced_map
+from .baseline import fine_columns
+from .catalogue import Candidate, columns_of, shape_parameter
+from .likelihood import Gains
+from .search import Search
+
+__all__ = ["Interval", "Refined", "refine"]
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 2
+_HALF_95 = 3.84
+_STEP = 0.02  # relative step of the derivative to a parameter
+_NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A chosen cause.
+
+    Attributes:
+        candidate: With refined nonlinear parameters.
+        columns: What it adds to the model, shape (N, k); for kind "input" the whole map of the new input.
+        tangent: Derivative of its contribution to the nonlinear parameter, shape (N, k) or None.
+        parameters: All parameters by name.
+        contribution: Its part of the fitted rate, deg/h, shape (N,).
+        edges: One column for every block where the changed input is not known, or None.
+        profile: Parameter values and gains of the profile likelihood, shape (2, n); None without a parameter.
+    """
+
+    candidate: Candidate
+    columns: Array
+    tangent: Array | None
+    parameters: dict[str, Interval]
+    contribution: Array
+    edges: Array | None
+    profile: Array | None
+
+
+def _columns(search: Search, candidate: Candidate) -> Array:
+    records = search.records
+    if candidate.role == "input":
+        return replaced_map(records, search.bank.basis, candidate)[0]
+    if candidate.id == "map_too_coarse":
+        return fine_columns(records)
+    if candidate.channel is not None:
+        return records.average([r.channels[candidate.channel] for r in records.runs])[:, None]
+    return columns_of(records, candidate.id, candidate.values)
+
+
+def _moved(candidate: Candidate, value: float) -> Candidate:
+    parameter = shape_parameter(candidate.id)
+    assert parameter is not None
+    return replace(candidate, values={**candidate.values, parameter.name: value})
+
+
+class _Fit:
+    """Generalised least squares at the likeliest colour for models made of whole candidates."""
+
+    def __init__(self, search: Search, gains: Gains, members: tuple[Candidate, ...]) -> None:
+        self.search, self.gains = search, gains
+        shift = max((abs(m.values["shift_s"]) for m in members if m.id == "time_misalignment"), default=0.0)
+        known = np.concatenate([_inside(search, k, shift + 150.0) for k in range(len(search.records.runs))])
+        edges = np.eye(search.y.size)[:, ~known] if shift else np.zeros((search.y.size, 0))
+        self.edges = edges
+        held = [gains.whiten(edges)] + ([] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)])
+        self.q = np.linalg.qr(np.column_stack(held))[0]
+        y = gains.whiten(search.y) / gains.scale
+        self.y = y - self.q @ (self.q.T @ y)
+        self._cache: dict[tuple[str, tuple[tuple[str, float], ...], str | None], Array] = {}
+
+    def white(self, candidate: Candidate) -> Array:
+        """Whitened columns of a candidate less what the map (or the masked edges) explain."""
+        key = (candidate.id, tuple(sorted(candidate.values.items())), candidate.channel)
+        if key not in self._cache:
+            columns = self.gains.whiten(_columns(self.search, candidate))
+            self._cache[key] = columns - self.q @ (self.q.T @ columns)
+        return self._cache[key]
+
+    def energy(self, members: list[Candidate]) -> float:
+        """Energy of the data that the members explain beyond the map."""
+        q, r = np.linalg.qr(np.column_stack([self.white(m) for m in members]))
+        size = np.abs(np.diag(r))
+        return float(((q[:, size > 1e-9 * size.max()].T @ self.y) ** 2).sum())
+
+
+def _inside(search: Search, k: int, margin_s: float) -> NDArray[np.bool_]:
+    """Blocks of a run that are farther than a margin from its ends."""
+    number = search.records.kept[k]
+    at = (number + 0.5) * search.records.block_s
+    length = (float(search.records.index[k][-1]) + 1.0) * search.records.block_s
+    return np.asarray((at > margin_s) & (at < length - margin_s))
+
+
+def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tuple[Refined, ...]:
+    """Moves the nonlinear parameters of all members to the optimum, one after the other, twice."""
+    fit = _Fit(search, gains, members)
+    current = list(members)
+    profiles: list[Array | None] = [None] * len(current)
+    for _ in range(_ROUNDS if len(current) > 1 else 1):
+        for k, member in enumerate(current):
+            if shape_parameter(member.id) is None or member.channel is not None:
+                continue
+            profiles[k], best = _profile(fit, current, k)
+            current[k] = _moved(member, best)
+    return tuple(_result(search, fit, current, k, profiles[k]) for k in range(len(current)))
+
+
+def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]:
+    """Profile likelihood of the k-th member's parameter around its optimum, and the optimum."""
+    parameter = shape_parameter(members[k].id)
+    assert parameter is not None
+    points: dict[float, float] = {}
+
+    def energy(value: float) -> float:
+        if value not in points:
+            points[value] = fit.energy([*members[:k], _moved(members[k], value), *members[k + 1 :]])
+        return points[value]
+
+    here = members[k].values[parameter.name]
+    width = _local_width(fit, members[k], here)
+    low = 0.05 * here if parameter.name != "shift_s" else -np.inf
+    for shrink in (1.0, 0.35):
+        here, curve = _parabola(energy, here, shrink * width, low)
+    half = float(np.sqrt(_HALF_95 / curve)) if curve > 0 else width
+    for sign in (-1.0, 1.0):
+        for reach in (0.6, 1.0, 1.4, 2.2, 3.5, 6.0):
+            value = here + sign * reach * half
+            if value <= low or energy(value) < energy(here) - 1.5 * _HALF_95:
+                break
+    best = max(points, key=lambda v: points[v])
+    return np.array(sorted(points.items())).T, best
+
+
+def _parabola(energy: Callable[[float], float], here: float, width: float, low: float) -> tuple[float, float]:
+    """One step to the top of a parabola through three points, and its curvature."""
+    left, right = max(here - width, 0.5 * (here + low) if np.isfinite(low) else here - width), here + width
+    x = np.array([left, here, right]) - here
+    c2, c1, _ = np.polyfit(x, [energy(left), energy(here), energy(right)], 2)
+    if c2 >= 0.0:
+        values = {v: energy(v) for v in (left, here, right)}
+        return max(values, key=lambda v: values[v]), 0.0
+    move = float(np.clip(-c1 / (2.0 * c2), x[0], x[2]))
+    energy(here + move)
+    return here + move, float(-c2)
+
+
+def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
+    """About one point of the search's grid."""
+    if member.id == "time_misalignment":
+        return 45.0
+    if member.id == "path_length_periodicity":
+        t = np.concatenate([r.history.temperature_c for r in fit.search.records.runs])
+        return here**2 / (4.0 * float(np.ptp(t)))
+    return 0.2 * abs(here)
+
+
+def _interval(profile: Array) -> tuple[float, float]:
+    """Where the profile has fallen by 3.84, linear between points; its ends where it has not."""
+    x, e = profile
+    top = int(e.argmax())
+    drop = e[top] - _HALF_95
+    low, high = float(x[0]), float(x[-1])
+    for i in range(top, 0, -1):
+        if e[i - 1] < drop:
+            low = float(np.interp(drop, [e[i - 1], e[i]], [x[i - 1], x[i]]))
+            break
+    for i in range(top, x.size - 1):
+        if e[i + 1] < drop:
+            high = float(np.interp(drop, [e[i + 1], e[i]], [x[i + 1], x[i]]))
+            break
+    return low, high
+
+
+def _result(
+    search: Search, fit: _Fit, members: list[Candidate], k: int, profile: Array | None
+) -> Refined:
+    """Amplitudes with intervals that allow for the uncertainty of the nonlinear parameters."""
+    swapped = [m for m in members if m.role == "input"]
+    blocks = [fit.edges] if swapped else [fit.edges, search.bank.map]
+    plain = [_columns(search, m) for m in members]
+    start = sum(b.shape[1] for b in blocks) + sum(p.shape[1] for p in plain[:k])
+    own = plain[k]
+    design = np.column_stack([*blocks, *plain])
+    white = fit.gains.whiten(design)
+    norm = np.linalg.norm(white, axis=0)
+    y = fit.gains.whiten(search.y)
+    weights = np.linalg.lstsq(white / norm, y, rcond=1e-10)[0] / norm
+    mine = weights[start : start + own.shape[1]]
+    tangent = _tangent(search, members[k], mine)
+    contribution = own @ mine
+    if members[k].role == "input":
+        contribution = contribution - search.bank.map @ (search.bank.map.T @ contribution)
+    parameters: dict[str, Interval] = {}
+    parameter = shape_parameter(members[k].id)
+    if parameter is not None and profile is not None:
+        low, high = _interval(profile)
+        parameters[parameter.name] = Interval(members[k].values[parameter.name], low, high)
+    tangents = [_tangent(search, m, None) if m is not members[k] else tangent for m in members]
+    spread = _spread(fit, design, [t for t in tangents if t is not None], start, own.shape[1])
+    parameters |= _amplitudes(members[k], mine, spread, fit, own)
+    edges = fit.edges if members[k].id == "time_misalignment" else None
+    return Refined(members[k], own, tangent, parameters, np.asarray(contribution), edges, profile)
+
+
+def _tangent(search: Search, candidate: Candidate, weights: Array | None) -> Array | None:
+    """Derivative to the nonlinear parameter: of the columns, or of their weighted sum for a map."""
+    parameter = shape_parameter(candidate.id)
+    if parameter is None or candidate.channel is not None:
+        return None
+    here = candidate.values[parameter.name]
+    step = 5.0 if candidate.id == "time_misalignment" else _STEP * here
+    upper = _columns(search, _moved(candidate, here + step))
+    lower = _columns(search, _moved(candidate, here - step))
+    slope = (upper - lower) / (2.0 * step)
+    if candidate.role != "input":
+        return np.asarray(slope)
+    if weights is None:
+        return None
+    return np.asarray(slope @ weights)[:, None]
+
+
+def _spread(fit: _Fit, design: Array, tangents: list[Array], start: int, count: int) -> Array:
+    """Covariance of the weights `start` ... when everything is free, shape (count, count)."""
+    white = fit.gains.whiten(np.column_stack([design, *tangents]))
+    norm = np.where(np.linalg.norm(white, axis=0) > 0, np.linalg.norm(white, axis=0), 1.0)
+    inverse = np.linalg.pinv((white / norm).T @ (white / norm), rcond=1e-11, hermitian=True)
+    part = slice(start, start + count)
+    return np.asarray(inverse[part, part] / np.outer(norm[part], norm[part]) * fit.gains.scale**2)
+
+
+def _amplitudes(
+    candidate: Candidate, weights: Array, spread: Array, fit: _Fit, columns: Array
+) -> dict[str, Interval]:
+    """Linear parameters by the term's own rule, with intervals."""
+    if candidate.role == "input" or candidate.id == "map_too_coarse":
+        return {}
+    if candidate.id == "turn_on_offset":
+        return {"std_dph": _random(weights, spread)}
+    rule = terms.CATALOGUE[candidate.id].amplitudes
+    assert rule is not None
+    centre = rule(weights)
+    out = {}
+    for name, value in centre.items():
+        gradient = np.zeros(weights.size)
+        for i in range(weights.size):
+            step = 1e-4 * float(np.linalg.norm(weights)) + 1e-300
+            moved = weights.copy()
+            moved[i] += step
+            gradient[i] = (rule(moved)[name] - value) / step
+        half = _NORMAL_95 * float(np.sqrt(max(gradient @ spread @ gradient, 0.0)))
+        out[name] = Interval(value, value - half, value + half)
+    if candidate.channel is not None:
+        out["reference"] = Interval(float(np.mean(columns)), float(np.mean(columns)), float(np.mean(columns)))
+    return out
+
+
+def _random(weights: Array, spread: Array) -> Interval:
+    """Standard deviation of normal offsets from their estimates: chi-square limits, noise taken off."""
+    from scipy.stats import chi2
+
+    n = weights.size
+    centred = weights - weights.mean()
+    middle = np.eye(n) - 1.0 / n
+    noise = float(np.trace(middle @ spread @ middle)) / max(n - 1, 1)
+    raw = float(centred @ centred)
+    value = float(np.sqrt(max(raw / max(n - 1, 1) - noise, 0.0)))
+    low = float(np.sqrt(max(raw / chi2.ppf(0.975, max(n - 1, 1)) - noise, 0.0)))
+    high = float(np.sqrt(max(raw / chi2.ppf(0.025, max(n - 1, 1)) - noise, 0.0)))
+    return Interval(value, low, high)
