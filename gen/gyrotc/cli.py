@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +18,7 @@ from rich.table import Table as RichTable
 from . import __version__
 from .errors import CheckFailed, GyrotcError
 from .model import write_atomically
+from .paper.published import AFTER_DPH
 
 if TYPE_CHECKING:
     from .build import Built
@@ -29,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-_OUT = Console()
+_OUT = Console(width=None if sys.stdout.isatty() else 120)
 _ERR = Console(stderr=True)
 
 DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
@@ -358,6 +360,43 @@ def _print_built(result: Built) -> None:
 
 
 @app.command()
+def compare(
+    dataset: DatasetArg,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
+    ] = None,
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The paper's Table 1 on this data: every training method side by side.
+
+    Example: gyrotc compare recordings --out comparison
+    """
+    from .applied import applied_of
+    from .compare import CompareOptions
+    from .compare import compare as run
+    from .dataset import load
+
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+    with _progress() as say:
+        result = run(
+            recordings, CompareOptions(seed=seed, block_s=block_s, average_s=average_s), progress=say
+        )
+    _write_json(json_file, result)
+    if out is not None:
+        from .plots import methods_side_by_side
+
+        write_atomically(out / "compare.json", json_text(result))
+        write_atomically(out / "compare.svg", methods_side_by_side(result))
+    for table in comparison_tables(result):
+        _OUT.print(table)
+
+
+@app.command()
 def report(folder: DirArg) -> None:
     """Write DIR/report.html from DIR/*.json and DIR/trace/*.csv.
 
@@ -396,6 +435,43 @@ def evaluation_table(result: dict[str, Any]) -> RichTable:
                 _e(part["after"]["std_dph"]), str(part["samples"]), style="bold",
             )  # fmt: skip
     return table
+
+
+def comparison_tables(result: dict[str, Any]) -> Iterator[RichTable]:
+    """The paper's Table 1 on this data, the paper's own figures beside it for its environments; then the costs."""
+    environments = [g["environment"] for g in result["methods"][0]["groups"]]
+    after = [g["after_rms_dph"] for m in result["methods"] for g in m["groups"]]
+    exponent = math.floor(math.log10(min(after)))
+    title = f"{result['serial']}: judged on {result['judged_on']}, rates in 1e{exponent} deg/h"
+    table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("", "method", *environments):
+        table.add_column(name, justify="right" if name in environments else "left", no_wrap=True)
+
+    def scaled(values: Iterable[float | None]) -> list[str]:
+        return ["" if v is None else f"{v / 10.0**exponent:.2f}" for v in values]
+
+    groups = result["methods"][0]["groups"]
+    table.add_row("RMS before", "", *scaled(g["before_rms_dph"] for g in groups))
+    table.add_row("std before", "", *scaled(g["before_std_dph"] for g in groups), end_section=True)
+    for label, key in (("RMS after", "after_rms_dph"), ("std after", "after_std_dph")):
+        for m in result["methods"]:
+            table.add_row(label, m["id"], *scaled(g[key] for g in m["groups"]))
+            paper = [AFTER_DPH.get(m["id"], {}).get(e) for e in environments]
+            if key == "after_rms_dph" and any(paper):
+                table.add_row("", "  in the paper", *scaled(paper), style="dim")
+        table.add_section()
+    for m in result["methods"]:
+        table.add_row("improvement", m["id"], *(f"{g['improvement']:.2f}" for g in m["groups"]))
+    yield table
+    cost = RichTable(title="All environments", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("method", "RMS", "std", "improvement", "centers", "bytes", "training, s"):
+        cost.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for m in result["methods"]:
+        cost.add_row(
+            m["id"], *scaled((m["exam_rms_dph"], m["exam_std_dph"])), f"{m['improvement']:.2f}",
+            str(m["centers"]), str(m["table_bytes"]), f"{m['train_s']:.3f}",
+        )  # fmt: skip
+    yield cost
 
 
 def verify_table(result: dict[str, Any]) -> RichTable:

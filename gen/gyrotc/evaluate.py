@@ -172,7 +172,9 @@ def _write_trace(
     )
     table = pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True)))
     part = folder / f".{name}.part"
-    pacsv.write_csv(table, part, pacsv.WriteOptions(quoting_style="none"))
+    with part.open("wb") as stream:
+        stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
+        pacsv.write_csv(table, stream, pacsv.WriteOptions(include_header=False, quoting_style="none"))
     part.replace(folder / name)
 
 

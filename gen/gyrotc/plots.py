@@ -20,7 +20,14 @@ from matplotlib.ticker import MaxNLocator
 from .metrics import Averages
 from .model import Model
 
-__all__ = ["allan_deviation", "bias_over_time", "curve_by_size", "map_with_centers", "svg"]
+__all__ = [
+    "allan_deviation",
+    "bias_over_time",
+    "curve_by_size",
+    "map_with_centers",
+    "methods_side_by_side",
+    "svg",
+]
 
 BEFORE, AFTER, COVERED, ACCENT = "#b4552d", "#1f6f8b", "#7a7a7a", "#222222"
 _STYLE: Any = {
@@ -195,4 +202,29 @@ def allan_deviation(noise: dict[str, Any]) -> str | None:
             )
             ax.legend(fontsize=8)
         ax.set(xscale="log", yscale="log", xlabel="averaging time, s", ylabel="deg/h")
+        return svg(figure)
+
+
+def methods_side_by_side(result: dict[str, Any]) -> str:
+    """RMS after compensation of every method in every environment, over the noise floor where it is known."""
+    methods = result["methods"]
+    environments = [g["environment"] for g in methods[0]["groups"]]
+    with mpl.rc_context(_STYLE):
+        figure = _figure(10.0, 3.4)
+        ax = figure.subplots()
+        width = 0.8 / len(methods)
+        colors = mpl.colormaps["cividis"](np.linspace(0.05, 0.95, len(methods)))
+        for k, (method, color) in enumerate(zip(methods, colors, strict=True)):
+            place = np.arange(len(environments)) + (k - (len(methods) - 1) / 2) * width
+            values = [g["after_rms_dph"] for g in method["groups"]]
+            label = f"{method['id']} ({method['table_bytes']} bytes)"
+            ax.bar(place, values, width=0.92 * width, color=color, label=label)
+        if result.get("noise_floor_dph"):
+            ax.axhline(
+                result["noise_floor_dph"], color=ACCENT, linewidth=0.8, linestyle="--", label="noise floor"
+            )
+        ax.set_xticks(np.arange(len(environments)), environments)
+        ax.set(ylabel="RMS after, deg/h")
+        ax.grid(visible=False, axis="x")
+        figure.legend(fontsize=8, loc="outside right upper")
         return svg(figure)
