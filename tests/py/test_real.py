@@ -1,0 +1,55 @@
+"""Measured recordings: every axis, built from end to end; skipped, and told, where they are absent."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import ROOT, Command
+
+REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
+SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")
+ABSENT = [name for name in SETS if not (REAL / name).is_dir()]
+SKIPPED = f"{len(ABSENT)} of {len(SETS)} measured recordings are absent: see GYROTC_REAL_DATA"
+
+
+def built(name: str, out: Path, gyrotc: Command) -> dict[str, dict[str, Any]]:
+    """Evaluation and model of every axis."""
+    if name in ABSENT:
+        pytest.skip(SKIPPED)
+    done = gyrotc("build", REAL / name, "--axis", "all", "--out", out, "--numeric", "f32")
+    assert done.returncode == 0, done.stderr
+    return {
+        axis: {
+            part: json.loads((out / axis / f"{part}.json").read_text())
+            for part in ("evaluate", "model", "training")
+        }
+        for axis in "xyz"
+    }
+
+
+def found(result: dict[str, Any]) -> set[str]:
+    return {finding["id"] for finding in result["evaluate"]["findings"]}
+
+
+def test_a_chamber_cycle_fails_on_the_branch_it_has_not_seen(tmp_path: Path, gyrotc: Command) -> None:
+    for result in built("mpu6000-chamber-cycle", tmp_path / "out", gyrotc).values():
+        assert "fails_on_unseen_span" in found(result)
+        assert "jump_in_temperature" in found(result), "the start-up row"
+        assert result["evaluate"]["mismatches"] == 0
+        left_out, seen = result["evaluate"]["left_out"], result["evaluate"]["train"]
+        assert left_out["after"]["rms_dph"] > 10.0 * seen["after"]["rms_dph"]
+        assert [span["kind"] for span in result["training"]["spans"]] == ["branch"] * 3
+
+
+def test_nothing_can_be_learnt_from_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
+    for result in built("mpu6050-isothermal", tmp_path / "out", gyrotc).values():
+        assert found(result) == {"no_temperature_information"}
+        assert "nothing can be learnt about temperature" in result["evaluate"]["findings"][0]["text"]
+        network = result["model"]["networks"][0]
+        assert (network["centers"], network["linear"]) == ([], [0.0, 0.0])
+        mean = result["evaluate"]["train"]["before"]["mean_dph"]
+        assert network["w0"] == pytest.approx(mean, abs=10.0)
