@@ -58,16 +58,6 @@ def position_scale(low: int, high: int) -> InputScale:
     return InputScale(low, min(gain, 2**32 - 1))
 
 
-Inputs = tuple[InputScale, InputScale]  # T, slope
-
-
-def position_scale(low: int, high: int) -> InputScale:
-    """Scale that spreads an envelope (2^-16 C) over the positions, rounding inputs to the nearest middle."""
-    zero = low - max(1, -(-(high - low) // (2 * POSITIONS)))
-    gain = min((POSITIONS * 2**_GAIN_BITS - 1) // (high - zero), 2**32 - 1)
-    return InputScale(zero, gain)
-
-
 @dataclass(frozen=True, slots=True)
 class Surface:
     """w0 + linear · x/2^16 + Σ weights · Gaussians, over positions."""

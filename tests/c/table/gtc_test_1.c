@@ -88,14 +88,14 @@ const gtc_f32_table_t gtc_test_1_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xfc0059a2UL), B(0x20000b85UL), B(0xefffdbbfUL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
+    B(0x3UL), B(0xfc006f23UL), B(0x1fffe117UL), B(0xefffe680UL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[15] = {
-    B(0x00006017UL), B(0xf3fd2662UL), B(0x00002670UL), B(0xe9940334UL), B(0x1800098cUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff89104UL), B(0x00000000UL), B(0x00000000UL), B(0xd7ffd32bUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245b246UL), B(0x09fff1fcUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd50ccUL), B(0x00002670UL), B(0xe994133eUL), B(0x17fff998UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a208UL), B(0x00000000UL), B(0x00000000UL), B(0xd7ffd497UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db78UL), B(0x09ffebd7UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -110,14 +110,14 @@ static const gtc_word_t q31_sigma[2] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xfbf165b7UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xeb719bfbUL), B(0x4UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xf31ea4aaUL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x0b908828UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xf665a7a9UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xe6e48925UL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x03ae1e04UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x099d48f3UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xfbf16b88UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xeb71a5a6UL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xf31e5490UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x0b90af27UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xf6664785UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xe6e47c53UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x03ae4bc9UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x099d4537UL), B(0x2UL),
 };
 
 const gtc_q31_table_t gtc_test_1_q31 = {
@@ -132,7 +132,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .max_step = 32768L,
     .max_slope = 65536L,
     .fallback = 201326592L,
-    .scale = { 838854L, 67107840L, 0L },
+    .scale = { 838860L, 67108863L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
     .n_centers = 3UL,
@@ -147,7 +147,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0xbbaa2f74UL,
+    .crc = 0x3e7aa1dbUL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
