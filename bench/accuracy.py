@@ -1,0 +1,155 @@
+"""What the default training reaches on simulated gyros, and how it behaves when asked for more or given less."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from gyrotc.train import Fit, TrainingData, fit, predict
+
+from . import learning
+from .problems import Gyro, gyro, joined, ratio
+
+__all__ = ["SCENARIOS", "accuracy"]
+
+SCENARIOS = ("paper", "paper-ripple", "paper-ripple-strong")
+SEEDS = range(1, 11)
+_CENTERS = (14, 20, 40, 60)
+_SLOW = {"scikit-learn GPR": 3, "scikit-learn MLP, 16": 3}  # so many gyros only
+_NOISE = (1.0 / 3.0, 3.0)
+_RAMPS = {"1 C/min": 3, "3 C/min": 4, "5 C/min": 5}  # index of the environment
+
+Say = Callable[[str], None]
+
+
+def accuracy(say: Say) -> dict[str, Any]:
+    """All tables of the section on accuracy."""
+    return {
+        "default": [_default(scenario, say) for scenario in SCENARIOS],
+        "more_centers": [_more_centers(scenario, say) for scenario in (SCENARIOS[0], SCENARIOS[2])],
+        "left_out": [_left_out(scenario, say) for scenario in SCENARIOS[:2]],
+        "noise": [_other_noise(factor, say) for factor in _NOISE],
+        "methods": [_method(name, say) for name in learning.CONTESTANTS],
+    }
+
+
+def _fit(data: TrainingData, **options: Any) -> tuple[Fit, float]:
+    began = time.process_time()
+    found = fit(data, **options)
+    return found, time.process_time() - began
+
+
+def _ratio(found: Fit, unit: Gyro, runs: Sequence[int] | None = None) -> float:
+    return ratio(lambda t, r: predict(found, t, r), unit, runs)
+
+
+def _spread(values: Sequence[float]) -> dict[str, float]:
+    return {"median": float(np.median(values)), "worst": float(np.max(values)), "best": float(np.min(values))}
+
+
+def _default(scenario: str, say: Say) -> dict[str, Any]:
+    ratios, sizes, seconds, surplus, weights, withheld = [], [], [], [], [], 0
+    for seed in SEEDS:
+        say(f"{scenario}, gyro {seed}")
+        unit = gyro(scenario, seed)
+        found, spent = _fit(joined(unit.train))
+        ratios.append(_ratio(found, unit))
+        sizes.append(found.n_centers)
+        seconds.append(spent)
+        weights.append(found.sum_abs_weights)
+        if found.predicted_rms_ratio is None:
+            withheld += 1
+        else:
+            surplus.append(ratios[-1] - found.predicted_rms_ratio)
+    return {
+        "scenario": scenario,
+        "gyros": len(SEEDS),
+        "ratio": _spread(ratios),
+        "centers": _spread(sizes),
+        "bytes": {k: 24 + 20 * v for k, v in _spread(sizes).items()},
+        "seconds": _spread(seconds),
+        "found_minus_predicted": float(np.median(surplus)) if surplus else None,
+        "withheld": withheld,
+        "sum_abs_weights_dph": float(max(weights)),
+    }
+
+
+def _more_centers(scenario: str, say: Say) -> dict[str, Any]:
+    """Largest departure of the ratio from that of the chosen size, over five gyros, for each number asked for."""
+    rows: dict[str, list[float]] = {str(n): [] for n in _CENTERS}
+    for seed in SEEDS[:5]:
+        say(f"{scenario}, gyro {seed}, more centers than chosen")
+        unit = gyro(scenario, seed)
+        chosen = _ratio(_fit(joined(unit.train))[0], unit)
+        for n in _CENTERS:
+            rows[str(n)].append(_ratio(_fit(joined(unit.train), centers=n)[0], unit) - chosen)
+    return {"scenario": scenario, "largest": {n: float(max(v, key=abs)) for n, v in rows.items()}}
+
+
+def _left_out(scenario: str, say: Say) -> dict[str, Any]:
+    """Ratio on a ramp rate that no training run had, and with it."""
+    rows: dict[str, Any] = {}
+    for name, k in _RAMPS.items():
+        without, with_it = [], []
+        for seed in SEEDS:
+            say(f"{scenario}, gyro {seed}, without {name}")
+            unit = gyro(scenario, seed)
+            rest = joined([part for i, part in enumerate(unit.train) if i != k])
+            without.append(_ratio(_fit(rest)[0], unit, [k]))
+            with_it.append(_ratio(_fit(joined(unit.train))[0], unit, [k]))
+        rows[name] = {"without": _spread(without), "with": _spread(with_it)}
+    every = [row["without"]["median"] for row in rows.values()]
+    return {"scenario": scenario, "ramps": rows, "median": float(np.median(every))}
+
+
+def _other_noise(factor: float, say: Say) -> dict[str, Any]:
+    """The noise of training and exam made larger or smaller: what was added is known, so it can be scaled."""
+    ratios, sizes = [], []
+    for seed in SEEDS:
+        say(f"noise x {factor:.2g}, gyro {seed}")
+        unit = gyro("paper", seed)
+        scaled = _with_noise(unit, factor, seed)
+        found, _ = _fit(joined(scaled.train))
+        ratios.append(_ratio(found, scaled))
+        sizes.append(found.n_centers)
+    return {"factor": factor, "ratio": _spread(ratios), "centers": _spread(sizes)}
+
+
+def _with_noise(unit: Gyro, factor: float, seed: int) -> Gyro:
+    """The map of a good fit as the truth, white noise of `factor` times the paper's on it."""
+    rng = np.random.default_rng(seed)
+    truth, _ = _fit(joined([*unit.train, *unit.exam]), centers=20)
+    sigma = factor * 7e-4 * np.sqrt(10.0)
+
+    def noisy(part: TrainingData) -> tuple[TrainingData, Any]:
+        noise = rng.normal(0.0, sigma, len(part))
+        columns = {name: getattr(part, name) for name in TrainingData.__dataclass_fields__}
+        columns["bias_dph"] = predict(truth, part.temperature_c, part.slope_c_per_min) + noise
+        return TrainingData(**columns), noise[: len(noise) // 10 * 10].reshape(-1, 10).mean(axis=1)
+
+    train = [noisy(part)[0] for part in unit.train]
+    exam = [noisy(part) for part in unit.exam]
+    return Gyro(tuple(train), tuple(e for e, _ in exam), tuple(n for _, n in exam))
+
+
+def _method(name: str, say: Say) -> dict[str, Any]:
+    learn = learning.CONTESTANTS[name]
+    ratios, sizes, seconds = [], [], []
+    for seed in SEEDS[: _SLOW.get(name, len(SEEDS))]:
+        say(f"{name}, gyro {seed}")
+        unit = gyro("paper", seed)
+        data = joined(unit.train)
+        began = time.process_time()
+        predictor, size = learn(data)
+        seconds.append(time.process_time() - began)
+        ratios.append(ratio(predictor, unit))
+        sizes.append(size)
+    return {
+        "name": name,
+        "gyros": len(ratios),
+        "ratio": _spread(ratios),
+        "bytes": float(np.median(sizes)),
+        "seconds": float(np.median(seconds)),
+    }

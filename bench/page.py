@@ -1,0 +1,165 @@
+"""docs/results.md from docs/results/bench.json: the section between its marks, written whole."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = ["filled", "section"]
+
+_MARKS = re.compile(r"(<!-- bench -->\n).*?(<!-- /bench -->)", re.DOTALL)
+_EMPTY = """# Results
+
+Figures that programs wrote; nobody edits them by hand.
+
+<!-- bench -->
+<!-- /bench -->
+"""
+_DEFAULT = """The default method on {gyros} simulated gyros of each scenario: trained on set 1 of the paper's six
+environments, everything chosen from it; judged on set 2. RMS of compensated 100-s means ÷ RMS of the noise that
+was really added.
+"""
+_SELECTION = """CPU seconds of one process and its peak memory, interpreter and libraries included. Selection by
+orthogonal least squares among equal Gaussians: 30 centers, least BIC over sizes and widths, weights. Peers get the
+same candidates as a matrix, which they have to build. RMS: what is left (noise: 0.5); a peer more than 5 % worse is
+no reference.
+"""
+_RAW = """Six recordings of 2.88 million rows (100 Hz, Parquet) to a C file proven on the host: {seconds:.1f} CPU s
+({steps}), {elapsed_s:.1f} s by the clock, at most {peak_gib:.2f} GiB.
+"""
+
+_DEFAULT_HEAD = (
+    "scenario",
+    "median",
+    "worst",
+    "centers",
+    "bytes",
+    "CPU s, median / worst",
+    "found − predicted",
+    "withheld",
+    "largest Σ\\|w\\|, deg/h",
+)
+
+Column = tuple[str, str, str]  # title, key, format
+
+
+def filled(page: str | None, result: dict[str, Any]) -> str:
+    """The page (None: a new one) with its section `bench` replaced."""
+    text = page if page is not None and _MARKS.search(page) else (page or "") + _EMPTY
+    return _MARKS.sub(lambda found: found[1] + section(result) + found[2], text)
+
+
+def section(result: dict[str, Any]) -> str:
+    """The section as text."""
+    versions = ", ".join(f"{name} {v}" for name, v in result["versions"].items())
+    parts = [
+        "## Training beside its peers (`make bench`)\n",
+        f"{result['machine']}, one thread. {versions}.\n",
+        *_accuracy(result["accuracy"]),
+        *_speed(result["speed"]),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def _ratio(spread: dict[str, float]) -> list[str]:
+    return [f"{spread['median']:.4f}", f"{spread['worst']:.4f}"]
+
+
+def _span(spread: dict[str, float]) -> str:
+    low, high = spread["best"], spread["worst"]
+    return f"{low:.0f}" if low == high else f"{low:.0f}-{high:.0f}"
+
+
+def _accuracy(a: dict[str, Any]) -> list[str]:
+    ramps = list(a["left_out"][0]["ramps"])
+    numbers = list(a["more_centers"][0]["largest"])
+    return [
+        "### Accuracy and size\n",
+        _DEFAULT.format(gyros=a["default"][0]["gyros"]),
+        _table(_DEFAULT_HEAD, [_default_row(d) for d in a["default"]]),
+        "Every method, scenario `paper` (bytes: the numbers of the map as 32-bit words):\n",
+        _table(
+            ["method", "gyros", "median", "worst", "bytes", "CPU s"],
+            [_method_row(m) for m in sorted(a["methods"], key=lambda m: float(m["ratio"]["median"]))],
+        ),
+        "More centers than it would choose, five gyros: the largest change of the ratio.\n",
+        _table(
+            ["scenario", *(f"{n} centers" for n in numbers)],
+            [[m["scenario"], *(f"{v:+.4f}" for v in m["largest"].values())] for m in a["more_centers"]],
+        ),
+        "A ramp rate that training never saw: ratio on it, median / worst; in brackets the median with it.\n",
+        _table(["scenario", *ramps, "median of medians"], [_left_out_row(x) for x in a["left_out"]]),
+        "Noise other than the paper's, the same maps:\n",
+        _table(
+            ["noise", "median", "worst", "centers"],
+            [[f"× {n['factor']:.2g}", *_ratio(n["ratio"]), _span(n["centers"])] for n in a["noise"]],
+        ),
+    ]
+
+
+def _default_row(d: dict[str, Any]) -> list[str]:
+    surplus = d["found_minus_predicted"]
+    return [
+        d["scenario"],
+        *_ratio(d["ratio"]),
+        _span(d["centers"]),
+        _span(d["bytes"]),
+        f"{d['seconds']['median']:.3f} / {d['seconds']['worst']:.3f}",
+        "-" if surplus is None else f"{surplus:+.4f}",
+        str(d["withheld"]),
+        f"{d['sum_abs_weights_dph']:.3f}",
+    ]
+
+
+def _method_row(m: dict[str, Any]) -> list[str]:
+    return [m["name"], str(m["gyros"]), *_ratio(m["ratio"]), f"{m['bytes']:.0f}", f"{m['seconds']:.3f}"]
+
+
+def _left_out_row(x: dict[str, Any]) -> list[str]:
+    cells = [
+        f"{' / '.join(_ratio(ramp['without']))} ({ramp['with']['median']:.4f})"
+        for ramp in x["ramps"].values()
+    ]
+    return [x["scenario"], *cells, f"{x['median']:.4f}"]
+
+
+def _speed(s: dict[str, Any]) -> list[str]:
+    time: Column = ("CPU s", "seconds", ".3f")
+    memory: Column = ("peak GiB", "peak_gib", ".2f")
+    blocks = ["### Speed\n", _SELECTION]
+    for x in s["selection"]:
+        widths = f"{x['widths']} width" + "s" * (x["widths"] > 1)
+        blocks.append(f"{x['samples']} samples, {x['candidates']} candidates, {widths}:\n")
+        blocks.append(_rows(x["rows"], [time, memory, ("RMS", "rms", ".4f")]))
+    for x in s["learning"]:
+        blocks.append(
+            f"Whole methods, one gyro of scenario `{x['scenario']}`, from block means to the map:\n"
+        )
+        blocks.append(
+            _rows(x["rows"], [time, memory, ("RMS ÷ floor", "ratio", ".4f"), ("bytes", "bytes", "d")])
+        )
+    blocks.append("Kohonen network, 300 nodes, 172800 samples, one epoch:\n")
+    blocks.append(_rows(s["kohonen"], [time, ("RMS distance", "rms_distance", ".4f")]))
+    blocks.append("Six anisotropic Gaussians through 500 points by variable projection, one start:\n")
+    blocks.append(_rows(s["varpro"], [("CPU s", "seconds", ".4f"), ("RMS", "rms", ".4f")]))
+    raw = s["raw"]
+    steps = ", ".join(f"{x['step']} {x['seconds']:.1f} s" for x in raw["steps"])
+    blocks.append(_RAW.format(**(raw | {"steps": steps})))
+    return blocks
+
+
+def _rows(rows: Sequence[dict[str, Any]], columns: Sequence[Column]) -> str:
+    body = [[row["name"], *(_figure(row, key, form) for _, key, form in columns)] for row in rows]
+    return _table(["", *(title for title, _, _ in columns)], body)
+
+
+def _figure(row: dict[str, Any], key: str, form: str) -> str:
+    if "over_s" in row:
+        return f"> {row['over_s']:.0f}" if key == "seconds" else "-"
+    return "failed" if "failed" in row else format(row[key], form)
