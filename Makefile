@@ -51,8 +51,12 @@ picture: demo
 paper: setup
 	@$(PYTHON) -m gyrotc.paper docs
 
+## measured recordings with their last span left out: docs/real.md (GYROTC_REAL_DATA names their folder)
+real: setup
+	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test check picture paper clean
+.PHONY: help setup demo test check picture paper real clean
