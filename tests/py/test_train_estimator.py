@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from gyrotc.estimator import RBFNetworkRegressor
@@ -48,3 +51,13 @@ def test_attributes_are_in_the_units_of_the_inputs() -> None:
 def test_a_negative_number_of_centers_is_refused() -> None:
     with pytest.raises(ValueError, match="n_centers"):
         RBFNetworkRegressor(n_centers=-1).fit(np.zeros((5, 2)), np.arange(5.0))
+
+
+def test_the_package_offers_it_and_loads_scikit_learn_only_then() -> None:
+    code = (
+        "import sys, gyrotc\n"
+        "assert 'sklearn' not in sys.modules\n"
+        "assert gyrotc.RBFNetworkRegressor().fit([[0.0], [1.0], [2.0]], [0.0, 1.0, 2.0]).n_features_in_ == 1\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
