@@ -55,8 +55,14 @@ paper: setup
 real: setup
 	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
 
+## training beside its peers, in an environment of its own (build/bench): docs/results.md
+bench: setup
+	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
+	@build/bench/bin/python -m pip install -q --disable-pip-version-check "./gen[bench]"
+	@build/bench/bin/python -m bench docs
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test check picture paper real clean
+.PHONY: help setup demo test check picture paper real bench clean

@@ -6,7 +6,6 @@
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
 #   tools/setup.sh picture    besides, the browser of `make picture`
-#   tools/setup.sh bench      besides, the peers of `make bench`
 #
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
 set -euo pipefail
@@ -21,12 +20,12 @@ targets=(gcc-aarch64-linux-gnu gcc-riscv64-linux-gnu gcc-powerpc-linux-gnu gcc-m
 prove=(frama-c-base gappa)
 
 case $level in
-  demo | bench) packages=("${base[@]}") ;;
+  demo) packages=("${base[@]}") ;;
   test) packages=("${base[@]}" "${test[@]}") ;;
   targets) packages=("${base[@]}" "${test[@]}" "${targets[@]}") ;;
   prove) packages=("${base[@]}" "${test[@]}" "${prove[@]}") ;;
   picture) packages=("${base[@]}" chromium) ;;
-  *) echo "setup: unknown level '$level' (demo, test, targets, prove, picture, bench)" >&2; exit 2 ;;
+  *) echo "setup: unknown level '$level' (demo, test, targets, prove, picture)" >&2; exit 2 ;;
 esac
 
 install_missing() {
@@ -58,7 +57,6 @@ fi
 # The environment is made again when what it is made of has changed.
 extras=""
 case $level in demo | picture) ;; *) extras="[test]" ;; esac
-[ "$level" = bench ] && extras="[test,bench]"
 stamp=.venv/.gyrotc$extras
 fingerprint=$({ cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
 if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
