@@ -23,7 +23,7 @@ from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 from .train import Fit, TrainingData, coverage, fit, predict, uncertainty
 
-__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "samples_of"]
+__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of"]
 
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0
@@ -139,7 +139,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     fitted = _fit(data, options)
     spans = training_spans(runs, data)
     left_out = _left_out(data, spans, options, say) if spans else None
-    model = _model(dataset, runs, data, fitted, front, options)
+    model = model_of(dataset, runs, data, fitted, front, options)
     return Fitted(model, _training(dataset, data, fitted, front, options, spans, left_out))
 
 
@@ -185,7 +185,7 @@ def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: floa
     return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
 
 
-def _model(
+def model_of(
     dataset: Dataset,
     runs: Sequence[Run],
     data: TrainingData,
@@ -193,6 +193,7 @@ def _model(
     front: FrontEnd,
     options: FitOptions,
 ) -> Model:
+    """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data."""
     started = [run.started for run in runs if run.started is not None]
     meta = dict(dataset.meta)
     if dataset.description:
