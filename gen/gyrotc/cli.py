@@ -258,6 +258,9 @@ def verify(
     log: Annotated[
         Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
     ] = None,
+    exhaustive: Annotated[
+        bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Compile DIR/c for each target and compare bit for bit with the reference.
@@ -270,7 +273,9 @@ def verify(
 
     recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
     with _progress() as say:
-        result = run(folder, targets=target or (), dataset=recordings, log=log, progress=say)
+        result = run(
+            folder, targets=target or (), dataset=recordings, log=log, exhaustive=exhaustive, progress=say
+        )
     write_atomically(folder / "verify.json", json_text(result))
     _write_json(json_file, result)
     _OUT.print(verify_table(result))
@@ -507,8 +512,13 @@ def verify_notes(result: dict[str, Any]) -> Iterator[str]:
         if file["status"] == "fail":
             yield f"{file['file']}: {file['mismatches']} lines or words differ from what the model gives"
     for error in result["errors"]:
-        if error["status"] == "fail":
-            yield f"{error['numeric']}: error {error['worst_dph']:.3e} deg/h above {error['bound_dph']:.3e}"
+        for text in error.get("first_mismatches", ()):
+            yield f"{error['numeric']}: {text}"
+        yield (
+            f"{error['numeric']}: worst error {error['worst_dph']:.2e} deg/h of {error['inputs_visited']} inputs "
+            f"visited; the bound is {error['bound_dph']:.2e}"
+            + (" and is EXCEEDED" if error["worst_dph"] > error["bound_dph"] else "")
+        )
 
 
 def summary(result: dict[str, Any]) -> str:

@@ -1,0 +1,171 @@
+"""Every pair of positions of a fixed-point table: the emitted code against integers and against float64.
+
+The network's inputs in fixed point are two numbers of 16 bits, so all of them can be visited. The
+program `exhaustive.c` does it with everything but the code under test written apart from libc/.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import CheckFailed, GyrotcError
+from ..model import Model
+from ..reference.q31 import exp2_table
+from ..table import Table
+from ..toolchain import Target, all_targets, compile_objects, link
+
+__all__ = ["Visited", "visit_all"]
+
+_SLICES = 128  # of exhaustive.c
+_COMPILERS = ("host-clang-O3", "host-gcc-O3")
+_SOURCE = Path(__file__).resolve().parent / "exhaustive.c"
+
+
+@dataclass(frozen=True, slots=True)
+class Visited:
+    """What came of visiting all pairs of positions.
+
+    `worst_dph` is the largest departure from the model over all inputs that a pair stands for (at the
+    corners of its cell), `arithmetic_dph` that at the middle of the cell, `mean_dph` the mean departure there.
+    """
+
+    inputs: int
+    mismatches: int
+    first: tuple[str, ...]
+    worst_dph: float
+    arithmetic_dph: float
+    mean_dph: float
+
+
+def visit_all(
+    c_folder: Path,
+    model: Model,
+    table: Table,
+    *,
+    every: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Visited:
+    """Visits every pair of positions, or every `every`-th slice of slopes.
+
+    Args:
+        model: The model that the table was made of.
+        table: Its fixed-point table.
+        progress: Called with the share done.
+
+    Raises:
+        CheckFailed: The emitted code does not compile, or the program failed.
+        GyrotcError: There is no host compiler.
+    """
+    target = _host()
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        program = _compiled(target, c_folder, model, Path(work))
+        parts = os.cpu_count() or 1
+        lines = list(_numbers(model, table))
+        done = _Counter(progress or (lambda _: None))
+        with ThreadPoolExecutor(max_workers=parts) as pool:
+            results = list(
+                pool.map(lambda part: _run(program, [f"{part} {parts} {every}", *lines], done), range(parts))
+            )
+    return _together(results)
+
+
+def _host() -> Target:
+    for name in _COMPILERS:
+        target = all_targets()[name]
+        if target.missing() is None:
+            return target
+    raise GyrotcError("no C compiler: install clang or gcc")
+
+
+def _compiled(target: Target, c_folder: Path, model: Model, work: Path) -> Path:
+    emitted = compile_objects(
+        target, [c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"], work, include=c_folder
+    )
+    # The program itself is no code for targets: it may use what the host has.
+    loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})
+    defines = [f"TABLE=gtc_{model.symbol}_q31", f'HEADER="gtc_{model.id}.h"']
+    (own,) = compile_objects(loose, [_SOURCE], work, include=c_folder, defines=defines)
+    program = work / "exhaustive"
+    link(target.model_copy(update={"link": (*target.link, "-lm")}), [own, *emitted], program)
+    return program
+
+
+def _numbers(model: Model, table: Table) -> Iterator[str]:
+    """What exhaustive.c reads: integers of the table's words, then the model in float64."""
+    per_block = model.block_s / 60.0
+    low_t, high_t, low_r, high_r = table.numbers(table.envelope).tolist()
+    gain_t, gain_r, narrow = table.scale
+    center, half = model.scale.temperature_c
+    half_r = model.scale.slope_c_per_min
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    yield f"{low_t} {high_t} {gain_t} {t0!r} {t1!r} {center!r} {half!r}"
+    yield f"{low_r} {high_r} {gain_r} {r0 * per_block!r} {r1 * per_block!r} 0.0 {half_r * per_block!r}"
+    yield f"{narrow} {' '.join(str(int(e)) for e in exp2_table())}"
+    network = model.networks[0]
+    _, w0, linear_t, linear_r, *_ = table.numbers(table.networks).tolist()
+    yield f"{w0} {linear_t} {linear_r} {table.n_centers} {len(network.weights)}"
+    for record in table.numbers(table.centers).reshape(-1, 5).tolist():
+        yield " ".join(map(str, record))
+    yield f"{table.coverage_cells[0]} {table.coverage_cells[1]}"
+    yield " ".join(str(int(word)) for word in table.coverage)
+    yield f"{2.0**-table.bias_frac_bits!r} {network.w0!r} {network.linear[0]!r} {network.linear[1]!r}"
+    for (c_t, c_r), widths, weight in zip(network.centers, network.widths, network.weights, strict=True):
+        inverse = [0.0 if width is None else 1.0 / width for width in widths]
+        yield f"{(c_t - center) / half!r} {inverse[0]!r} {c_r / half_r!r} {inverse[1]!r} {weight!r}"
+
+
+class _Counter:
+    """Slices done, by all processes together."""
+
+    def __init__(self, progress: Callable[[str], None]) -> None:
+        self._progress = progress
+        self._done = 0
+
+    def one_more(self) -> None:
+        self._done += 1
+        self._progress(f"every input: {self._done / _SLICES:.0%}")
+
+
+def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:
+    """Lines that one process printed, without its progress."""
+    kept: list[str] = []
+    with subprocess.Popen(
+        [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            process.stdin.write("\n".join(lines) + "\n")
+            process.stdin.close()
+            for line in process.stdout:
+                if line.startswith("progress"):
+                    done.one_more()
+                else:
+                    kept.append(line.strip())
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode != 0:
+        raise CheckFailed(f"the visit of all inputs ended with status {process.returncode}")
+    return kept
+
+
+def _together(results: list[list[str]]) -> Visited:
+    first = [line for lines in results for line in lines if line.startswith("differs")]
+    words: list[list[Any]] = [lines[-1].split()[1:] for lines in results]
+    inputs = sum(int(w[0]) for w in words)
+    return Visited(
+        inputs=inputs,
+        mismatches=sum(int(w[1]) for w in words),
+        first=tuple(first[:5]),
+        worst_dph=max(float.fromhex(w[3]) for w in words),
+        arithmetic_dph=max(float.fromhex(w[2]) for w in words),
+        mean_dph=math.fsum(float.fromhex(w[4]) for w in words) / max(inputs, 1),
+    )
