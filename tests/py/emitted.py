@@ -11,7 +11,7 @@ from gyrotc.model import Model, load_model
 from gyrotc.toolchain import Target, all_targets
 from gyrotc.verify import verify
 
-GOLDEN = Path(__file__).resolve().parent / "golden" / "model.json"
+GOLDEN = Path(__file__).resolve().parents[2] / "examples" / "minimal" / "model.json"
 
 
 def emitted(folder: Path, model: Model | None = None) -> Path:

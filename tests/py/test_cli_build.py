@@ -172,3 +172,65 @@ def test_a_kill_at_any_moment_leaves_no_half_written_result(demo: Path, tmp_path
         if out.exists():
             assert (out / "report.html").is_file() and (out / "manifest.json").is_file()
             assert load_model(out / "model.json").serial == "SIM-0001"
+
+
+def _three_axes(source: Path, folder: Path) -> None:
+    """Two training runs of the demo as three-axis recordings whose axes differ by a constant."""
+    folder.mkdir()
+    for name in ("run-04.csv", "run-05.csv", "run-06.csv"):
+        rows = np.genfromtxt(source / name, delimiter=",", names=True)
+        columns = [rows["time_s"], rows["temperature_c"], *(rows["rate_dph"] + k for k in (0.0, 1.0, 2.0))]
+        header = "time_s,temperature_c,rate_x_dph,rate_y_dph,rate_z_dph"
+        np.savetxt(
+            folder / name, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments=""
+        )
+
+
+def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
+    _three_axes(demo / "data", tmp_path / "triad")
+    done = gyrotc("build", tmp_path / "triad", "--axis", "all", "--numeric", "f32", "--out", tmp_path / "r")
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (tmp_path / "r").iterdir()} == {"x", "y", "z", "c", "report.html"}
+    c = tmp_path / "r" / "c"
+    assert {f"gtc_triad_{axis}.c" for axis in "xyz"} <= {p.name for p in c.iterdir()}
+    w0 = [load_model(tmp_path / "r" / axis / "model.json").map_dph(10.0, 0.0) for axis in "xyz"]
+    np.testing.assert_allclose(np.diff(w0), 1.0, atol=1e-5)
+    program = tmp_path / "main"
+    sources = [c / "main.c", c / "gtc.c", *(c / f"gtc_triad_{axis}.c" for axis in "xyz")]
+    subprocess.run(["gcc", "-std=c99", "-ffp-contract=off", "-o", program, *sources], check=True)
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    assert printed.count("deg/h") == 3
+
+
+def test_without_an_axis_a_three_axis_recording_is_refused_naming_the_choices(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    _three_axes(demo / "data", tmp_path / "triad")
+    done = gyrotc("build", tmp_path / "triad", "--out", tmp_path / "r")
+    assert done.returncode == 2
+    assert all(axis in done.stderr for axis in ("x", "y", "z")) and not (tmp_path / "r").exists()
+
+
+def test_a_correction_applied_while_recording_is_added_back_or_refused(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    """Recordings from which the demo's own correction was subtracted give the demo's figures again."""
+    corrected = tmp_path / "corrected"
+    corrected.mkdir()
+    model = load_model(demo / "result" / "model.json")
+    text = (demo / "data" / "dataset.toml").read_text()
+    text = text.replace("schema = 1\n", f'schema = 1\napplied_table = "{model.hash}"\n')
+    (corrected / "dataset.toml").write_text(text)
+    for path in (demo / "result" / "trace").glob("*.csv"):
+        trace = np.genfromtxt(path, delimiter=",", names=True)
+        rows = np.stack([trace["time_s"], trace["temperature_c"], trace["compensated_dph"]], axis=1)
+        header = "time_s,temperature_c,rate_dph"
+        np.savetxt(corrected / path.name, rows, fmt="%.12g", delimiter=",", header=header, comments="")
+    refused = gyrotc("fit", corrected, "--out", tmp_path / "no")
+    assert refused.returncode == 2 and "applied" in refused.stderr and not (tmp_path / "no").exists()
+    applied = demo / "result" / "model.json"
+    done = gyrotc("fit", corrected, "--applied", applied, "--out", tmp_path / "again")
+    assert done.returncode == 0, done.stderr
+    again = load_model(tmp_path / "again" / "model.json")
+    t = np.linspace(-30, 60, 40)
+    np.testing.assert_allclose(again.map_dph(t, 0.0), model.map_dph(t, 0.0), atol=2e-6)

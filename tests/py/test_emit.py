@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import GOLDEN, Command
+from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.emit import emit, emit_texts, quantise_all
 from gyrotc.errors import InputError
 from gyrotc.model import Model, load_model
@@ -18,7 +18,7 @@ RUNTIME = {"gtc.h", "gtc.c"}
 
 
 def _golden_texts() -> dict[str, bytes]:
-    model = load_model(GOLDEN / "model.json")
+    model = load_model(EXAMPLE / "model.json")
     return emit_texts(model, quantise_all(model, None))
 
 
@@ -27,8 +27,8 @@ def test_emitted_files_are_the_golden_ones() -> None:
     sums = dict(reversed(line.split()) for line in (GOLDEN / "SHA256SUMS").read_text().splitlines())
     texts = _golden_texts()
     assert set(texts) - RUNTIME == set(sums)
-    for name in ("gtc_rlg_0042.c", "gtc_rlg_0042.h"):
-        assert texts[name].decode() == (GOLDEN / name).read_text()
+    for name in ("gtc_rlg_0042.c", "gtc_rlg_0042.h", "main.c"):
+        assert texts[name].decode() == (EXAMPLE / name).read_text()
     found = {name: hashlib.sha256(texts[name]).hexdigest() for name in sums}
     assert found == sums
 
@@ -45,7 +45,7 @@ def test_emitted_text_names_no_time_path_or_version(tmp_path: Path) -> None:
 
 
 def test_emit_replaces_the_folder_whole(tmp_path: Path) -> None:
-    model = load_model(GOLDEN / "model.json")
+    model = load_model(EXAMPLE / "model.json")
     emit(model, tmp_path)
     (tmp_path / "c" / "stale.c").write_text("old")
     emit(model, tmp_path)
@@ -61,7 +61,7 @@ def test_methods_for_comparison_are_refused(model_dict: dict[str, Any], tmp_path
 
 
 def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: Path) -> None:
-    model = load_model(GOLDEN / "model.json")
+    model = load_model(EXAMPLE / "model.json")
     emit(model, tmp_path)
     c = tmp_path / "c"
     program = tmp_path / "main"
@@ -86,7 +86,7 @@ def test_intel_hex_holds_the_image(tmp_path: Path) -> None:
 
 
 def test_zero_at_emits_a_table_that_is_zero_there_and_verifies(tmp_path: Path, gyrotc: Command) -> None:
-    done = gyrotc("emit", GOLDEN / "model.json", "--out", tmp_path, "--zero-at", "20")
+    done = gyrotc("emit", EXAMPLE / "model.json", "--out", tmp_path, "--zero-at", "20")
     assert done.returncode == 0, done.stderr
     assert "--zero-at 20" in (tmp_path / "c" / "gtc_rlg_0042.h").read_text()
     verified = gyrotc("verify", tmp_path, "--target", "host-gcc-O2")
@@ -98,3 +98,17 @@ def test_a_serial_cannot_break_out_of_its_comment(model_dict: dict[str, Any]) ->
     text = emit_texts(model, quantise_all(model, None))["gtc_rlg_0042.h"].decode("ascii")
     assert "*/ int hidden" not in text
     assert text.count("/*") == text.count("*/")
+
+
+def test_the_example_builds_from_the_library_s_folders_by_its_one_command(tmp_path: Path) -> None:
+    """Copying include/ and libc/ is the installation; the example's README gives the command."""
+    line = next(t for t in (EXAMPLE / "README.md").read_text().splitlines() if t.startswith("cc "))
+    command = line.replace("-o minimal && ./minimal", f"-o {tmp_path / 'minimal'} && {tmp_path / 'minimal'}")
+    done = subprocess.run(["sh", "-c", command], cwd=EXAMPLE, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "deg/h" in done.stdout and not done.stderr
+    assert (
+        (ROOT / "libc" / "README.md")
+        .read_text()
+        .startswith("libc = the C library of gyrotc that runs on the target")
+    )

@@ -74,7 +74,7 @@ def test_meter_counts_instructions_cycles_and_stack(name: str, tmp_path: Path) -
 
 
 def test_instruction_counts_repeat_exactly(tmp_path: Path) -> None:
-    folder = emitted(tmp_path, load_model(Path(__file__).parents[1] / "py" / "golden" / "model.json"))
+    folder = emitted(tmp_path, load_model(Path(__file__).parents[2] / "examples" / "minimal" / "model.json"))
     names = ["cortex-m0", "cortex-m3", "cortex-m4f", "cortex-m7", "rv32imac"]
     first, second = (verify(folder, targets=names)["targets"] for _ in range(2))
     assert [e["instructions"] for e in first] == [e["instructions"] for e in second]

@@ -1,4 +1,4 @@
-"""Writes the golden files again from `model.json`; read the difference before you commit it."""
+"""Writes the golden files again from the example's `model.json`; read the difference before you commit it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from gyrotc.emit import emit_texts, quantise_all
 from gyrotc.model import load_model
 
 GOLDEN = Path(__file__).resolve().parent
+EXAMPLE = GOLDEN.parents[2] / "examples" / "minimal"
 
-model = load_model(GOLDEN / "model.json")
+model = load_model(EXAMPLE / "model.json")
 texts = {n: t for n, t in emit_texts(model, quantise_all(model, None)).items() if n not in ("gtc.h", "gtc.c")}
-for name in (f"gtc_{model.id}.c", f"gtc_{model.id}.h"):
-    (GOLDEN / name).write_bytes(texts[name])
+for name in (f"gtc_{model.id}.c", f"gtc_{model.id}.h", "main.c"):
+    (EXAMPLE / name).write_bytes(texts[name])
 sums = "".join(f"{hashlib.sha256(data).hexdigest()}  {name}\n" for name, data in sorted(texts.items()))
 (GOLDEN / "SHA256SUMS").write_text(sums)

@@ -91,21 +91,21 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0xaUL), B(0x0ecf4e61UL), B(0xfdd35b70UL), B(0x02470a1eUL), B(0xffdf2d50UL), B(0x00440396UL), B(0xffff9b74UL), B(0x0000648aUL),
+    B(0xaUL), B(0x0ec217f8UL), B(0xfdd35515UL), B(0x0247136fUL), B(0xffdf2d50UL), B(0x00440396UL), B(0xffff9b74UL), B(0x0000648aUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[50] = {
-    B(0x00003accUL), B(0x1a564c23UL), B(0x000002d0UL), B(0xffe588d1UL), B(0xfd4cdb77UL), /* -27.57 C, +0.173 C/min; widths 0.082, 1.708; -1.318e-03 deg/h */
-    B(0x00003f69UL), B(0x15d1024bUL), B(0x00000398UL), B(0x002fb46fUL), B(0xfd23f44cUL), /* -17.10 C, -0.244 C/min; widths 0.076, 1.337; -1.396e-03 deg/h */
-    B(0x000046c1UL), B(0x10833a12UL), B(0x000002bbUL), B(0x00634575UL), B(0xfcb766f0UL), /* -5.94 C, -0.669 C/min; widths 0.068, 1.760; -1.603e-03 deg/h */
-    B(0x000034b7UL), B(0x03a3ed40UL), B(0x00000244UL), B(0x002acc8eUL), B(0x06e33d23UL), /* 10.63 C, -0.348 C/min; widths 0.091, 2.119; +3.363e-03 deg/h */
-    B(0x0000208aUL), B(0x0229d4a2UL), B(0x0000027cUL), B(0x00382f67UL), B(0xf8198f94UL), /* 10.89 C, -0.416 C/min; widths 0.148, 1.933; -3.857e-03 deg/h */
-    B(0x00004632UL), B(0xf9931264UL), B(0x00000133UL), B(0xffaf9181UL), B(0xfd6294eeUL), /* 26.83 C, +1.235 C/min; widths 0.068, 4.001; -1.277e-03 deg/h */
-    B(0x000037c3UL), B(0xf47596f2UL), B(0x0000019aUL), B(0x00399f95UL), B(0xf88fd580UL), /* 38.47 C, -0.662 C/min; widths 0.086, 3.001; -3.632e-03 deg/h */
-    B(0x00002697UL), B(0xf79a1ce8UL), B(0x000001d8UL), B(0x0061fd0dUL), B(0x071a1d92UL), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
-    B(0x00004319UL), B(0xe73939ebUL), B(0x000002d8UL), B(0x00475f26UL), B(0x03ac254dUL), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
-    B(0x000030e1UL), B(0xe8f1096fUL), B(0x0000033bUL), B(0x005124eaUL), B(0x03c07198UL), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
+    B(0x00007598UL), B(0xf9e0d0bcUL), B(0x000005a0UL), B(0xfcfb14f4UL), B(0xfd4cd976UL), /* -27.57 C, +0.173 C/min; widths 0.082, 1.708; -1.318e-03 deg/h */
+    B(0x00007ed2UL), B(0xec393afeUL), B(0x00000730UL), B(0xfcc76deaUL), B(0xfd23f37eUL), /* -17.10 C, -0.244 C/min; widths 0.076, 1.337; -1.396e-03 deg/h */
+    B(0x00008d82UL), B(0xda45a923UL), B(0x00000576UL), B(0xfe0b8f60UL), B(0xfcb76747UL), /* -5.94 C, -0.669 C/min; widths 0.068, 1.760; -1.603e-03 deg/h */
+    B(0x0000696eUL), B(0xd290f974UL), B(0x00000489UL), B(0xfe112f51UL), B(0x06e37783UL), /* 10.63 C, -0.348 C/min; widths 0.091, 2.119; +3.363e-03 deg/h */
+    B(0x00004114UL), B(0xe3c9bc49UL), B(0x000004f8UL), B(0xfdf46286UL), B(0xf8198e37UL), /* 10.89 C, -0.416 C/min; widths 0.148, 1.933; -3.857e-03 deg/h */
+    B(0x00008c63UL), B(0xacf4da54UL), B(0x00000267UL), B(0xfe2b60aaUL), B(0xfd62833cUL), /* 26.83 C, +1.235 C/min; widths 0.068, 4.001; -1.277e-03 deg/h */
+    B(0x00006f86UL), B(0xb1283f7aUL), B(0x00000334UL), B(0xfed941c7UL), B(0xf88fef08UL), /* 38.47 C, -0.662 C/min; widths 0.086, 3.001; -3.632e-03 deg/h */
+    B(0x00004d2dUL), B(0xc89dfd49UL), B(0x000003b0UL), B(0xfeebfd6dUL), B(0x071a04b8UL), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
+    B(0x00008631UL), B(0x8b5a5cccUL), B(0x000005afUL), B(0xfdb72986UL), B(0x03ac07c7UL), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
+    B(0x000061c1UL), B(0xa1020e4eUL), B(0x00000677UL), B(0xfd66e7deUL), B(0x03c09cc7UL), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -116,14 +116,14 @@ static const gtc_word_t q31_coverage[12] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002b4beeUL), B(0x00000e0aUL), B(0x110aa28eUL), B(0x4UL),
-    B(0x00129446UL), B(0xffffb78bUL), B(0x0bc4e756UL), B(0x0UL),
-    B(0xfff9dc9fUL), B(0x00002a21UL), B(0x0cf8629aUL), B(0x0UL),
-    B(0xffe124f7UL), B(0xffffd3a1UL), B(0x0e0b9191UL), B(0x4UL),
-    B(0x002d4395UL), B(0x00004637UL), B(0x11027c99UL), B(0x4UL),
-    B(0x00148beeUL), B(0xffffefb7UL), B(0x0d10f960UL), B(0x4UL),
-    B(0xffc5f7beUL), B(0xffff692fUL), B(0x0e66550eUL), B(0x6UL),
-    B(0x005d3927UL), B(0x000096cfUL), B(0x10460925UL), B(0x6UL),
+    B(0x002b4beeUL), B(0x00000e0aUL), B(0x110aa284UL), B(0x4UL),
+    B(0x00129446UL), B(0xffffb78bUL), B(0x0bc4ec8bUL), B(0x0UL),
+    B(0xfff9dc9fUL), B(0x00002a21UL), B(0x0cf87018UL), B(0x0UL),
+    B(0xffe124f7UL), B(0xffffd3a1UL), B(0x0e0baa36UL), B(0x4UL),
+    B(0x002d4395UL), B(0x00004637UL), B(0x11027d10UL), B(0x4UL),
+    B(0x00148beeUL), B(0xffffefb7UL), B(0x0d10dce2UL), B(0x4UL),
+    B(0xffc5f7beUL), B(0xffff692fUL), B(0x0e66445bUL), B(0x6UL),
+    B(0x005d3927UL), B(0x000096cfUL), B(0x1045cf89UL), B(0x6UL),
 };
 
 const gtc_q31_table_t gtc_rlg_0042_q31 = {
@@ -138,7 +138,7 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .max_step = 65536L,
     .max_slope = 327680L,
     .fallback = 249514756L,
-    .scale = { -2151139L, 665513L, -25741L, 85433798L, 6L, 0L },
+    .scale = { 665518L, 85435458L, 4L },
     .envelope = { -2151088L, 4457366L, -25740L, 25738L },
     .n_networks = 1UL,
     .n_centers = 10UL,
@@ -153,7 +153,7 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .coverage = q31_coverage,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x8cae8027UL,
+    .crc = 0x3977b631UL,
     .term_code = { NULL },
     .serial = "RLG-0042",
 };
