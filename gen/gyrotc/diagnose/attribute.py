@@ -19,7 +19,7 @@ from .likelihood import Gains, Point
 from .refine import Refined, refine
 from .search import Found, Search
 
-__all__ = ["Attribution", "Rival", "attribute"]
+__all__ = ["Attribution", "Rival", "attribute", "choose"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -110,6 +110,19 @@ def attribute(search: Search) -> Attribution:
         share=share,
         last=found,
     )
+
+
+def choose(search: Search, count: int) -> tuple[Refined, ...]:
+    """The best one or two causes without asking whether there is any: for runs left out of a choice made."""
+    gains = Gains(search)
+    points = list(gains.single())
+    best = _best(points, gains.size)
+    if count > 1:
+        pairs = [p for p in gains.pairs() if p.members[0].id != p.members[1].id or _twice(p)]
+        pair = _best(pairs, gains.size)
+        best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
+    chosen = sorted(best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0))
+    return refine(search, gains, tuple(chosen)) if best.criterion(gains.size) > 0.0 else ()
 
 
 def _twice(point: Point) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import terms
-from .baseline import MapBasis, fine_columns, make_basis
+from .baseline import LEVELS, MapBasis, fine_columns, make_basis
 from .catalogue import Candidate, columns_of, grid, testable
 from .noise import COLOURS, Whitener
 from .records import Records, centred_slope
@@ -50,6 +50,7 @@ class Bank:
         grams: Inner products of (map, signatures) under each colour, shape (len(COLOURS), m + K, m + K).
         log_dets: log det of each colour's covariance.
         untestable: Why a cause cannot be tested, by id.
+        finer: Functions of the next finer map that this one lacks, shape (N, q).
     """
 
     basis: MapBasis
@@ -65,10 +66,16 @@ class Bank:
     grams: Array
     log_dets: Array
     untestable: dict[str, str]
+    finer: Array
+
+    def weighted(self, records: Records, sigma: Array) -> Bank:
+        """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
+        grams, log_dets = _grams(records, self.map, self.signatures, sigma)
+        return replace(self, grams=grams, log_dets=log_dets)
 
 
-def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
-    """Computes the bank. `sigma`: factor of the noise of every block, shape (N,), None: even."""
+def build(records: Records, level: int) -> Bank:
+    """Computes the bank of the map of a level (`baseline.LEVELS`)."""
     basis, static = make_basis(records, level)
     groups, columns, untestable = _columns(records)
     raw = np.column_stack(columns)
@@ -82,13 +89,7 @@ def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
     inputs, replaced, known = _inputs(records, basis)
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
     keep = size > _COMMON * size[0]
-    both = np.column_stack([static, signatures])
-    grams, log_dets = [], []
-    for colour in COLOURS:
-        whiten = Whitener(colour, records.kept, records.block_s, sigma)
-        white = whiten(both)
-        grams.append(white.T @ white)
-        log_dets.append(whiten.log_det)
+    grams, log_dets = _grams(records, static, signatures, None)
     return Bank(
         basis=basis,
         map=static,
@@ -100,10 +101,34 @@ def build(records: Records, level: int, sigma: Array | None = None) -> Bank:
         replaced=replaced,
         known=known,
         common=right[keep].T / size[keep],
-        grams=np.array(grams),
-        log_dets=np.array(log_dets),
+        grams=grams,
+        log_dets=log_dets,
         untestable=untestable,
+        finer=_finer(records, static, level),
     )
+
+
+def _grams(
+    records: Records, static: Array, signatures: Array, sigma: Array | None
+) -> tuple[Array, Array]:
+    """Inner products and log determinants under every colour."""
+    both = np.column_stack([static, signatures])
+    grams, log_dets = [], []
+    for colour in COLOURS:
+        whiten = Whitener(colour, records.kept, records.block_s, sigma)
+        white = whiten(both)
+        grams.append(white.T @ white)
+        log_dets.append(whiten.log_det)
+    return np.array(grams), np.array(log_dets)
+
+
+def _finer(records: Records, static: Array, level: int) -> Array:
+    """Orthonormal functions of the next level that are not in the map."""
+    if level + 1 >= len(LEVELS):
+        return np.zeros((len(static), 0))
+    finer = make_basis(records, level + 1)[1]
+    left, size, _ = np.linalg.svd(finer - static @ (static.T @ finer), full_matrices=False)
+    return np.asarray(left[:, size > 0.1])
 
 
 def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]]:

@@ -82,6 +82,27 @@ class Gains:
         self.base = self._project(None, self._map, None)
         self._bases: list[_Base] | None = None
 
+    @cached_property
+    def map_q(self) -> Array:
+        """Orthonormal columns of the whitened map."""
+        return np.asarray(np.linalg.qr(self._map)[0])
+
+    def plain_columns(self, at: slice) -> Array:
+        """Whitened bank columns with the map projected out."""
+        columns = self._columns[:, at]
+        return np.asarray(columns - self.map_q @ (self.map_q.T @ columns))
+
+    def rest_after(self, candidate: Candidate, white: Array) -> float:
+        """Energy of whitened data that the map of another input leaves on the blocks where it is known."""
+        i = self.search.bank.inputs.index(candidate)
+        known = self.search.bank.known[i]
+        design = self.whiten(self.search.bank.replaced[i])
+        if not known.all():
+            design = np.column_stack([design, self.whiten(np.eye(self.size)[:, ~known])])
+        q, r = np.linalg.qr(design)
+        q = q[:, np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max()]
+        return float(white @ white - ((q.T @ white) ** 2).sum())
+
     def bases(self) -> list[_Base]:
         """The map of every changed input, projected out."""
         if self._bases is None:

@@ -146,6 +146,16 @@ class Whitener:
         """L⁻ᵀ w: applied to whitened data it gives the data times the inverse covariance."""
         return self._scaled(self._solve(white, 1))
 
+    def colour(self, white: Array) -> Array:
+        """L w: noise with this covariance from white noise, shape (N, k)."""
+        out = np.empty_like(white)
+        at = 0
+        for factor in self._factor:
+            part = slice(at, at + len(factor))
+            out[part] = factor @ white[part]
+            at += len(factor)
+        return out if self._sigma is None else np.asarray(out * self._sigma[:, None])
+
     def _scaled(self, data: Array) -> Array:
         if self._sigma is None:
             return data

@@ -83,6 +83,7 @@ class Search:
         norm = np.linalg.norm(rest, axis=0)
         norm = np.where(norm > 1e-9 * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
         self.extra_on_map = on_map / norm
+        self.extra_norm = norm
         length = np.linalg.norm(dropped, axis=0)
         self.extra = np.column_stack([rest / norm, dropped / np.where(length > 0.0, length, 1.0)])
         m, k = bank.map.shape[1], bank.signatures.shape[1]
@@ -132,6 +133,17 @@ class Search:
             np.array(single), np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(variance)
         )
         self.owners = [*owners, *pair_owners, *variance_owners, Candidate("structure", {}, "structure")]
+
+    def view_of(self, colour: Colour) -> View:
+        """The view under a colour that is not in the bank."""
+        whiten = Whitener(colour, self.records.kept, self.records.block_s, self.sigma)
+        white = whiten(np.column_stack([self.bank.map, self.bank.signatures]))
+        return self._view(colour, white.T @ white, whiten.log_det)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the residual likelihood."""
+        return int(self.y.size - self.n_map - self.bank.common.shape[1] - (len(self.base) - self.n_map))
 
     def _view(self, colour: Colour, gram: Array, log_det: float) -> View:
         whiten = Whitener(colour, self.records.kept, self.records.block_s, self.sigma)

@@ -1,0 +1,151 @@
+"""The stages of `gyrotc diagnose` in order: screen, noise, compare, detect, attribute, extend, measure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .attribute import Attribution, attribute
+from .bank import Bank
+from .cache import bank_of
+from .catalogue import Candidate
+from .compare import Ensemble, compare
+from .levels import NoiseFinding, noise_findings
+from .likelihood import Gains
+from .limits import Limit, detection_limits, overlap
+from .noise import Declared
+from .records import Records
+from .screen import Screened, cleaned, screen
+from .search import Search
+from .words import NOISE_WORDS
+
+__all__ = ["Analysis", "analyse", "search_of"]
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+_FINER_P = 1e-3
+_HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything that is known before an extension is made.
+
+    Attributes:
+        records: Training runs.
+        screened: What the screens found.
+        search: The search of the data, before any cause.
+        attribution: What was found.
+        noise: Findings of the family `noise`, from screens and from the declaration.
+        limits: Detection limits by cause.
+        separations: For every cause found, d from which it can be told from each rival.
+        ensemble: Measured against simulated residuals.
+    """
+
+    records: Records
+    screened: Screened
+    search: Search
+    attribution: Attribution
+    noise: tuple[NoiseFinding, ...]
+    limits: dict[str, Limit]
+    separations: tuple[dict[str, float], ...]
+    ensemble: Ensemble
+
+
+def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
+    """Everything from rows to named causes."""
+    say("screening")
+    screened = screen(records)
+    search = search_of(records, screened, say)
+    say("searching for causes")
+    attribution = attribute(search)
+    say("comparing with the simulation")
+    after = _after(search, attribution)
+    noise = [
+        NoiseFinding(name, p, values, NOISE_WORDS[name]) for name, p, values in screened.findings
+    ] + noise_findings(after, declared, causes=bool(attribution.causes) or attribution.detected)
+    gains = Gains(search) if attribution.causes else None
+    separations = tuple(
+        overlap(gains, cause, _others(cause.candidate.id)) if gains is not None else {}
+        for cause in attribution.causes
+    )
+    return Analysis(
+        records,
+        screened,
+        search,
+        attribution,
+        tuple(noise),
+        detection_limits(search),
+        separations,
+        compare(search, declared),
+    )
+
+
+def _others(cause: str) -> list[str]:
+    near = ["cavity_lag", "thermal_gradient", "time_misalignment", "hysteresis", "warm_up", "turn_on_offset"]
+    return [n for n in near if n != cause]
+
+
+def search_of(
+    records: Records, screened: Screened | None = None, say: Progress = lambda _: None, level: int | None = None
+) -> Search:
+    """The search with the coarsest map that the data do not reject."""
+    checked = screen(records) if screened is None else screened
+    y, empty = cleaned(records, checked)
+    nuisance = np.eye(records.size)[:, empty] if empty.size else None
+    levels: Sequence[int] = range(_HIGHEST_LEVEL + 1) if level is None else [level]
+    for at in levels:
+        bank = bank_of(records, at, say)
+        if checked.sigma is not None:
+            bank = bank.weighted(records, checked.sigma)
+        extras = _channels(records)
+        search = Search(records, bank, y, extras, nuisance, checked.sigma)
+        if at == levels[-1] or not needs_finer(search):
+            break
+    return search
+
+
+def _channels(records: Records) -> tuple[Array, list[Candidate]] | None:
+    """Columns of the auxiliary channels that vary."""
+    names = sorted(set.intersection(*(set(r.channels) for r in records.runs)))
+    columns, candidates = [], []
+    for name in names:
+        column = records.average([r.channels[name] for r in records.runs])
+        if np.ptp(column) > 1e-9 * (1.0 + np.abs(column).max()):
+            columns.append(column - column.mean())
+            candidates.append(Candidate("auxiliary", {}, "columns", name))
+    return (np.column_stack(columns), candidates) if columns else None
+
+
+def needs_finer(search: Search) -> bool:
+    """Whether the next finer map explains what neither this one nor any memory does."""
+    from scipy.stats import chi2
+
+    gains = Gains(search)
+    bank: Bank = search.bank
+    finer = gains.whiten(bank.finer)
+    memory = np.column_stack(
+        [gains.plain_columns(s) for c, s in gains.plain if c.id != "path_length_periodicity"]
+        + [gains.plain_columns(s) for c, s in gains.random if c.id == "turn_on_offset"]
+    )
+    left, size, _ = np.linalg.svd(memory, full_matrices=False)
+    held = np.linalg.qr(np.column_stack([gains.map_q, left[:, size > 0.05 * size[0]]]))[0]
+    rest = finer - held @ (held.T @ finer)
+    q, r = np.linalg.qr(rest)
+    own = np.abs(np.diag(r)) > 0.05 * np.linalg.norm(finer, axis=0)
+    if not own.any():
+        return False
+    y = gains.whiten(search.y) / gains.scale
+    energy = float(((q[:, own].T @ (y - held @ (held.T @ y))) ** 2).sum())
+    return float(chi2.sf(energy, int(own.sum()))) < _FINER_P
+
+
+def _after(search: Search, attribution: Attribution) -> Search:
+    """The search with the causes found taken out."""
+    blocks = [b for c in attribution.causes for b in (c.columns, c.tangent, c.edges) if b is not None]
+    return search.extended(np.column_stack(blocks)) if blocks else search
+

@@ -1,0 +1,323 @@
+"""`gyrotc diagnose`: all stages, and their result as the JSON object of the interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__, terms
+from ..dataset import Dataset
+from ..fitting import FitOptions, front_end, model_of
+from ..model import Model
+from .extend import Extension, extend
+from .gain import Gain
+from .levels import NoiseFinding
+from .limits import Limit
+from .pipeline import Analysis, analyse
+from .recordings import declared_noise, records_of
+from .refine import Interval, Refined
+from .verdict import named, verdict_of
+from .words import NOISE_WORDS, WORDS, separate_by
+
+__all__ = ["Diagnosis", "diagnose"]
+
+Progress = Callable[[str], None]
+
+_LITTLE_C = 2.0  # a temperature span below which nothing can be learnt about temperature
+_MOST_EQUIVALENT = 2
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Result, and what the pictures are made of.
+
+    Attributes:
+        result: The JSON object.
+        analysis: Search and statistics; None where the recordings cannot decide anything.
+        extension: Gain; None without an analysis.
+        model: The extended model, None if none is shipped.
+    """
+
+    result: dict[str, Any]
+    analysis: Analysis | None
+    extension: Extension | None
+    model: Model | None
+
+
+def diagnose(
+    dataset: Dataset,
+    *,
+    model: Model | None = None,
+    out: Path | None = None,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Runs the whole diagnosis on the training runs; exam runs measure the gain only.
+
+    Args:
+        dataset: Recordings. `truth.json` beside them is never opened.
+        model: A model made before: its method, block and number of centers are those of the refit.
+        out: Folder for pictures and `model-extended.json`; None: nothing is written.
+        options: As for `fit`; default: those of `model`, else of `fit`.
+        progress: Called with what is being done.
+
+    Raises:
+        InputError: No training run, or nothing usable in them.
+    """
+    say = progress or (lambda _: None)
+    chosen = options or _options_of(model)
+    say("reading")
+    records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
+    temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
+    if float(np.ptp(temperature)) < _LITTLE_C:
+        return Diagnosis(_not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
+    analysis = analyse(records, declared_noise(dataset), say)
+    causes = analysis.attribution.causes if named(analysis.attribution) else ()
+    extension = extend(dataset, records, causes, chosen, say)
+    extended = _extended_model(dataset, extension, chosen)
+    result = _result(dataset, analysis, extension, causes, chosen)
+    if out is not None:
+        from .pictures import draw
+
+        say("drawing")
+        out.mkdir(parents=True, exist_ok=True)
+        if extended is not None:
+            extended.save(out / "model-extended.json")
+            result["extended"]["model"] = "model-extended.json"
+        result["pictures"] = draw(out, analysis, extension, causes)
+    return Diagnosis(result, analysis, extension, extended)
+
+
+def _options_of(model: Model | None) -> FitOptions:
+    if model is None:
+        return FitOptions()
+    return FitOptions(
+        method=model.method, seed=model.seed, block_s=model.block_s, average_s=model.average_s
+    )
+
+
+def _head(dataset: Dataset, verdict: str, options: FitOptions) -> dict[str, Any]:
+    block = front_end([r for r in dataset.runs if r.role == "train"], options.block_s).block_s
+    return {
+        "schema": "gyrotc.diagnose/1",
+        "gyrotc_version": __version__,
+        "serial": dataset.serial,
+        "axis": dataset.axis,
+        "verdict": verdict,
+        "block_s": block,
+        "average_s": options.average_s,
+    }
+
+
+def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[str, Any]:
+    text = f"Temperature spans only {span_c:.2f} C: nothing can be learnt about temperature here."
+    return _head(dataset, "not_testable", options) | {
+        "noise_floor_dph": None,
+        "discrepancies": [],
+        "causes": [],
+        "baseline": None,
+        "extended": None,
+        "considered": [
+            {"id": i, "family": t.family, "p_value": None, "detection_limit": None, "not_testable": text}
+            for i, t in terms.CATALOGUE.items()
+            if i in WORDS
+        ],
+        "missing": [text],
+        "text": text,
+    }
+
+
+def _result(
+    dataset: Dataset,
+    analysis: Analysis,
+    extension: Extension,
+    causes: tuple[Refined, ...],
+    options: FitOptions,
+) -> dict[str, Any]:
+    attribution = analysis.attribution
+    verdict = verdict_of(attribution, analysis.noise, [])
+    listed = [_cause(analysis, extension, k) for k in range(len(causes))]
+    listed += [_noise_cause(n) for n in analysis.noise]
+    missing = [f"{WORDS[i].name}: {why}" for i, why in analysis.search.bank.untestable.items()]
+    result = _head(dataset, verdict, options) | {
+        "noise_floor_dph": extension.floor,
+        "discrepancies": [vars(d) for d in analysis.ensemble.discrepancies],
+        "causes": listed,
+        "baseline": {"exam_rms_dph": extension.baseline_rms, "centers": extension.baseline_centers},
+        "extended": _extended(extension),
+        "considered": _considered(analysis),
+        "missing": missing,
+        "measured_on": extension.measured_on,
+        "unexplained": _unexplained(analysis) if verdict in ("unexplained", "partial") else None,
+    }
+    result["text"] = _sentence(result)
+    return result
+
+
+def _cause(analysis: Analysis, extension: Extension, k: int) -> dict[str, Any]:
+    attribution = analysis.attribution
+    cause = attribution.causes[k]
+    id = cause.candidate.id
+    rivals = [r.id for r in attribution.rivals[k]][:_MOST_EQUIVALENT]
+    entry: dict[str, Any] = {
+        "id": id,
+        "family": terms.CATALOGUE[id].family,
+        "name": WORDS[id].name,
+        "p_value": attribution.p_values[k],
+        "parameters": {n: _interval(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
+        "equivalent": rivals,
+        "separate_by": separate_by(id, rivals[0]) if rivals else None,
+        "gain": _gain(extension.steps[k]),
+        "signature": WORDS[id].signature,
+        "remedy": WORDS[id].remedy,
+        "separable_from_d": analysis.separations[k],
+    }
+    if cause.candidate.channel is not None:
+        entry["channel"] = cause.candidate.channel
+    return entry
+
+
+def _interval(value: Interval) -> dict[str, float]:
+    return {"value": value.value, "low": value.low, "high": value.high}
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    return gain.to_dict()
+
+
+def _noise_cause(finding: NoiseFinding) -> dict[str, Any]:
+    return {
+        "id": finding.id,
+        "family": "noise",
+        "name": NOISE_WORDS[finding.id],
+        "p_value": finding.p_value,
+        "parameters": {n: {"value": v, "low": None, "high": None} for n, v in finding.parameters.items()},
+        "equivalent": [],
+        "separate_by": None,
+        "gain": None,
+        "signature": finding.text,
+        "remedy": "declare what was measured, or mend the instrument",
+    }
+
+
+def _extended(extension: Extension) -> dict[str, Any] | None:
+    if extension.extended is None or extension.total is None:
+        return None
+    left = extension.rate_left_out
+    return {
+        "exam_rms_dph": extension.total.rms_after,
+        "centers": extension.extended.n_centers,
+        "terms": [e.id for e in extension.shipped if e.id != "map_too_coarse"],
+        "model": None,
+        "gain": _gain(extension.total),
+        "rate_left_out": None if left is None else {"environment": left[0], **_gain(left[1])},
+        "forward_in_time": None if extension.forward is None else _gain(extension.forward),
+    }
+
+
+def _considered(analysis: Analysis) -> list[dict[str, Any]]:
+    """Every cause of the catalogue with its adjusted p-value and its detection limit."""
+    best: dict[str, tuple[float, float | None]] = {}
+    for found in analysis.attribution.first:
+        candidate = found.candidate
+        key = candidate.id if candidate.channel is None else f"{candidate.id}:{candidate.channel}"
+        if key not in best or found.p_value < best[key][0]:
+            best[key] = (found.p_value, None)
+    out = []
+    for key, (p_value, _) in best.items():
+        id, _, channel = key.partition(":")
+        if id == "structure":
+            continue
+        limit = analysis.limits.get(key)
+        entry: dict[str, Any] = {
+            "id": id,
+            "family": terms.CATALOGUE[id].family,
+            "p_value": p_value,
+            "detection_limit": _limit(limit),
+        }
+        if channel:
+            entry["channel"] = channel
+        out.append(entry)
+    for id, why in analysis.search.bank.untestable.items():
+        out.append(
+            {
+                "id": id,
+                "family": terms.CATALOGUE[id].family,
+                "p_value": None,
+                "detection_limit": None,
+                "not_testable": why,
+            }
+        )
+    order = list(WORDS)
+    return sorted(out, key=lambda e: order.index(e["id"]))
+
+
+def _limit(limit: Limit | None) -> dict[str, Any] | None:
+    if limit is None:
+        return None
+    return {
+        "value": limit.value,
+        "unit": limit.unit,
+        "parameter": limit.parameter,
+        "over": [list(p) for p in limit.at],
+    }
+
+
+def _unexplained(analysis: Analysis) -> dict[str, Any]:
+    """What is left: how much of the structure the best cause holds, and where the rest lies."""
+    attribution = analysis.attribution
+    return {
+        "share_explained": attribution.share,
+        "p_value": attribution.misfit_p,
+        "best_partial_match": [c.candidate.id for c in attribution.causes],
+    }
+
+
+def _sentence(result: dict[str, Any]) -> str:
+    """The finding in one or two sentences."""
+    causes = [c for c in result["causes"] if c["family"] != "noise"]
+    names = "; ".join(c["name"] for c in causes)
+    noise = "; ".join(c["name"] for c in result["causes"] if c["family"] == "noise")
+    text = {
+        "consistent": "Nothing was found beyond the static map and the declared noise.",
+        "explained": f"{names}.",
+        "ambiguous": f"{names}, or equally well: "
+        + ", ".join(WORDS[i].name for c in causes for i in c["equivalent"])
+        + ".",
+        "partial": f"{names}, and structure remains that no cause explains.",
+        "noise_differs": f"{noise}.",
+        "unexplained": "There is structure that no cause of the catalogue explains.",
+        "not_testable": "The recordings cannot decide.",
+    }[result["verdict"]]
+    extended = result["extended"]
+    if extended is None:
+        return str(text)
+    share = extended["gain"]["share_of_excess_removed"]
+    part = f" On unseen runs the extension removes {share:.0%} of the removable error" if share is not None else ""
+    return f"{text}{part}{'.' if part else ''}"
+
+
+def _extended_model(dataset: Dataset, extension: Extension, options: FitOptions) -> Model | None:
+    """The model file of the extension."""
+    if extension.extended is None:
+        return None
+    runs = [r for r in dataset.runs if r.role == "train"]
+    front = front_end(runs, options.block_s)
+    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options)
+    entries = []
+    for effect in extension.shipped:
+        if effect.id == "map_too_coarse":
+            continue
+        names = [p.name for p in terms.CATALOGUE[effect.id].parameters]
+        entries.append(
+            {
+                "id": effect.id,
+                "parameters": {n: effect.values[n] for n in names},
+                "channel": effect.channel,
+            }
+        )
+    return Model.from_dict({**plain.to_dict(), "terms": entries})
