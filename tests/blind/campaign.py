@@ -84,6 +84,7 @@ class Hidden:
     parameters: list[dict[str, float]]
     noise: noise.Noise
     stress: str = ""
+    declared: noise.Noise | None = None  # what the data set says, where it differs from the truth
     rows: list[Array] = field(default_factory=list)  # deg/h at 10 s
     effect_rows: list[Array] = field(default_factory=list)
     map_rows: list[Array] = field(default_factory=list)
@@ -165,7 +166,11 @@ def draw_recording(
         truth.parameters.append(parameters)
     offset = rng.uniform(-0.01, 0.01)
     for run, rate, extra in zip(campaign.runs, scene.rates(), total, strict=True):
-        static = offset + contrast * scene.map(run.block_c, rate)
+        seen = run.block_c
+        if stress == "sensor_lag":  # the bias knows the temperature before the thermometer does: T = T_s + tau dT_s/dt
+            seen = seen + 60.0 * np.gradient(seen)
+            rate = np.gradient(seen) * 60.0
+        static = offset + contrast * scene.map(seen, rate)
         drawn = noise.draw(level, run.block_c.size, rng)
         rows = _stressed(mean_of(drawn, ROW_S), mean_of(run.block_c, ROW_S), stress, level, rng)
         truth.noise_rows.append(rows)
@@ -197,7 +202,7 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     lines = ["schema = 1", f'serial = "{serial}"', 'earth_rate = "none"']
     if declare:
-        lines += ["", "[noise]"] + [f"{k} = {float(v)!r}" for k, v in truth.noise.declared().items()]
+        lines += ["", "[noise]"] + [f"{k} = {float(v)!r}" for k, v in (truth.declared or truth.noise).declared().items()]
     for k, (run, role) in enumerate(zip(campaign.runs, campaign.roles, strict=True)):
         name = f"run-{k + 1:02d}.csv"
         started = (_EPOCH + timedelta(days=campaign.days[k])).isoformat()
