@@ -229,7 +229,7 @@ REFUSED: dict[str, Refused] = {
                 toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1e6")
             ),
         ),
-        ("a.csv, line 3, column pulses", "deg/h", "at most 7.5e+06"),
+        ("a.csv, line 3, column pulses", "-7.5e+06 ... 7.5e+06 deg/h"),
     ),
     # Parquet
     "no Parquet": Refused(with_bytes(lambda data: data, "a.parquet"), ("a.parquet", "Parquet")),

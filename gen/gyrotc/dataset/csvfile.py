@@ -25,7 +25,7 @@ from .values import Fault
 
 __all__ = ["CsvFile"]
 
-_BLOCK_BYTES = 2**22
+_BLOCK_BYTES = 2**20
 _LONGEST_LINE = 2**20
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
@@ -60,9 +60,10 @@ class CsvFile(Source):
     def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
         """As `Source.read`, fast: by pyarrow, one block after the other."""
         unique = [f"{index} {name}" for index, name in enumerate(self.names)]
+        parts: list[list[Floats]] = [[] for _ in columns]
         try:
             with Prefix(self.path, self.size) as prefix:
-                table = pacsv.read_csv(
+                for batch in pacsv.open_csv(
                     prefix,
                     pacsv.ReadOptions(
                         use_threads=False, block_size=_BLOCK_BYTES, skip_rows=1, column_names=unique
@@ -71,12 +72,15 @@ class CsvFile(Source):
                         column_types=dict.fromkeys(unique, pa.float64()),
                         include_columns=[unique[self.names.index(name)] for name in columns],
                     ),
-                )
+                ):
+                    if any(values.null_count for values in batch.columns):
+                        return None
+                    for part, values in zip(parts, batch.columns, strict=True):
+                        part.append(values.to_numpy())
         except pa.ArrowInvalid:
             return None
-        if any(column.null_count for column in table.columns):
-            return None
-        return {name: column.to_numpy() for name, column in zip(columns, table.columns, strict=True)}
+        # Popped, so that the parts of a column are gone before the next one is joined.
+        return {name: np.concatenate([np.zeros(0), *parts.pop(0)]) for name in columns}
 
     def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
         """As `Source.scan`, line by line."""
@@ -154,6 +158,8 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
         text = head.decode("utf-8-sig").rstrip("\r\n")
     except UnicodeDecodeError:
         raise InputError(where, "bytes that are no UTF-8", "CSV text in UTF-8") from None
+    if "\r" in text:
+        raise InputError(where, "carriage returns inside a line", "line ends of LF or CRLF")
     if "," not in text:
         for mark, what in ((";", "semicolons"), ("\t", "tabs")):
             if mark in text:

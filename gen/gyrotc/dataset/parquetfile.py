@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import InputError
@@ -17,7 +16,8 @@ from .values import Fault
 
 __all__ = ["ParquetFile"]
 
-_BATCH_ROWS = 2**18
+_BATCH_ROWS = 2**16
+_DAMAGE = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)  # of whatever pyarrow meets
 
 
 class ParquetFile(Source):
@@ -42,7 +42,7 @@ class ParquetFile(Source):
                 self._n_rows = file.metadata.num_rows
             self.size = path.stat().st_size
             self.keep_as_read()
-        except (pa.ArrowException, OSError) as error:
+        except _DAMAGE as error:
             raise InputError(
                 name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
             ) from error
@@ -53,16 +53,17 @@ class ParquetFile(Source):
 
     def read(self, columns: Sequence[str]) -> dict[str, Floats]:
         """As `Source.read`, row group by row group; never None."""
-        read = {column: np.empty(self._n_rows) for column in columns}
         at = 0
         try:
-            with pq.ParquetFile(self.path) as file:
+            read = {column: np.empty(self._n_rows) for column in columns}
+            with pq.ParquetFile(self.path, pre_buffer=False) as file:
                 for batch in file.iter_batches(_BATCH_ROWS, columns=list(columns), use_threads=False):
                     for name, values in zip(batch.schema.names, batch.columns, strict=True):
-                        filled = pc.fill_null(values.cast(pa.float64(), safe=False), float("nan"))
-                        read[name][at : at + len(batch)] = filled.to_numpy(zero_copy_only=False)
+                        read[name][at : at + len(batch)] = values.to_numpy(zero_copy_only=False)
                     at += len(batch)
-        except (pa.ArrowException, OSError, ValueError) as error:
+            if at != self._n_rows:
+                raise ValueError(f"{at} rows instead of {self._n_rows}")
+        except _DAMAGE as error:
             raise InputError(self.name, f"is damaged ({_short(error)})", "a whole Parquet file") from error
         return read
 

@@ -15,7 +15,7 @@ from .problems import Problems
 from .records import Applied, EarthRate, Floats, Rows
 from .schema import Columns
 from .source import Source
-from .values import MIN_ROWS, RATE_DPH, Fault, faults
+from .values import MIN_ROWS, Fault, faults, rate_faults
 
 __all__ = ["Reader", "Recording", "open_file", "open_recording"]
 
@@ -127,36 +127,23 @@ def _checked(file: Source, layout: Layout, pulse_weight_arcsec: float | None, pr
     values = file.read(file.names)
     lines = None
     if values is None:
-        values, lines, found = file.scan()
-        for fault in found:
+        values, lines, unread = file.scan()
+        for fault in unread:
             problems.add(_problem(file, fault, fault.row))
         keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
         values = {name: column[keep] for name, column in values.items()}
         lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
     time = values[layout.time]
-    for fault in faults(values, layout):
-        problems.add(_problem(file, fault, lines[fault.row] if lines else file.place(fault.row)))
-    if layout.pulses and len(time) > 1:
-        _check_pulse_rate(
-            file, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0), problems
+    found = list(faults(values, layout))
+    if layout.pulses and not found:
+        found += rate_faults(
+            layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0)
         )
+    for fault in found:
+        problems.add(_problem(file, fault, lines[fault.row] if lines else file.place(fault.row)))
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
     return time
-
-
-def _check_pulse_rate(file: Source, rate: Floats, problems: Problems) -> None:
-    wrong = np.abs(rate) > RATE_DPH[1]
-    if wrong.any():
-        first = int(np.argmax(wrong))
-        found = f"counts that make {rate[first]:.10g} deg/h"
-        problems.add(
-            _problem(
-                file,
-                Fault(first, "pulses", int(wrong.sum()), found, f"at most {RATE_DPH[1]:g} deg/h"),
-                file.place(first),
-            )
-        )
 
 
 def _problem(file: Source, fault: Fault, place: int) -> InputError:

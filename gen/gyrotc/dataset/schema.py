@@ -211,21 +211,15 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _dropped(content: dict[str, Any], detail: ErrorDetails) -> bool:
     """Takes a wrong field out of the content so that the rest can be looked at; False if that cannot be."""
-    if detail["type"] == "missing":
-        if detail["loc"] != ("serial",):
+    location = detail["loc"]
+    if location[0] == "run":
+        if len(location) < 3 or location[2] == "file":
             return False
+        content["run"][location[1]].pop(location[2], None)
+    elif location[0] == "serial":
         content["serial"] = "unknown"
-        return True
-    at: Any = content
-    path = [part for part in detail["loc"] if isinstance(part, int) or re.fullmatch(r"\w+", part)]
-    for part in path[:2] if path[0] == "run" else []:
-        at = at[part]
-    key = path[2] if path[0] == "run" and len(path) > 2 else path[0]
-    if key in ("run", "file"):
-        return False
-    at.pop(key, None)
-    if key == "serial":
-        content["serial"] = "unknown"
+    else:
+        content.pop(str(location[0]), None)
     return True
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from .columns import Layout
 from .records import Floats
 
-__all__ = ["MIN_ROWS", "Fault", "faults"]
+__all__ = ["MIN_ROWS", "Fault", "faults", "rate_faults"]
 
 MIN_ROWS = 10
-TEMPERATURE_C = (-90.0, 200.0)
-RATE_DPH = (-7.5e6, 7.5e6)
+_TEMPERATURE_C = (-90.0, 200.0)
+_RATE_DPH = (-7.5e6, 7.5e6)
 _TIME_S = (-1e10, 1e10)
 _KELVIN = (183.15, 473.15)  # the plausible range, had it been given in kelvin
 
@@ -51,7 +51,12 @@ def faults(columns: Mapping[str, Floats], layout: Layout) -> Iterator[Fault]:
             yield _fault(layout.value, wrong, pulses, "whole counts since the last row")
     else:
         for name in layout.axes.values() or (layout.value,):
-            yield from _within(name, columns[name], RATE_DPH, "deg/h")
+            yield from rate_faults(name, columns[name])
+
+
+def rate_faults(name: str, rate: Floats) -> Iterator[Fault]:
+    """Rates that no gyro has, deg/h; NaN passes."""
+    yield from _within(name, rate, _RATE_DPH, "deg/h")
 
 
 def _order(name: str, time: Floats) -> Iterator[Fault]:
@@ -64,8 +69,8 @@ def _order(name: str, time: Floats) -> Iterator[Fault]:
 
 
 def _temperature(name: str, values: Floats) -> Iterator[Fault]:
-    for fault in _within(name, values, TEMPERATURE_C, "C"):
-        wrong = values > TEMPERATURE_C[1]
+    for fault in _within(name, values, _TEMPERATURE_C, "C"):
+        wrong = values > _TEMPERATURE_C[1]
         kelvin = bool(np.all((values[wrong] >= _KELVIN[0]) & (values[wrong] <= _KELVIN[1])) and wrong.any())
         hint = "; kelvin?" if kelvin else ""
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
