@@ -15,6 +15,7 @@ from typing import Any
 from . import learning, pieces, problems, selection
 
 WIDTHS = (0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6)
+LIMIT_S = 300  # CPU seconds of a process; the system ends it there
 _SHORT_S = 1.0
 _REPEATS = 5
 
@@ -69,6 +70,7 @@ KINDS: dict[str, Callable[..., dict[str, Any]]] = {
 
 
 def main(arguments: list[str]) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S + 10))
     result = KINDS[arguments[0]](*arguments[1:])
     result["peak_gib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(json.dumps(result))
