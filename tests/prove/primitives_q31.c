@@ -1,0 +1,166 @@
+/* primitives_q31.c - the fixed-point primitives over all of their arguments, against formulas written apart.
+ *
+ * Prints one line for each: name, arguments visited, arguments that differ; for the Gaussian also its worst error
+ * in 2^-31 against 2^-v for every v that truncates to u.
+ */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "gtc_num_q31.h"
+
+static uint64_t seed = 1;
+
+static uint64_t draw(void) /* splitmix64 */
+{
+    uint64_t z = (seed += 0x9E3779B97F4A7C15ULL);
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
+    return z ^ (z >> 31);
+}
+
+static void gauss(void)
+{
+    uint64_t wrong = 0;
+    double worst = 0.0;
+    uint64_t table[64];
+    double step[64];
+    uint64_t u;
+    int i;
+    for (i = 0; i < 64; i++) {
+        table[i] = (uint64_t)llrint(2147483603.0 * exp2(-i / 64.0));
+        step[i] = 2147483648.0 * exp2(-i / 64.0);
+    }
+    for (u = 0; u < Q31_CUT; u++) {
+        const uint64_t f = u % 262144U; /* 2^-18 of an entry */
+        const uint64_t drop = (f * 16384U * (2977018596U - 979U * (f / 16U))) / 4294967296U;
+        const uint64_t entry = table[(u / 262144U) % 64U];
+        const uint64_t want = (entry - (entry * drop) / 274877906944U) >> (u / 16777216U);
+        const uint32_t got = gtc_q31_exp2((uint_least32_t)u);
+        /* 2^-f/64 of both ends by the exponential's series: f ln2/64 <= 0.011 */
+        const double x0 = (double)f * (0.6931471805599453094 / 64.0 / 262144.0);
+        const double x1 = (double)(f + 1U) * (0.6931471805599453094 / 64.0 / 262144.0);
+        const double scale = ldexp(step[(u / 262144U) % 64U], -(int)(u / 16777216U));
+        const double e0 = got - scale * (1 - x0 * (1 - x0 / 2 * (1 - x0 / 3 * (1 - x0 / 4 * (1 - x0 / 5)))));
+        const double e1 = got - scale * (1 - x1 * (1 - x1 / 2 * (1 - x1 / 3 * (1 - x1 / 4 * (1 - x1 / 5)))));
+        wrong += (got != want);
+        worst = fmax(worst, fmax(fabs(e0), fabs(e1)));
+    }
+    printf("gauss %" PRIu64 " %" PRIu64 " %.6f\n", (uint64_t)Q31_CUT, wrong, worst);
+}
+
+static void products(void)
+{
+    static const uint32_t corners[] = { 0, 1, 2, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x10001, 0x7FFFFFFF, 0x80000000,
+                                        0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF };
+    const uint64_t n = sizeof corners / sizeof corners[0];
+    uint64_t wrong = 0, k;
+    for (k = 0; k < n * n + 100000000U; k++) {
+        const uint64_t pair = draw();
+        const uint32_t a = (k < n * n) ? corners[k / n] : (uint32_t)pair;
+        const uint32_t b = (k < n * n) ? corners[k % n] : (uint32_t)(pair >> 32);
+        const int32_t p = (a == 0x80000000U) ? 0 : (int32_t)a;
+        const int32_t q = (b == 0x80000000U) ? 0 : (int32_t)b;
+        wrong += (gtc_q31_high(a, b) != (uint32_t)(((uint64_t)a * b) >> 32));
+        wrong += (gtc_q31_high_of_squares(p, q)
+                  != (uint32_t)(((uint64_t)((int64_t)p * p) + (uint64_t)((int64_t)q * q)) >> 32));
+    }
+    printf("products %" PRIu64 " %" PRIu64 "\n", n * n + 100000000U, wrong);
+}
+
+/* Every input of a range, and inputs far outside. */
+static void one_range(int32_t low, uint32_t span, uint64_t *visited, uint64_t *wrong)
+{
+    const int_least32_t range[2] = { low, (int32_t)(low + (int64_t)span) };
+    const uint64_t most = (65536ULL * 67108864ULL - 1U) / (span > 0U ? span : 1U);
+    const uint32_t gain = (uint32_t)(most > 0xFFFFFFFFULL ? 0xFFFFFFFFULL : most);
+    uint64_t offset;
+    uint_least32_t x = 0;
+    for (offset = 0; offset <= span; offset++) {
+        const int status = gtc_q31_position((int32_t)(low + (int64_t)offset), range, (int_least32_t)gain, &x);
+        const uint64_t want = (offset * gain) / 67108864U;
+        *wrong += (status != GTC_OK) || (x != want) || (want > 65535U);
+    }
+    *visited += offset;
+    if (low > -2147483647) {
+        *wrong += gtc_q31_position(low - 1, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
+        *wrong += gtc_q31_position(-2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
+    }
+    *wrong += gtc_q31_position(2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED
+              || x != ((uint64_t)span * gain) / 67108864U;
+    *wrong += gtc_q31_position(GTC_TEMP_MISSING, range, (int_least32_t)gain, &x) != GTC_E_ARG;
+    *visited += 4;
+}
+
+static void positions(void)
+{
+    static const uint32_t spans[] = { 0, 1, 2, 63, 64, 65, 65535, 65536, 65537, 6553600, 10000019, 67107839 };
+    uint64_t visited = 0, wrong = 0;
+    size_t k;
+    for (k = 0; k < sizeof spans / sizeof spans[0]; k++) {
+        one_range(-3276800, spans[k], &visited, &wrong);
+        one_range(-13107200, spans[k], &visited, &wrong);
+    }
+    printf("positions %" PRIu64 " %" PRIu64 "\n", visited, wrong);
+}
+
+/* num / den to the nearest, halves away from zero. */
+static void quotients(void)
+{
+    uint64_t wrong = 0, k;
+    const uint64_t n = 50000000U;
+    for (k = 0; k < n; k++) {
+        const uint64_t bits = draw();
+        const int64_t num = (int64_t)(draw() >> (8U + bits % 40U)) * ((bits & 0x10000U) ? 1 : -1);
+        const uint32_t den = (uint32_t)((draw() >> (32U + bits / 64U % 31U)) | 1U);
+        const int64_t q = gtc_q31_divided(num, den);
+        /* |2 (num - q den)| <= den, and at a tie |q den| > |num| */
+        const __int128 left = 2 * ((__int128)num - (__int128)q * den);
+        const __int128 size = left < 0 ? -left : left;
+        const int away = (num < 0) ? (left > 0) : (left < 0);
+        wrong += (size > den) || ((size == den) && !away);
+    }
+    printf("quotients %" PRIu64 " %" PRIu64 "\n", n, wrong);
+}
+
+/* The rounding shift: a network without Gaussians, at every position. */
+static void shifts(void)
+{
+    static const int32_t values[] = { 0, 1, -1, 2, -2, 3, -3, 16383, -16384, 32767, 32768, -32768, 65535, 65537,
+                                      1000003, -1000003, 0x3FFFFFFF, -0x3FFFFFFF };
+    const size_t n = sizeof values / sizeof values[0];
+    static gtc_q31_table_t table;
+    uint64_t visited = 0, wrong = 0;
+    size_t a, b;
+    for (a = 0; a < n; a++) {
+        for (b = 0; b < n; b++) {
+            gtc_word_t network[GTC_NETWORK_WORDS] = { { .bits = 0U }, { .integer = values[a] }, { .integer = values[b] },
+                                                      { .integer = values[(a + b) % n] } };
+            POINT in;
+            for (in.x_temp = 0; in.x_temp < 65536U; in.x_temp++) {
+                int64_t twice, want;
+                in.x_slope = (in.x_temp * 40503U) & 0xFFFFU;
+                /* twice the exact result, in 2^-16: rounded to nearest, halves up */
+                twice = 2 * ((int64_t)values[a] * 65536 + (int64_t)values[b] * in.x_temp
+                             + (int64_t)values[(a + b) % n] * in.x_slope) + 65536;
+                want = twice / 131072 - ((twice % 131072) < 0);
+                if ((want >= -2147483647) && (want <= 2147483647)) {
+                    wrong += gtc_q31_network(&table, network, network, &in) != want;
+                    visited++;
+                }
+            }
+        }
+    }
+    printf("shifts %" PRIu64 " %" PRIu64 "\n", visited, wrong);
+}
+
+int main(void)
+{
+    gauss();
+    shifts();
+    products();
+    positions();
+    quotients();
+    return 0;
+}

@@ -1,0 +1,71 @@
+"""The runtime's primitives over all of their arguments, against formulas written apart (tests/prove/*.c)."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from emitted import spoil
+from gyrotc.reference.q31 import GAUSS_ERROR
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Largest departure of the float32 Gaussian from the exact one that docs/numerics.md allows.
+F32_GAUSS_ERROR = 1.0e-7
+
+
+def _run(
+    name: str, work: Path, *arguments: str, libc: Path = ROOT / "libc", half: int = 0
+) -> dict[str, list]:
+    """Words of each line that a program prints, by its first word."""
+    program = work / name
+    sources = [ROOT / "tests" / "prove" / f"{name}.c", libc / "gtc_crc.c", *libc.glob("gtc_q31_narrow.c")]
+    flags = ["-std=gnu99", "-O3", "-march=native", "-ffp-contract=off", f"-DGTC_HALF_MULTIPLY={half}"]
+    include = [f"-I{ROOT / 'include'}", f"-I{libc}"]
+    subprocess.run(["gcc", *flags, *include, *map(str, sources), "-lm", "-o", str(program)], check=True)
+    done = subprocess.run([str(program), *arguments], check=True, capture_output=True, text=True)
+    return {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
+
+
+@pytest.mark.parametrize("half", [0, 1], ids=["long multiply", "16-bit halves"])
+def test_fixed_point_primitives_over_all_arguments(half: int, tmp_path: Path) -> None:
+    found = _run("primitives_q31", tmp_path, half=half)
+    assert {name: words[1] for name, words in found.items()} == dict.fromkeys(
+        ("gauss", "shifts", "products", "positions", "quotients"), "0"
+    )
+    assert int(found["gauss"][0]) == 2**29
+    assert 0.98 * GAUSS_ERROR < float(found["gauss"][2]) * 2.0**-31 <= GAUSS_ERROR
+
+
+def test_float32_gaussian_over_every_seventh_argument(tmp_path: Path) -> None:
+    """`make prove` takes every one."""
+    visited, wrong, worst = _run("primitives_f32", tmp_path, "7")["gauss"]
+    assert int(visited) > 1.6e8 and wrong == "0"
+    assert float(worst) <= F32_GAUSS_ERROR
+
+
+@pytest.mark.parametrize(
+    ("program", "file", "pattern", "replacement"),
+    [
+        ("primitives_q31", "gtc_num_q31.h", "0x40B268E3UL", "0x40B268E4UL"),
+        ("primitives_q31", "gtc_num_q31.h", r"#define Q31_C 979U", "#define Q31_C 978U"),
+        ("primitives_f32", "gtc_num_f32.h", "0x3F0164D2UL", "0x3F0164D3UL"),
+        ("primitives_f32", "gtc_num_f32.h", r"F32_P1 0x1\.62e36cp", "F32_P1 0x1.62e36ep"),
+    ],
+)
+def test_one_wrong_bit_is_seen(
+    program: str, file: str, pattern: str, replacement: str, tmp_path: Path
+) -> None:
+    libc = Path(shutil.copytree(ROOT / "libc", tmp_path / "libc"))
+    spoil(libc / file, pattern, replacement)
+    found = _run(program, tmp_path, *(["64"] if program.endswith("f32") else []), libc=libc)
+    assert int(found["gauss"][1]) > 0
+
+
+def test_the_formulas_share_no_text_with_the_runtime() -> None:
+    """Only the name of the function under test and the limits of its argument come from libc/."""
+    for name in ("primitives_q31", "primitives_f32"):
+        text = (ROOT / "tests" / "prove" / f"{name}.c").read_text()
+        assert not re.search(r"exp2_table|F32_P[12]|Q31_[BC]\b", text)
