@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dataset import Dataset, RunFacts
+from .dataset import Dataset, RunFacts, earth_rate_warning
 from .model import Model
 
 __all__ = ["earth_rate_findings", "findings_of", "jump_findings", "temperature_findings"]
 
 Finding = dict[str, Any]
 
-_EARTH_RATE_DPH = 15.05  # largest component of Earth's rate, rounded up
 _LEAST_SPAN_C = 2.0
 _UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
 _UNSEEN_TO_FLOOR = 3.0
@@ -90,16 +89,12 @@ def jump_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
 
 def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator[Finding]:
     """A mean rate that could be Earth's rate, and no word whether that is still in the data."""
-    if dataset.earth_rate is not None or not facts:
+    if not facts:
         return
     mean = float(np.average([f.mean_dph for f in facts], weights=[f.rows for f in facts]))
-    if abs(mean) <= _EARTH_RATE_DPH:
-        yield _finding(
-            "earth_rate_not_stated",
-            f"The mean rate is {mean:.4g} deg/h, Earth's rate is up to 15.04 deg/h, and the data set does not "
-            "state earth_rate: the model may take Earth's rate for bias.",
-            mean_dph=mean,
-        )
+    warning = earth_rate_warning(dataset.earth_rate, mean)
+    if warning:
+        yield _finding("earth_rate_not_stated", warning, mean_dph=mean)
 
 
 def _unseen(result: Mapping[str, Any], training: Mapping[str, Any] | None) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import __version__
-from .dataset import Dataset, Run
+from .dataset import Dataset, Run, earth_rate_warning
 from .errors import InputError
 from .frontend import Blocks, run_blocks
 from .metrics import Averages, pooled
@@ -201,8 +201,10 @@ def model_of(
     if started and "calibrated_on" not in meta:
         meta["calibrated_on"] = max(started).date().isoformat()
     meta["environments"] = sorted({run.environment for run in runs if run.environment})
-    if dataset.warnings:
-        meta["warnings"] = list(dataset.warnings)
+    meta["earth_rate"] = _earth_rate(dataset)
+    mean = float(np.average(data.bias_dph, weights=data.weight))
+    warnings = [*dataset.warnings, earth_rate_warning(dataset.earth_rate, mean)]
+    meta["warnings"] = [warning for warning in warnings if warning]
     return Model.from_dict(
         {
             "schema": "gyrotc.model/1",
@@ -246,6 +248,18 @@ def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, 
 
 def _on_grid(z: float) -> float:
     return round(z * _CENTER_GRID) / _CENTER_GRID
+
+
+def _earth_rate(dataset: Dataset) -> str:
+    """What was done about Earth's rate, in words; computed terms with their standard uncertainties."""
+    terms = {
+        f"{run.earth.rate_dph:.4f} +- {run.earth.sigma_dph:.4f}"
+        for run in dataset.runs
+        if run.earth is not None
+    }
+    if terms:
+        return f"computed and taken off: {', '.join(sorted(terms))} deg/h (1 sigma)"
+    return dataset.earth_rate or "not stated"
 
 
 def _data_file(run: Run) -> dict[str, Any]:

@@ -53,3 +53,28 @@ def test_nothing_can_be_learnt_from_a_constant_temperature(tmp_path: Path, gyrot
         assert (network["centers"], network["linear"]) == ([], [0.0, 0.0])
         mean = result["evaluate"]["train"]["before"]["mean_dph"]
         assert network["w0"] == pytest.approx(mean, abs=10.0)
+
+
+def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Command) -> None:
+    """A thousandth of every rate in a folder of another name: the same findings, and now a mean like Earth's rate."""
+    name = SETS[0]
+    if name in ABSENT:
+        pytest.skip(SKIPPED)
+    rows = (REAL / name / "data.csv").read_text().splitlines()
+    scaled = [
+        ",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) / 1000.0!r}"]) for line in rows[1:]
+    ]
+    folder = tmp_path / SETS[1]
+    folder.mkdir()
+    (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")
+    assert gyrotc("build", folder, "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    result = {"evaluate": json.loads((tmp_path / "out" / "evaluate.json").read_text())}
+    assert {"fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated"} <= found(result)
+    assert "no_temperature_information" not in found(result)
+
+
+def test_simulated_data_under_a_real_name_have_no_findings(tmp_path: Path, gyrotc: Command) -> None:
+    folder = tmp_path / SETS[1]
+    assert gyrotc("simulate", "paper", "--seed", 5, "--out", folder).returncode == 0
+    assert gyrotc("build", folder, "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    assert found({"evaluate": json.loads((tmp_path / "out" / "evaluate.json").read_text())}) == set()

@@ -114,3 +114,23 @@ def test_the_model_does_not_depend_on_the_form_of_a_recording(tmp_path: Path, gy
         models.append(model)
     assert all(model == models[0] for model in models)
     assert np.isfinite(models[0]["networks"][0]["w0"])
+
+
+def test_earth_rate_that_is_not_stated_warns_in_model_and_header(tmp_path: Path, gyrotc: Command) -> None:
+    table = columns() | {"rate_dph": columns()["rate_dph"] - 20.0}
+    write_csv(tmp_path / "RLG-1" / "a.csv", table)
+    assert gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "out").returncode == 0
+    meta = json.loads((tmp_path / "out" / "model.json").read_text())["meta"]
+    assert meta["earth_rate"] == "not stated"
+    assert "Earth's rate" in meta["warnings"][0]
+    done = gyrotc("emit", tmp_path / "out" / "model.json", "--out", tmp_path / "out", "--numeric", "f32")
+    assert done.returncode == 0, done.stderr
+    assert "Earth's rate" in next((tmp_path / "out" / "c").glob("gtc_rlg*.h")).read_text()
+
+
+def test_a_computed_earth_rate_is_said_with_its_uncertainty(tmp_path: Path, gyrotc: Command) -> None:
+    ACCEPTED["computed earth rate"](tmp_path / "RLG-1")
+    assert gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "out").returncode == 0
+    meta = json.loads((tmp_path / "out" / "model.json").read_text())["meta"]
+    assert meta["earth_rate"] == "computed and taken off: 0.0000 +- 0.0263 deg/h (1 sigma)"
+    assert meta["warnings"] == []

@@ -4,6 +4,7 @@
 after a problem and tells all of them. What a folder may hold is written in docs/recordings.md.
 """
 
+from .earth import earth_rate_warning
 from .facts import Jump, RunFacts, facts_of
 from .load import axes_of, load, survey
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run
@@ -19,6 +20,7 @@ __all__ = [
     "Run",
     "RunFacts",
     "axes_of",
+    "earth_rate_warning",
     "facts_of",
     "load",
     "survey",

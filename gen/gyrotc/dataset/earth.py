@@ -6,9 +6,21 @@ from math import cos, hypot, radians, sin
 
 from .records import EarthRate
 
-__all__ = ["EARTH_RATE_DPH", "earth_rate"]
+__all__ = ["EARTH_RATE_DPH", "earth_rate", "earth_rate_warning"]
 
 EARTH_RATE_DPH = 15.04106717866910  # 7.2921150e-5 rad/s (WGS 84), deg/h
+
+_LARGEST_DPH = 15.05  # of a component of Earth's rate, rounded up
+
+
+def earth_rate_warning(stated: str | None, mean_dph: float) -> str:
+    """What to say of a mean rate that could be Earth's where nothing is stated; empty where all is well."""
+    if stated is not None or abs(mean_dph) > _LARGEST_DPH:
+        return ""
+    return (
+        f"The mean rate is {mean_dph:.4g} deg/h, Earth's rate is up to 15.04 deg/h, and the data set does not "
+        "state earth_rate: the model may take Earth's rate for bias."
+    )
 
 
 def earth_rate(
