@@ -402,6 +402,45 @@ def compare(
 
 
 @app.command()
+def diagnose(
+    dataset: DatasetArg,
+    model: Annotated[Path | None, typer.Option("--model", help="A model.json made before.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
+    ] = None,
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """What the simulation gets wrong about recordings, the named cause, the extended model, the measured gain.
+
+    Example: gyrotc diagnose recordings --out diagnosis
+    """
+    from .applied import applied_of
+    from .dataset import load
+    from .diagnose import diagnose as run
+    from .fitting import FitOptions
+    from .model import load_model
+
+    known = load_model(model) if model else None
+    options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+    with _progress() as say:
+        result = run(recordings, model=known, out=out, options=options, progress=say).result
+    if out is not None:
+        write_atomically(out / "diagnose.json", json_text(result))
+    _write_json(json_file, result)
+    for line in diagnosis_lines(result):
+        _OUT.print(line, highlight=False, soft_wrap=True, markup=False)
+
+
+@app.command()
 def report(folder: DirArg) -> None:
     """Write DIR/report.html from DIR/*.json and DIR/trace/*.csv.
 
@@ -477,6 +516,46 @@ def comparison_tables(result: dict[str, Any]) -> Iterator[RichTable]:
             str(m["centers"]), str(m["table_bytes"]), f"{m['train_s']:.3f}",
         )  # fmt: skip
     yield cost
+
+
+def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
+    """The verdict in words: causes with their size and gain, rivals, and what could still hide."""
+    yield f"{result['serial']}: {result['verdict'].replace('_', ' ')}"
+    yield from result.get("missing", ())
+    for d in result["discrepancies"]:
+        if d["p_value"] is not None and d["p_value"] < 0.01:
+            yield (
+                f"  {d['statistic'].replace('_', ' ')}: measured {d['measured']:.4g}, "
+                f"simulated {d['simulated_low']:.4g} ... {d['simulated_high']:.4g}"
+            )
+    for cause in result["causes"]:
+        yield from _cause_lines(cause)
+    if result["causes"] and result["extended"] is None:
+        yield "no extension is shipped: none has a gain on runs it was not fitted to"
+    limits = [c for c in result["considered"] if c.get("detection_limit")]
+    if limits and not result["causes"]:
+        yield "what could still hide below its detection limit:"
+        for c in limits:
+            yield f"  {c['id']}: {c['detection_limit']['value']:.3g} {c['detection_limit']['unit']}"
+
+
+def _cause_lines(cause: dict[str, Any]) -> Iterator[str]:
+    yield f"cause: {cause['name']} ({cause['id']}, family {cause['family']})"
+    for name, p in cause["parameters"].items():
+        interval = "" if p.get("low") is None else f", 95 % {p['low']:.4g} ... {p['high']:.4g}"
+        yield f"  {name} = {p['value']:.4g}{interval}"
+    if cause["equivalent"]:
+        yield f"  as likely on these runs: {', '.join(cause['equivalent'])}"
+    if cause.get("separate_by"):
+        yield f"  to tell them apart: {cause['separate_by']}"
+    gain = cause.get("gain")
+    if gain and gain.get("exam_rms_after_dph") is not None:
+        share = gain.get("share_of_excess_removed")
+        removed = "" if share is None else f", {share:.0%} of the removable excess"
+        yield (
+            f"  RMS on runs not fitted to: {gain['exam_rms_before_dph']:.4g} -> "
+            f"{gain['exam_rms_after_dph']:.4g} deg/h{removed}"
+        )
 
 
 def verify_table(result: dict[str, Any]) -> RichTable:
