@@ -175,7 +175,7 @@ def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Index]:
 
 def _total(gains: Gains, current: Search, out: Index) -> float:
     """Energy that the causes explain beyond the map, at the likeliest colour, over the noise."""
-    view = current.views[gains.search.best]
+    view = current.views[current.best]
     before = current.project(view, np.arange(current.n_map))
     after = current.project(view, out)
     return max((before.rest - after.rest) / view.scale**2, 0.0)

@@ -21,7 +21,7 @@ __all__ = ["Discrepancy", "Ensemble", "compare"]
 
 Array = NDArray[np.float64]
 
-_MEMBERS = 999
+_MEMBERS = 499
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
 _SLOW_S = 1800.0
 
@@ -59,7 +59,7 @@ def compare(search: Search, declared: Declared | None, seed: int = 1) -> Ensembl
     if declared is not None:
         colour, scale = declared.colour(records.block_s), 1.0
     else:
-        colour, scale = COLOURS[0], search.views[0].scale
+        colour, scale = COLOURS[0], search.view_of(COLOURS[0]).scale
     whiten = Whitener(colour, records.kept, records.block_s, search.sigma)
     normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)
@@ -123,7 +123,8 @@ def _statistics(search: Search) -> dict[str, Callable[[Array], Array]]:
         return np.asarray(np.mean(parts, axis=0))
 
     def outlying(e: Array) -> Array:
-        return np.asarray((e**4).mean(axis=0) / (e**2).mean(axis=0) ** 2)
+        square = e * e
+        return np.asarray((square * square).mean(axis=0) / square.mean(axis=0) ** 2)
 
     out: dict[str, Callable[[Array], Array]] = {
         "residual_rms_dph": rms,

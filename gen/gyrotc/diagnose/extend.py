@@ -90,6 +90,7 @@ class _Bench:
         self.train = play_runs(dataset, self.runs, self.front)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
         self.average_s = options.average_s
+        self._fits: list[tuple[list[Effect], Fit]] = []
         self.arguments: dict[str, Any] = {
             "method": options.method,
             "seed": options.seed,
@@ -97,6 +98,17 @@ class _Bench:
             "rho": options.rho,
             "average_s": options.average_s,
         }
+
+    def fit(self, effects: Sequence[Effect], kept: list[Mask] | None = None) -> Fit:
+        """The map beside the effects; fits on all training samples are remembered."""
+        whole = kept is None or all(m.all() for m in kept)
+        for known, fitted in self._fits:
+            if whole and known == list(effects):
+                return fitted
+        fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept)
+        if whole:
+            self._fits.append((list(effects), fitted))
+        return fitted
 
     def everything(self) -> list[Mask]:
         return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
@@ -116,7 +128,7 @@ class _Bench:
     def _residuals(
         self, kept: list[Mask], runs: list[Played], scored: list[Mask], effects: Sequence[Effect]
     ) -> list[Averages]:
-        fitted = fit_extended(self.train, effects, self.arguments, kept)
+        fitted = self.fit(effects, kept)
         return score(fitted, runs, effects, self.average_s, scored)
 
     def _chosen(self, held: list[Mask], count: int) -> tuple[Refined, ...]:
@@ -144,7 +156,7 @@ def extend(
     floor = floor_of(chain[-1])
     steps = [gain_of(a, b, floor, options.average_s) for a, b in zip(chain[:-1], chain[1:], strict=True)]
     shipped, total = _shipped(bench, effects, steps, chain, floor)
-    extended = fit_extended(bench.train, shipped, bench.arguments) if shipped else None
+    extended = bench.fit(shipped) if shipped else None
     return Extension(
         steps=tuple(steps),
         total=total,
@@ -155,7 +167,7 @@ def extend(
         samples=joined([samples(run, shipped) for run in bench.train]),
         floor=floor,
         baseline_rms=_rms(chain[0]),
-        baseline_centers=fit_extended(bench.train, [], bench.arguments).n_centers,
+        baseline_centers=bench.fit([]).n_centers,
         measured_on="exam" if bench.exam else "left out",
         before=chain[0],
         after=chain[-1],
@@ -195,8 +207,7 @@ def _crossed(bench: _Bench, count: int) -> Chain:
 def score_self(bench: _Bench, count: int) -> list[Averages]:
     """Where nothing can be left out (one very short run): the training samples themselves, without gain."""
     del count
-    fitted = fit_extended(bench.train, [], bench.arguments)
-    return score(fitted, bench.train, [], bench.average_s, bench.everything())
+    return score(bench.fit([]), bench.train, [], bench.average_s, bench.everything())
 
 
 def _folds(bench: _Bench) -> list[list[Mask]]:

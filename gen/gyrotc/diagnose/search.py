@@ -5,6 +5,7 @@ Everything that is asked of the data afterwards is algebra on these inner produc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,7 @@ class Search:
         extras: Further candidate columns, shape (N, e), and their candidates.
         nuisance: Columns that are in every model beside the map (blocks left out, causes taken), shape (N, d).
         sigma: Factor of the noise of every block, shape (N,); None: even.
+        colours: Numbers of the colours that are looked at; None: all.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Search:
         extras: tuple[Array, list[Candidate]] | None = None,
         nuisance: Array | None = None,
         sigma: Array | None = None,
+        colours: Sequence[int] | None = None,
     ) -> None:
         self.records, self.bank, self.sigma = records, bank, sigma
         self._given = extras
@@ -92,15 +95,19 @@ class Search:
         self.base = np.concatenate([self.base, m + k + added.shape[1] + len(moved) + np.arange(dropped.shape[1])])
         self.extra_candidates = [*names, *bank.inputs]
         self._index()
-        self.views = [self._view(c, g, d) for c, g, d in zip(COLOURS, bank.grams, bank.log_dets, strict=True)]
-        likelihood = np.array([v.log_likelihood for v in self.views])
-        self.best = int(likelihood.argmax())
-        self.allowed = [int(k) for k in np.flatnonzero(2 * (likelihood.max() - likelihood) <= _SET_95)]
+        numbers = range(len(COLOURS)) if colours is None else colours
+        self.views = {k: self._view(COLOURS[k], bank.grams[k], float(bank.log_dets[k])) for k in numbers}
+        top = max(v.log_likelihood for v in self.views.values())
+        self.best = next(k for k, v in self.views.items() if v.log_likelihood == top)
+        self.allowed = [k for k, v in self.views.items() if 2.0 * (top - v.log_likelihood) <= _SET_95]
 
     def extended(self, columns: Array) -> Search:
-        """The same search with further columns in every model; `base` lists them after the map."""
+        """The same search with further columns in every model; `base` lists them after the map.
+
+        Only the colours that the data allow are looked at again.
+        """
         held = columns if self._nuisance is None else np.column_stack([self._nuisance, columns])
-        return Search(self.records, self.bank, self.y, self._given, held, self.sigma)
+        return Search(self.records, self.bank, self.y, self._given, held, self.sigma, self.allowed)
 
     def baseline_weights(self, y: Array) -> Array:
         """Least-squares weights of the map."""
