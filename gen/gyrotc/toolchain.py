@@ -7,6 +7,7 @@ library that the test programs use. Their standard input is the file `stdin.bin`
 from __future__ import annotations
 
 import functools
+import re
 import shutil
 import subprocess
 import sys
@@ -50,6 +51,7 @@ _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
 _RUN_LIMIT_S = 600
 _SHOWN_LINES = 12
+_SYMBOL = re.compile(r"[0-9A-Fa-f]+ (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
 
 class Target(BaseModel):
@@ -185,30 +187,38 @@ def run_program(target: Target, program: Path, data: bytes = b"") -> Run:
     return Run(done.returncode, done.stdout, done.stderr.decode("utf-8", "replace"))
 
 
-def symbols(target: Target, file: Path) -> list[Symbol]:
-    """Symbols with a size, of an object or a program."""
-    rows = [line.split() for line in _inspected(target, "nm", "-S", file)]
-    return [Symbol(row[3], row[2], int(row[1], 16)) for row in rows if len(row) == 4]
+def symbols(target: Target, *files: Path) -> list[Symbol]:
+    """Symbols with a size, of objects or programs."""
+    rows = [_SYMBOL.fullmatch(line) for line in _inspected(target, "nm", "-S", files)]
+    return [Symbol(row["name"], row["kind"], int(row["size"], 16)) for row in rows if row]
 
 
-def writable_bytes(target: Target, file: Path) -> int:
-    """Bytes of writable static data in an object (what is constant once it is relocated does not count)."""
-    rows = [line.split() for line in _inspected(target, "size", "-A", file)]
-    sizes = {row[0]: int(row[1]) for row in rows if len(row) == 3 and row[1].isdigit()}
+def writable_bytes(target: Target, *files: Path) -> int:
+    """Bytes of writable static data in objects (what is constant once it is relocated does not count)."""
+    rows = [line.split() for line in _inspected(target, "size", "-A", files)]
+    sizes = [(row[0], int(row[1])) for row in rows if len(row) == 3 and row[1].isdigit()]
     writable = (".data", ".bss", ".sdata", ".sbss", "COMMON")
-    return sum(n for name, n in sizes.items() if name.startswith(writable) and ".rel.ro" not in name)
+    return sum(n for name, n in sizes if name.startswith(writable) and ".rel.ro" not in name)
 
 
-def _inspected(target: Target, tool: str, option: str, file: Path) -> list[str]:
+def _inspected(target: Target, tool: str, option: str, files: Sequence[Path]) -> list[str]:
     """Lines that a tool of the toolchain (nm, size) prints."""
-    asked = [target.compiler, f"-print-prog-name={tool}"]
-    name = subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or tool
-    done = subprocess.run([name, option, str(file)], capture_output=True, text=True, check=False)
+    name = _tool(target.compiler, tool)
+    command = [name, option, *(str(f) for f in files)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise CheckFailed(f"{target.name}: {name} failed: {done.stderr[:200]}")
     return done.stdout.splitlines()
 
 
+@functools.cache
+def _tool(compiler: str, tool: str) -> str:
+    """Path of the nm or size that belongs to a compiler."""
+    asked = [compiler, f"-print-prog-name={tool}"]
+    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or tool
+
+
+@functools.cache
 def compiler_version(compiler: str) -> str:
     """Name and version in one short text, e.g. ``gcc 12.2.0``."""
     for option in ("-dumpfullversion", "-dumpversion"):

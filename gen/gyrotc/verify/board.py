@@ -130,10 +130,9 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
 
 def _sizes(target: Target, program: Path, objects: list[Path]) -> dict[str, int]:
     """Code of the runtime that the program links, and writable static data of runtime and table."""
-    own = [symbol for file in objects for symbol in symbols(target, file)]
-    code = {symbol.name for symbol in own if symbol.kind in _CODE}
+    code = {symbol.name for symbol in symbols(target, *objects) if symbol.kind in _CODE}
     linked = [symbol for symbol in symbols(target, program) if symbol.name in code]
     return {
         "code_bytes": sum(symbol.size for symbol in linked),
-        "ram_bytes": sum(writable_bytes(target, file) for file in objects),
+        "ram_bytes": writable_bytes(target, *objects),
     }
