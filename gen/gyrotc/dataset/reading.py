@@ -108,7 +108,8 @@ def open_recording(
         return None
     if len(problems) > before:
         return None
-    return Recording(file, layout, time, len(time), float(np.median(np.diff(time))))
+    period = float(np.median(np.diff(time), overwrite_input=True))
+    return Recording(file, layout, time, len(time), period)
 
 
 def open_file(name: str, path: Path) -> Source:
