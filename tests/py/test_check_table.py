@@ -1,0 +1,169 @@
+"""tools/check_table.py: agrees with what is emitted, and sees every seeded fault of quantisation.
+
+The faulty tables are emitted whole (checksums, known answers, images follow the fault), so that nothing
+but the model can tell.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from emitted import GOLDEN, emitted, flip
+from gyrotc.emit import Emission, emit, emit_texts, quantise_all, replace_folder
+from gyrotc.model import Model, load_model
+from gyrotc.table import Table
+from models import random_model
+
+SCRIPT = ROOT / "tools" / "check_table.py"
+
+
+def _check(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Alone: without site packages, so that nothing of gyrotc can be imported."""
+    command = [sys.executable, "-I", "-S", str(SCRIPT), str(folder)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_it_imports_the_standard_library_only() -> None:
+    tree = ast.parse(SCRIPT.read_text())
+    names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
+    names |= {str(n.module) for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+    assert {name.split(".")[0] for name in names} <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2, 3, 6, 7, 64])
+def test_emitted_tables_are_the_model(seed: int | None, tmp_path: Path) -> None:
+    emitted(tmp_path, None if seed is None else random_model(seed))
+    done = _check(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_table_shifted_by_zero_at_is_the_model(tmp_path: Path) -> None:
+    model = load_model(GOLDEN)
+    emit(model, tmp_path, zero_at=21.0625)
+    model.save(tmp_path / "model.json")
+    done = _check(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def _words(table: Table, name: str) -> np.ndarray:
+    return np.array(getattr(table, name)).copy()
+
+
+def _record(column: int, change: Callable[[int], int]) -> Callable[[Table], Table]:
+    """Changes one word of the weightiest center."""
+
+    def fault(table: Table) -> Table:
+        words = _words(table, "centers").reshape(-1, 5)
+        k = int(np.argmax(np.abs(table.numbers(table.centers).reshape(-1, 5)[:, 4].astype(float))))
+        words[k, column] = change(int(words[k, column])) & 0xFFFFFFFF
+        return replace(table, centers=words.reshape(-1))
+
+    return fault
+
+
+def _head(column: int) -> Callable[[Table], Table]:
+    """Changes the sign of w0 or of a linear part."""
+
+    def fault(table: Table) -> Table:
+        words = _words(table, "networks")
+        word = int(words[column])
+        words[column] = (word ^ 0x80000000) if table.numeric == "f32" else (-word & 0xFFFFFFFF)
+        return replace(table, networks=words)
+
+    return fault
+
+
+def _first_center_dropped(table: Table) -> Table:
+    """The fault of a loop that starts at one: the record is there, its weight is not."""
+    words = _words(table, "centers").reshape(-1, 5)
+    k = int(np.argmax(np.abs(table.numbers(table.centers).reshape(-1, 5)[:, 4].astype(float))))
+    words[k, 4] = 0
+    return replace(table, centers=words.reshape(-1))
+
+
+def _inputs_swapped(table: Table) -> Table:
+    return replace(table, centers=_words(table, "centers").reshape(-1, 5)[:, [2, 3, 0, 1, 4]].reshape(-1))
+
+
+def _coverage_inverted(table: Table) -> Table:
+    return replace(table, coverage=_words(table, "coverage") ^ np.uint32(1))
+
+
+def _slope_per_minute(table: Table) -> Table:
+    factor = round(60.0 / table.block_s)
+    if table.numeric == "f32":
+        value = np.uint32(table.max_slope).view(np.float32) * np.float32(factor)
+        return replace(table, max_slope=int(value.view(np.uint32)))
+    return replace(table, max_slope=table.max_slope * factor)
+
+
+FAULTS: dict[str, Callable[[Table], Table]] = {
+    # A record is center, gain of each input in float32, gain and offset in fixed point.
+    "second number of T off by 2^17 units": _record(1, lambda w: w + (1 << 17)),
+    "second number of the slope off by 2^23 units": _record(3, lambda w: w - (1 << 23)),
+    "first number of T off by 1/64": _record(0, lambda w: w + (w >> 6) + 1000),
+    "weight in its 20th bit": _record(4, lambda w: w ^ (1 << 19)),
+    "weight of the other sign": _record(4, lambda w: -w if w >= 2**31 else w ^ 0x80000000),
+    "w0 of the other sign": _head(1),
+    "linear in T of the other sign": _head(2),
+    "linear in the slope of the other sign": _head(3),
+    "a Gaussian lost": _first_center_dropped,
+    "T and slope swapped": _inputs_swapped,
+    "one bit of the coverage": _coverage_inverted,
+    "limit of the slope per minute": _slope_per_minute,
+    "hold_blocks off by one": lambda t: replace(t, hold_blocks=t.hold_blocks + 1),
+    "slope_blocks off by one": lambda t: replace(t, slope_blocks=t.slope_blocks + 1),
+    "fallback": lambda t: replace(t, fallback=(t.fallback ^ (1 << 20))),
+    "id": lambda t: replace(t, id=t.id ^ 1),
+    "envelope": lambda t: replace(t, envelope=(t.envelope[0], t.envelope[1] - (1 << 12), *t.envelope[2:])),
+}
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_model(GOLDEN)
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+@pytest.mark.parametrize("name", FAULTS)
+def test_seeded_fault_of_quantisation_is_seen(name: str, numeric: str, model: Model, tmp_path: Path) -> None:
+    table = quantise_all(model, [numeric]).tables[numeric]
+    emission = Emission({numeric: FAULTS[name](table)}, {})
+    replace_folder(tmp_path / "c", emit_texts(model, emission, asked=True))
+    model.save(tmp_path / "model.json")
+    done = _check(tmp_path)
+    assert done.returncode == 1, (name, done.stdout, done.stderr)
+
+
+def test_one_flipped_bit_of_source_image_hex_or_answers_is_seen(tmp_path: Path) -> None:
+    for file, pattern, bit in (
+        ("gtc_rlg_0042.c", r"\.crc = 0x([0-9a-f]{8})", 3),
+        ("gtc_rlg_0042.c", r"q31_centers\[50\] = \{\s+B\(0x([0-9a-f]{8})", 0),
+        ("vectors_rlg_0042.txt", r"\n00000004 ([0-9a-f]{8})\n", 28),
+        ("gtc_rlg_0042.h", r"sha256 ([0-9a-f]{8})", 3),
+    ):
+        folder = emitted(tmp_path / f"{file}{bit}")
+        flip(folder / "c" / file, pattern, bit)
+        done = _check(folder)
+        assert done.returncode == 1, (file, done.stdout, done.stderr)
+    folder = emitted(tmp_path / "image")
+    path = folder / "c" / "gtc_rlg_0042.bin"
+    data = bytearray(path.read_bytes())
+    data[200] ^= 1
+    path.write_bytes(data)
+    assert _check(folder).returncode == 1
+
+
+def test_what_cannot_be_read_exits_2(tmp_path: Path) -> None:
+    assert _check(tmp_path).returncode == 2
+    folder = emitted(tmp_path / "x")
+    (folder / "c" / "gtc_rlg_0042.bin").write_bytes(b"\x31CTG" * 50)
+    assert _check(folder).returncode == 2

@@ -1,0 +1,386 @@
+#!/usr/bin/env python3
+"""Checks emitted tables against model.json without a line of gyrotc: standard library only.
+
+    tools/check_table.py DIR        DIR holds model.json and c/, as `gyrotc emit` or `gyrotc build` leave them
+
+Reads the tables from the C source and from the image, computes the equation of docs/FORMAT.md with the words
+of the table and with the numbers of the model, and compares the two within the bound that the emitted header
+prints. The emitted known answers are judged by the model, too.
+Exit status: 0 all agrees, 1 something differs (each is printed), 2 a file cannot be read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import random
+import re
+import struct
+import sys
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+MAGIC = 0x47544331
+ARITHMETIC = {1: "f32", 2: "q31"}
+HEAD = [
+    "quantity", "unit", "id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits", "max_step",
+    "max_slope", "fallback", "scale:3", "envelope:4", "n_networks", "n_centers", "n_channels", "n_terms",
+    "coverage_cells:2", "sigma_cells:2", "n_probes",
+]  # fmt: skip
+NUMBERS = {"max_step", "max_slope", "fallback", "scale", "envelope"}
+CLAMPED, UNCOVERED = 2, 4
+
+
+class Unreadable(Exception):
+    """A file is missing or not of the form that docs/FORMAT.md gives."""
+
+
+def as_float(word: int) -> float:
+    return float(struct.unpack("<f", struct.pack("<I", word))[0])
+
+
+def as_integer(word: int) -> int:
+    return word - 2**32 if word >= 2**31 else word
+
+
+def nearest_float(x: float) -> float:
+    return float(struct.unpack("<f", struct.pack("<f", x))[0])
+
+
+class Model:
+    """The equation of model.json in float64."""
+
+    def __init__(self, path: Path) -> None:
+        self.raw = json.loads(path.read_text(encoding="utf-8"))
+        canonical = json.dumps(self.raw, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+        self.hash = hashlib.sha256(canonical.encode("ascii")).hexdigest()
+        if len(self.raw["networks"]) != 1 or self.raw["terms"]:
+            raise Unreadable("model banks and extension terms are not covered by this check")
+        self.network = self.raw["networks"][0]
+        self.per_block = self.raw["block_s"] / 60.0
+        self.t_range = self.raw["envelope"]["temperature_c"]
+        self.r_range = self.raw["envelope"]["slope_c_per_min"]
+        self.shift = 0.0  # of --zero-at
+
+    def id(self) -> str:
+        serial, axis = self.raw["serial"], self.raw["axis"] or ""
+        plain = re.sub(r"[^a-z0-9]", "_", serial.lower()) + (f"_{axis}" if axis else "")
+        if re.fullmatch(r"[A-Za-z0-9_-]+", serial) and len(plain) <= 31 - len("gtc_") - len("_f32"):
+            return plain
+        return f"{plain[:18]}_{hashlib.sha256((serial + axis).encode('ascii')).hexdigest()[:8]}"
+
+    def bias(self, temperature: float, slope_per_block: float) -> float:
+        t = min(max(temperature, self.t_range[0]), self.t_range[1])
+        r = min(max(slope_per_block / self.per_block, self.r_range[0]), self.r_range[1])
+        center, half = self.raw["scale"]["temperature_c"]
+        half_r = self.raw["scale"]["slope_c_per_min"]
+        z = ((t - center) / half, r / half_r)
+        n = self.network
+        total = [n["w0"] - self.shift, n["linear"][0] * z[0], n["linear"][1] * z[1]]
+        for (c_t, c_r), widths, weight in zip(n["centers"], n["widths"], n["weights"], strict=True):
+            c = ((c_t - center) / half, c_r / half_r)
+            u = sum(((z[k] - c[k]) / widths[k]) ** 2 for k in (0, 1) if widths[k] is not None)
+            total.append(weight * math.exp(-u))
+        return math.fsum(total)
+
+
+class Image:
+    """A table: its words, and the equation that they stand for, in float64."""
+
+    def __init__(self, words: list[int], where: str) -> None:
+        if len(words) < 30 or words[0] != MAGIC or words[2] != len(words) or words[1] & 0xFFFF != 1:
+            raise Unreadable(f"{where}: not an image of layout 1")
+        self.where, self.words = where, words
+        self.numeric = ARITHMETIC[words[1] >> 16]
+        rest = iter(words[3:-1])
+        self.member: dict[str, list[Any]] = {}
+        for entry in HEAD:
+            name, _, n = entry.partition(":")
+            group = [next(rest) for _ in range(int(n or 1))]
+            self.member[name] = [self.number(w) for w in group] if name in NUMBERS else group
+        cells, sigma = self.member["coverage_cells"], self.member["sigma_cells"]
+        sizes = {"networks": 8 * self.one("n_networks"), "centers": 5 * self.one("n_centers"),
+                 "terms": 8 * self.one("n_terms"), "coverage": (cells[0] * cells[1] + 31) // 32,
+                 "sigma": sigma[0] * sigma[1], "probes": 4 * self.one("n_probes")}  # fmt: skip
+        self.array = {name: [next(rest) for _ in range(n)] for name, n in sizes.items()}
+        if next(rest, None) is not None:
+            raise Unreadable(f"{where}: more words than its counts say")
+
+    def one(self, name: str) -> int:
+        return int(self.member[name][0])
+
+    def number(self, word: int) -> float:
+        return as_float(word) if self.numeric == "f32" else as_integer(word)
+
+    def crc(self) -> int:
+        return zlib.crc32(struct.pack(f"<{len(self.words) - 2}I", *self.words[1:-1]))
+
+    def to_dph(self, number: float) -> float:
+        return number if self.numeric == "f32" else number * 2.0 ** -self.one("bias_frac_bits")
+
+    def input(self, value: float) -> float:
+        """An input (C or C per block) as the arithmetic takes it, in C."""
+        return nearest_float(value) if self.numeric == "f32" else round(value * 65536.0) / 65536.0
+
+    def bias(self, temperature: float, slope: float) -> float:
+        """The equation of docs/numerics.md with the table's words, without the target's rounding."""
+        e = self.member["envelope"]
+        network = [self.number(w) for w in self.array["networks"]]
+        records = [self.number(w) for w in self.array["centers"]]
+        centers = [records[k : k + 5] for k in range(0, len(records), 5)]
+        if self.numeric == "f32":
+            t, r = min(max(temperature, e[0]), e[1]), min(max(slope, e[2]), e[3])
+            s = self.member["scale"]
+            z = ((t - s[0]) * s[1], r * s[2])
+            total = [network[1], network[2] * z[0], network[3] * z[1]]
+            for c_t, g_t, c_r, g_r, weight in centers:
+                u = ((z[0] - c_t) * g_t) ** 2 + ((z[1] - c_r) * g_r) ** 2
+                total.append(weight * 2.0 ** (-u / 64.0) if u < 64 * 1000 else 0.0)
+            return math.fsum(total)
+        gain_t, gain_r, narrow = self.member["scale"]
+        t, r = (min(max(round(v * 65536.0), e[k]), e[k + 1]) for v, k in ((temperature, 0), (slope, 2)))
+        x = (((t - e[0]) * gain_t) >> 26, ((r - e[2]) * gain_r) >> 26)
+        total = [network[1], network[2] * x[0] / 65536.0, network[3] * x[1] / 65536.0]
+        for s_t, k_t, s_r, k_r, weight in centers:
+            u = ((s_t * x[0] + k_t) ** 2 + (s_r * x[1] + k_r) ** 2) / 2.0 ** (56 - narrow)
+            total.append(weight * 2.0**-u if u < 1000 else 0.0)
+        return self.to_dph(math.fsum(total))
+
+
+# ---- the files ----
+
+
+def images_of(folder: Path, name: str) -> list[Image]:
+    paths = [p for p in (folder / f"gtc_{name}.bin", folder / f"gtc_{name}_q31.bin") if p.is_file()]
+    if not paths:
+        raise Unreadable(f"{folder}: no image gtc_{name}.bin")
+    found = []
+    for path in paths:
+        data = path.read_bytes()
+        if len(data) % 4:
+            raise Unreadable(f"{path}: not whole words")
+        found.append(Image(list(struct.unpack(f"<{len(data) // 4}I", data)), path.name))
+    return found
+
+
+def hex_bytes(text: str) -> bytes:
+    data = bytearray()
+    for line in text.split():
+        record = bytes.fromhex(line[1:])
+        if line[0] != ":" or sum(record) & 255:
+            raise Unreadable(f"Intel HEX: bad record {line}")
+        if record[3] == 0:
+            data += record[4:-1]
+    return bytes(data)
+
+
+def constants(text: str) -> list[int]:
+    """Words of the constants in a piece of emitted C: V(float), B(integer), plain integers."""
+    words = []
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    text = text.replace("(-2147483647L - 1L)", "-2147483648L")
+    for value, bits, plain in re.findall(
+        r"V\(([^)]*)F\)|B\(([^)]*?)U?L?\)|(?<![\w.])(-?\d\w*?)U?L?(?![\w.])", text
+    ):
+        if value:
+            words.append(struct.unpack("<I", struct.pack("<f", float(value)))[0])
+        else:
+            words.append(int(bits or plain, 0) & 0xFFFFFFFF)
+    return words
+
+
+def source_words(text: str, numeric: str) -> list[int]:
+    """The image that a table in C source stands for."""
+    struct_text = re.search(rf"const gtc_{numeric}_table_t \w+ = \{{(.*?)\n\}};", text, re.S)
+    if struct_text is None:
+        raise Unreadable(f"no {numeric} table in the C source")
+    members = dict(re.findall(r"^\s*\.(\w+) = (.*?),?$", struct_text[1], re.M))
+    words = [word for entry in HEAD for word in constants(members[entry.partition(":")[0]])]
+    for name in ("networks", "centers", "terms", "coverage", "sigma", "probes"):
+        if members[name] != "NULL":
+            array = re.search(rf"gtc_word_t {members[name]}\[(\d+)\] = \{{(.*?)\n\}};", text, re.S)
+            if array is None or len(constants(array[2])) != int(array[1]):
+                raise Unreadable(f"array {members[name]} is not there, or not of its size")
+            words += constants(array[2])
+    layout = int(members["layout"]) + 65536 * {v: k for k, v in ARITHMETIC.items()}[numeric]
+    return [MAGIC, layout, len(words) + 4, *words, *constants(members["crc"])]
+
+
+# ---- the checks: each yields what is wrong ----
+
+
+def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
+    if image.crc() != image.words[-1]:
+        yield "the CRC-32 is not that of the words"
+    source = source_words((folder / f"gtc_{name}.c").read_text(encoding="ascii"), image.numeric)
+    if source != image.words:
+        wrong = [k for k, pair in enumerate(zip(source, image.words, strict=False)) if pair[0] != pair[1]]
+        yield f"the C source is not the image (words {wrong[:5]}, {len(source)} of {len(image.words)})"
+    if (
+        hex_bytes((folder / image.where).with_suffix(".hex").read_text())
+        != (folder / image.where).read_bytes()
+    ):
+        yield "the Intel HEX file is not the image"
+
+
+def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
+    raw, unit = model.raw, 1.0 if image.numeric == "f32" else 65536.0
+    result_unit = 1.0 if image.numeric == "f32" else 2.0 ** image.one("bias_frac_bits")
+    expected = {
+        "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))], "slope_blocks": [raw["slope_blocks"]],
+        "hold_blocks": [raw["hold_blocks"]], "stuck_samples": [raw["stuck_samples"]], "n_networks": [1],
+        "n_channels": [1], "n_terms": [0], "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
+        "sigma_cells": (raw["uncertainty_dph"] or {"cells": [0, 0]})["cells"],
+    }  # fmt: skip
+    for key, value in expected.items():
+        if image.member[key] != list(value):
+            yield f"{key} is {image.member[key]}, the model says {list(value)}"
+    numbers = {
+        "max_step": [raw["max_step_c"] * unit],
+        "max_slope": [raw["max_rate_c_per_min"] * model.per_block * unit],
+        "fallback": [(raw["fallback_dph"] - model.shift) * result_unit],
+        "envelope": [
+            *(t * unit for t in model.t_range),
+            *(r * model.per_block * unit for r in model.r_range),
+        ],
+    }
+    for key, value in numbers.items():
+        for got, want in zip(image.member[key], value, strict=True):
+            room = 0.5000001 if image.numeric == "q31" else abs(want) * 2.0**-24 * 1.000001
+            if abs(got - min(want, 2**31 - 1)) > room:
+                yield f"{key} is {got}, the model says {want}"
+    cells = "".join((raw["coverage"] or {"rows": []})["rows"])
+    bits = "".join(f"{word:032b}"[::-1] for word in image.array["coverage"])
+    if bits[: len(cells)] != cells or "1" in bits[len(cells) :]:
+        yield "the coverage bits are not the model's"
+    sigma = [s for row in (raw["uncertainty_dph"] or {"rows": []})["rows"] for s in row]
+    for got, want in zip(image.array["sigma"], sigma, strict=True):
+        if abs(image.to_dph(image.number(got)) - want) > max(
+            abs(want) * 2.0**-24, 0.51 / result_unit * (unit > 1)
+        ):
+            yield f"an uncertainty is {image.to_dph(image.number(got))}, the model says {want}"
+
+
+def places(model: Model) -> Iterator[tuple[float, float]]:
+    """A grid over the envelope and beyond its edges, every center, and random places (always the same ones)."""
+    t0, t1 = model.t_range
+    r0, r1 = (r * model.per_block for r in model.r_range)
+    for i in range(-1, 42):
+        for j in range(-1, 22):
+            yield t0 + (t1 - t0) * i / 40, r0 + (r1 - r0) * j / 20
+    for c_t, c_r in model.network["centers"]:
+        yield c_t, c_r * model.per_block
+    draw = random.Random(20140801)
+    for _ in range(4000):
+        yield draw.uniform(t0, t1), draw.uniform(r0, r1)
+
+
+def check_map(model: Model, image: Image, bound: float) -> Iterator[str]:
+    worst, where = 0.0, (0.0, 0.0)
+    for t, slope in places(model):
+        error = abs(image.bias(image.input(t), image.input(slope)) - model.bias(t, slope))
+        if error > worst:
+            worst, where = error, (t, slope)
+    print(
+        f"{image.where}: largest departure of the table from the model {worst:.3e} deg/h, bound {bound:.2e}"
+    )
+    if worst > bound:
+        yield f"at T = {where[0]:.4f} C, slope = {where[1]:.6f} C per block the table departs by {worst:.3e} deg/h"
+
+
+def check_answer(model: Model, image: Image, words: list[int], bound: float) -> Iterator[str]:
+    """One known answer: temperature, slope, bias, status."""
+    t, slope = (image.number(w) / (1.0 if image.numeric == "f32" else 65536.0) for w in words[:2])
+    if not (math.isfinite(t) and math.isfinite(slope)) or (
+        image.numeric == "q31" and 0x80000000 in words[:2]
+    ):
+        if words[3] < 2**31:
+            yield f"a missing input is answered with status {words[3]}"
+        return
+    error = abs(image.to_dph(image.number(words[2])) - model.bias(t, slope))
+    if error > bound:
+        yield f"answer at T = {t:.4f}, slope = {slope:.6f} departs from the model by {error:.3e} deg/h"
+    outside = [(v - low) / (high - low or 1.0) for v, low, high in
+               ((t, *model.t_range), (slope, *(r * model.per_block for r in model.r_range)))]  # fmt: skip
+    if min(abs(o - edge) for o in outside for edge in (0.0, 1.0)) > 1e-4:  # at an edge rounding decides
+        if bool(words[3] & CLAMPED) != any(not 0.0 <= o <= 1.0 for o in outside):
+            yield f"answer at T = {t:.4f}, slope = {slope:.6f} has status {words[3]}"
+        cells, rows = (model.raw["coverage"] or {"cells": [1, 1], "rows": ["1"]}).values()
+        place = [min(max(o, 0.0), 0.999999) * n for o, n in zip(outside, cells, strict=True)]
+        certain = all(1e-3 < p % 1.0 < 0.999 for p in place)
+        if certain and bool(words[3] & UNCOVERED) == (rows[int(place[1])][int(place[0])] == "1"):
+            yield f"answer at T = {t:.4f}, slope = {slope:.6f} has status {words[3]}, coverage says otherwise"
+
+
+def known_answers(folder: Path, name: str, image: Image) -> Iterator[list[int]]:
+    """Known answers of the table and of the board test's map vectors: temperature, slope, bias, status."""
+    probes = image.array["probes"]
+    yield from (probes[k : k + 4] for k in range(0, len(probes), 4))
+    header = (folder / f"vectors_{name}.h").read_text(encoding="ascii")
+    number = {k: int(v, 0) for k, v in re.findall(r"#define VECTORS_(\w+) \(?(-?\w+?)U?L\)?(?:\s|$)", header)}
+    direct = re.search(rf"vectors_{image.numeric}_direct.*?= \{{(.*?)\n\}};", header, re.S)
+    text = (folder / f"vectors_{name}.txt").read_text(encoding="ascii")
+    lines = re.search(rf"begin {image.numeric} \w+\n((?:\w{{8}} \w{{8}}\n)+)", text)
+    if direct is None or lines is None:
+        raise Unreadable(f"no {image.numeric} vectors")
+    inputs = [[int(w, 16) for w in pair] for pair in re.findall(r"0x(\w{8})UL, 0x(\w{8})UL", direct[1])]
+    x = number["SEED"]
+    for _ in range(number["RANDOM"]):
+        pair = []
+        for low, span, fraction in (("T_LOW", "T_SPAN", 12), ("S_LOW", "S_SPAN", 16)):
+            x ^= x << 13 & 0xFFFFFFFF
+            x ^= x >> 17
+            x ^= x << 5 & 0xFFFFFFFF
+            n = number[low] + (x * number[span] >> 32)
+            as_bits = struct.pack("<f", n * 2.0**-fraction) if image.numeric == "f32" else None
+            pair.append(struct.unpack("<I", as_bits)[0] if as_bits else n << 16 - fraction & 0xFFFFFFFF)
+        inputs.append(pair)
+    answers = [[int(w, 16) for w in line.split()] for line in lines[1].splitlines()]
+    yield from ([*pair, bits, status] for pair, (status, bits) in zip(inputs, answers[1:], strict=False))
+
+
+def check(folder: Path) -> list[str]:
+    """Everything that is wrong with an emitted folder."""
+    model = Model(folder / "model.json")
+    name = model.id()
+    c = folder / "c"
+    header = (c / f"gtc_{name}.h").read_text(encoding="ascii")
+    wrong = [] if model.hash in header else ["the header names another model's hash"]
+    zero_at = re.search(r"Make again: .* --zero-at (\S+)", header)
+    model.shift = model.bias(float(zero_at[1]), 0.0) if zero_at else 0.0
+    for image in images_of(c, name):
+        printed = re.search(rf"\* {image.numeric}: .*\|error\| <= (\S+) deg/h", header)
+        if printed is None:
+            raise Unreadable(f"the header prints no bound of {image.numeric}")
+        bound = float(printed[1])
+        found = [
+            *check_files(c, name, image),
+            *check_members(model, image, name),
+            *check_map(model, image, bound),
+        ]
+        for words in known_answers(c, name, image):
+            found += check_answer(model, image, words, bound)
+        wrong += [f"{image.where}: {text}" for text in found]
+    return wrong
+
+
+def main() -> int:
+    if len(sys.argv) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    try:
+        wrong = check(Path(sys.argv[1]))
+    except (OSError, Unreadable, ValueError, KeyError, TypeError, StopIteration) as error:
+        print(f"check_table: {type(error).__name__}: {error}", file=sys.stderr)
+        return 2
+    for text in wrong[:20]:
+        print(text)
+    print(f"{len(wrong)} differences" if wrong else "the tables are the model")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
