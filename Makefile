@@ -31,7 +31,7 @@ test:
 	@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@ctest --test-dir build/ctest --output-on-failure
-	@$(PYTHON) -m pytest -q -n 2 --dist loadfile tests/py
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py
 
 ## style and promises: ruff, mypy, and what the C library must not contain
 check:

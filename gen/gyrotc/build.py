@@ -38,6 +38,7 @@ class Built:
     checks that failed (none: exit 0).
     """
 
+    training: dict[str, Any]
     evaluation: dict[str, Any]
     verification: dict[str, Any]
     refused: dict[str, str]
@@ -107,7 +108,13 @@ def _build_axis(
     _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
     say("drawing the report")
     write_report(work)
-    return Built(evaluation, verification, emission.refused, tuple(_failures(evaluation, verification)))
+    return Built(
+        fitted.training,
+        evaluation,
+        verification,
+        emission.refused,
+        tuple(_failures(evaluation, verification)),
+    )
 
 
 def _of_axis(axis: str, say: Progress) -> Progress:

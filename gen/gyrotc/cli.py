@@ -194,6 +194,8 @@ def fit(
     write_atomically(out / "model.json", fitted.model.to_json())
     write_atomically(out / "training.json", json_text(fitted.training))
     _write_json(json_file, fitted.training)
+    for line in span_lines(fitted.training):
+        _OUT.print(line, highlight=False, soft_wrap=True)
     _OUT.print(
         f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}",
         highlight=False,
@@ -357,6 +359,8 @@ def build(
 def _print_built(result: Built) -> None:
     _OUT.print(evaluation_table(result.evaluation))
     _OUT.print(verify_table(result.verification))
+    for line in span_lines(result.training):
+        _OUT.print(line, highlight=False, soft_wrap=True)
     for name, reason in result.refused.items():
         _OUT.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     for finding in result.evaluation["findings"]:
@@ -537,6 +541,15 @@ def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
         yield "what could still hide below its detection limit:"
         for c in limits:
             yield f"  {c['id']}: {c['detection_limit']['value']:.3g} {c['detection_limit']['unit']}"
+
+
+def span_lines(training: dict[str, Any]) -> Iterator[str]:
+    """What was cut where there are fewer than three training runs."""
+    spans = training["spans"]
+    if spans:
+        yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
+        for s in spans:
+            yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
 
 
 def _cause_lines(cause: dict[str, Any]) -> Iterator[str]:

@@ -29,7 +29,7 @@ from .simulate.truth import simulated_floor
 from .toolchain import Target, all_targets
 from .verify.replay import history_of, replay_on, replay_program
 
-__all__ = ["Replayed", "evaluate"]
+__all__ = ["Replayed", "evaluate", "trace_name"]
 
 Progress = Callable[[str], None]
 _HOST = "host-gcc-O2"
@@ -152,16 +152,21 @@ def _one_run(
         average_s=average_s,
     )
     if trace is not None:
-        shared = sum(r.file == run.file for r in all_runs) > 1
-        _write_trace(trace, run, rows, replayed, span, shared=shared)
+        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span)
     return _Part(run, averages, replayed.mismatches, facts_of(run, rows))
 
 
-def _write_trace(
-    folder: Path, run: Run, rows: Rows, replayed: Replayed, span: NDArray[np.bool_], *, shared: bool
-) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    name = Path(run.file).stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
+    """Name of a run's trace: the file's stem, its start where runs share a file, its folders where stems collide."""
+    stem = Path(run.file).stem
+    if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
+        stem = run.file.replace("/", "_")
+    shared = sum(r.file == run.file for r in all_runs) > 1
+    return stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+
+
+def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: NDArray[np.bool_]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
     columns = (
         rows.time_s[span],
         rows.temperature_c[span],
@@ -171,11 +176,11 @@ def _write_trace(
         replayed.status[span],
     )
     table = pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True)))
-    part = folder / f".{name}.part"
+    part = path.with_name(f".{path.name}.part")
     with part.open("wb") as stream:
         stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
         pacsv.write_csv(table, stream, pacsv.WriteOptions(include_header=False, quoting_style="none"))
-    part.replace(folder / name)
+    part.replace(path)
 
 
 def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:

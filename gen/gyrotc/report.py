@@ -90,8 +90,9 @@ def _pictures(
 
 
 def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | None:
-    stem = Path(run["file"]).stem
-    names = (f"{stem}@{run.get('from_s') or 0.0:g}.csv", f"{stem}.csv")
+    start = f"@{run.get('from_s') or 0.0:g}"
+    stems = (run["file"].replace("/", "_"), Path(run["file"]).stem)
+    names = [stem + end + ".csv" for stem in stems for end in (start, "")]
     path = next((folder / n for n in names if (folder / n).is_file()), None)
     if path is None:
         return None

@@ -245,3 +245,17 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
     again = load_model(tmp_path / "again" / "model.json")
     t = np.linspace(-30, 60, 40)
     np.testing.assert_allclose(again.map_dph(t, 0.0), model.map_dph(t, 0.0), atol=2e-6)
+
+
+def test_traces_of_files_with_one_stem_do_not_meet() -> None:
+    from types import SimpleNamespace
+
+    from gyrotc.evaluate import trace_name
+
+    runs = [
+        SimpleNamespace(file=f, from_s=s)
+        for f, s in (("a.csv", None), ("b/a.csv", None), ("c.csv", 5.0), ("c.csv", 9.0))
+    ]
+    names = [trace_name(run, runs) for run in runs]
+    assert names[2:] == ["c@5.csv", "c@9.csv"]
+    assert len(set(names)) == 4
