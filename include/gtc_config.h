@@ -48,10 +48,10 @@
 #endif
 #endif
 
-/* 1: two Gaussians in each turn of the loop of the fixed-point map, about 6 % faster and 80 bytes longer;
- * the bits are the same. */
+/* 1: two Gaussians in each turn of the loop of the fixed-point map. The bits are the same; it takes
+ * 6 % fewer instructions and 90 bytes more. The default follows the compiler's -Os. */
 #ifndef GTC_UNROLL
-#ifdef __OPTIMIZE_SIZE__
+#if defined(__OPTIMIZE_SIZE__) || GTC_HALF_MULTIPLY
 #define GTC_UNROLL 0
 #else
 #define GTC_UNROLL 1

@@ -5,21 +5,18 @@
  * SPDX-License-Identifier: MIT
  */
 
-/* GTC_OK or GTC_UNCOVERED. */
-static int FN(coverage)(const TABLE *table, const POINT *in)
+/* 1 if there was training data where the inputs lie, or no map says where it was. */
+static int FN(is_covered)(const TABLE *table, const POINT *in)
 {
     uint_least32_t cell[2];
     uint_least32_t index;
-    int status = GTC_OK;
 
-    if (table->coverage != NULL) {
-        FN(cells)(table, in, table->coverage_cells, cell);
-        index = (cell[1] * table->coverage_cells[0]) + cell[0];
-        if (((table->coverage[index >> 5].bits >> (index & 31U)) & 1U) == 0U) {
-            status = GTC_UNCOVERED;
-        }
+    if (table->coverage == NULL) {
+        return 1;
     }
-    return status;
+    FN(cells)(table, in, table->coverage_cells, cell);
+    index = (cell[1] * table->coverage_cells[0]) + cell[0];
+    return (int)((table->coverage[index >> 5].bits >> (index & 31U)) & 1U);
 }
 
 int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
@@ -34,7 +31,9 @@ int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     if (status < 0) {
         return GTC_E_ARG;
     }
-    status |= FN(coverage)(table, &in);
+    if (!FN(is_covered)(table, &in)) {
+        status |= GTC_UNCOVERED;
+    }
     *bias = FN(network)(table, table->networks, table->centers, &in);
     return status;
 }

@@ -11,6 +11,9 @@
 #define GTC_NUM_Q31_H_INCLUDED
 
 #include "gtc_private.h"
+#if defined(__ARM_FEATURE_SAT)
+#include <arm_acle.h>
+#endif
 
 #define FN(name) gtc_q31_##name
 #define TABLE gtc_q31_table_t
@@ -49,31 +52,39 @@ static inline int FN(is_missing)(int_least32_t x)
     return (x == GTC_TEMP_MISSING) ? 1 : 0;
 }
 
-/* ---- the map ---------------------------------------------------------------------------- */
-
-/* 2147483603 * 2^(-i/64): just under 2^31, so that truncating u errs to both sides alike. */
-static const uint_least32_t FN(exp2_table)[64] = {
-    0x7FFFFFD3UL, 0x7E9F05DAUL, 0x7D41D942UL, 0x7BE86F8EUL, 0x7A92BE5FUL, 0x7940BB74UL,
-    0x77F25CA4UL, 0x76A797E6UL, 0x7560634BUL, 0x741CB4FFUL, 0x72DC834BUL, 0x719FC491UL,
-    0x70666F4FUL, 0x6F307A1AUL, 0x6DFDDBA5UL, 0x6CCE8ABBUL, 0x6BA27E40UL, 0x6A79AD30UL,
-    0x69540EA4UL, 0x683199C9UL, 0x671245E6UL, 0x65F60A5CUL, 0x64DCDEA0UL, 0x63C6BA41UL,
-    0x62B394E6UL, 0x61A3664BUL, 0x60962643UL, 0x5F8BCCBAUL, 0x5E8451AEUL, 0x5D7FAD38UL,
-    0x5C7DD783UL, 0x5B7EC8D1UL, 0x5A82797AUL, 0x5988E1EAUL, 0x5891FAA2UL, 0x579DBC38UL,
-    0x56AC1F57UL, 0x55BD1CBDUL, 0x54D0AD3DUL, 0x53E6C9BDUL, 0x52FF6B38UL, 0x521A8ABAUL,
-    0x51382165UL, 0x5058286CUL, 0x4F7A9914UL, 0x4E9F6CB8UL, 0x4DC69CC2UL, 0x4CF022AFUL,
-    0x4C1BF80EUL, 0x4B4A1681UL, 0x4A7A77BAUL, 0x49AD157EUL, 0x48E1E9A0UL, 0x4818EE08UL,
-    0x47521CADUL, 0x468D6F95UL, 0x45CAE0D9UL, 0x450A6AA2UL, 0x444C0728UL, 0x438FB0B4UL,
-    0x42D5619CUL, 0x421D144BUL, 0x4166C335UL, 0x40B268E3UL
+/* With H, t in 2^-24 and G in 2^-16: ((H - t)^2 + G) table[i] = 2^(-(i + t)/64) (1 + 6.7e-9), 0 <= t < 1.
+ * The table also makes up for the truncation of t: its errors go to both sides alike. */
+#define Q31_H 1557473452U
+#define Q31_G 558709134U
+static const uint_least32_t FN(exp2_table)[65] = {
+    0x7A54FA4FUL, 0x7903A1B7UL, 0x77B5EB65UL, 0x766BCD55UL, 0x75253D9BUL, 0x73E2326BUL,
+    0x72A2A211UL, 0x716682F3UL, 0x702DCB94UL, 0x6EF87291UL, 0x6DC66E9EUL, 0x6C97B68CUL,
+    0x6B6C4143UL, 0x6A4405C6UL, 0x691EFB2EUL, 0x67FD18B0UL, 0x66DE5597UL, 0x65C2A947UL,
+    0x64AA0B3AUL, 0x63947305UL, 0x6281D84FUL, 0x617232DCUL, 0x60657A82UL, 0x5F5BA730UL,
+    0x5E54B0EAUL, 0x5D508FCBUL, 0x5C4F3C03UL, 0x5B50ADD7UL, 0x5A54DDA4UL, 0x595BC3DAUL,
+    0x586558FCUL, 0x577195A6UL, 0x56807285UL, 0x5591E85CUL, 0x54A5F000UL, 0x53BC825CUL,
+    0x52D5986EUL, 0x51F12B46UL, 0x510F3408UL, 0x502FABEBUL, 0x4F528C39UL, 0x4E77CE4FUL,
+    0x4D9F6B99UL, 0x4CC95D9AUL, 0x4BF59DE3UL, 0x4B242619UL, 0x4A54EFF1UL, 0x4987F533UL,
+    0x48BD2FB7UL, 0x47F49966UL, 0x472E2C3AUL, 0x4669E23EUL, 0x45A7B58DUL, 0x44E7A051UL,
+    0x44299CC8UL, 0x436DA53BUL, 0x42B3B406UL, 0x41FBC393UL, 0x4145CE5DUL, 0x4091CEECUL,
+    0x3FDFBFDAUL, 0x3F2F9BCCUL, 0x3E815D7AUL, 0x3DD4FFA7UL,
+    Q31_G,
 };
 
-/* 2^(-t/64) = 1 - t (B 2^-38 - C 2^-24 t) + 9.3e-9, 0 <= t < 1 */
-#define Q31_B 2977018596U
-#define Q31_C 979U
+/* u in 2^-24, below 32; 2^-u is 0 in 2^-29. */
+#define Q31_LAST 0x1FFFFFFF
 
-/* u in 2^-24 from which 2^-u is below the last bit of the sum. */
-#define Q31_CUT 0x20000000U
+/* ---- products, in halves of 16 bits where a core has no long multiplication */
 
-/* Upper word of a product. */
+#if GTC_HALF_MULTIPLY
+/* floor(x / 2^16); what >> does to a negative number is up to the compiler, but all do the same. */
+static inline int_least32_t FN(upper)(int_least32_t x)
+{
+    return ((-1 >> 1) == -1) ? (x >> 16) : ((int_least32_t)((FN(bits)(x) ^ 0x80000000U) >> 16) - 32768);
+}
+#endif
+
+/* Upper word of a * b; a, b < 2^31. */
 static inline uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
 {
 #if GTC_HALF_MULTIPLY
@@ -81,12 +92,23 @@ static inline uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
     const uint_least32_t a1 = a >> 16;
     const uint_least32_t b0 = b & 0xFFFFU;
     const uint_least32_t b1 = b >> 16;
-    const uint_least32_t middle = (a1 * b0) + ((a0 * b0) >> 16);
-    const uint_least32_t other = (a0 * b1) + (middle & 0xFFFFU);
 
-    return (a1 * b1) + (middle >> 16) + (other >> 16);
+    return (a1 * b1) + (((a1 * b0) + (a0 * b1) + ((a0 * b0) >> 16)) >> 16);
 #else
     return (uint_least32_t)(((uint_least64_t)a * b) >> 32);
+#endif
+}
+
+/* Upper word of a^2; a < 2^31. */
+static inline uint_least32_t FN(high_of_square)(uint_least32_t a)
+{
+#if GTC_HALF_MULTIPLY
+    const uint_least32_t a0 = a & 0xFFFFU;
+    const uint_least32_t a1 = a >> 16;
+
+    return (a1 * a1) + (((a0 * a1) + ((a0 * a0) >> 17)) >> 15);
+#else
+    return FN(high)(a, a);
 #endif
 }
 
@@ -101,10 +123,9 @@ static inline uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t 
     const uint_least32_t q0 = q & 0xFFFFU;
     const uint_least32_t q1 = q >> 16;
     const uint_least32_t low_p = p0 * p0;
-    const uint_least32_t low_q = q0 * q0;
-    const uint_least32_t carry = ((low_p & 0xFFFFU) + (low_q & 0xFFFFU)) >> 16;
-    const uint_least32_t low = (low_p >> 16) + (low_q >> 16) + carry;
-    const uint_least32_t cross = (p0 * p1) + (q0 * q1) + (low >> 1);
+    const uint_least32_t low = low_p + (q0 * q0);
+    const uint_least32_t carry = (low < low_p) ? 0x8000U : 0U;
+    const uint_least32_t cross = (p0 * p1) + (q0 * q1) + (low >> 17) + carry;
 
     return (p1 * p1) + (q1 * q1) + (cross >> 15);
 #else
@@ -115,22 +136,60 @@ static inline uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t 
 #endif
 }
 
-/* sum + w * e, in two's complement; 0 <= e < 2^31 */
-static inline uint_least64_t FN(accumulate)(uint_least64_t sum, int_least32_t w, uint_least32_t e)
+/* A sum of products, in 2^-29 of the result's unit, and the sum with w * e added;
+ * |w| < 2^30, 0 <= e < 2^30. */
+#if GTC_HALF_MULTIPLY
+typedef struct {
+    uint_least32_t low;
+    uint_least32_t high;
+} FN(sum_t);
+
+static inline FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
-    return sum + (uint_least64_t)((int_least64_t)w * (int_least32_t)e);
+    const int_least32_t w0 = (int_least32_t)(FN(bits)(w) & 0xFFFFU);
+    const int_least32_t w1 = FN(upper)(w);
+    const int_least32_t e0 = e & 0xFFFF;
+    const int_least32_t e1 = e >> 16;
+    const uint_least32_t carry = ((uint_least32_t)w0 * (uint_least32_t)e0) >> 16;
+    const int_least32_t middle = (w1 * e0) + (w0 * e1) + (int_least32_t)carry;
+    const uint_least32_t low = (uint_least32_t)w * (uint_least32_t)e;
+
+    sum.high += (uint_least32_t)((w1 * e1) + FN(upper)(middle));
+    sum.low += low;
+    sum.high += (sum.low < low) ? 1U : 0U;
+    return sum;
 }
 
-/* 2^-u in 2^-31, u in 2^-24, below Q31_CUT. */
-static inline uint_least32_t FN(exp2)(uint_least32_t u)
+static inline uint_least32_t FN(units)(FN(sum_t) sum)
 {
-    const uint_least32_t t = (u << 14) & 0xFFFFFFFFU; /* 2^-32 of a step of the table */
-    const uint_least32_t slope = Q31_B - (Q31_C * ((u >> 4) & 0x3FFFU));
-    const uint_least32_t drop = FN(high)(t, slope);
-    const uint_least32_t entry = FN(exp2_table)[(u >> 18) & 63U];
+    return (sum.high << 3) | (sum.low >> 29);
+}
+#else
+typedef int_least64_t FN(sum_t);
 
-    GTC_ASSERT_RANGE((u < Q31_CUT) && (slope < Q31_B + 1U) && ((FN(high)(entry, drop) >> 6) < entry));
-    return (entry - (FN(high)(entry, drop) >> 6)) >> (u >> 24);
+static inline FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
+{
+    return sum + ((int_least64_t)w * e);
+}
+
+/* Its value in units of the result, rounded down, in two's complement. */
+static inline uint_least32_t FN(units)(FN(sum_t) sum)
+{
+    GTC_ASSERT_RANGE((sum >= -0x1000000000000000LL) && (sum < 0x1000000000000000LL));
+    return (uint_least32_t)(((uint_least64_t)sum >> 29) & 0xFFFFFFFFU);
+}
+#endif
+
+/* ---- the map ---------------------------------------------------------------------------- */
+
+/* 2^-u in 2^-29, u in 2^-24, up to Q31_LAST; g is Q31_G. */
+static inline int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
+{
+    const uint_least32_t v = Q31_H - ((u << 14) >> 8);
+    const uint_least32_t s = FN(high_of_square)(v) + g;
+
+    GTC_ASSERT_RANGE((u <= Q31_LAST) && (v <= Q31_H) && (s >= Q31_G));
+    return (int_least32_t)FN(high)(FN(exp2_table)[(u >> 18) & 63U], s) >> (u >> 24);
 }
 
 /* The inputs of a network: 0 ... 2^16 - 1 over the envelope. */
@@ -140,7 +199,7 @@ typedef struct {
 } FN(point_t);
 #define POINT FN(point_t)
 
-/* Position of an input in its range, clamped; gain in 2^-26. Returns GTC_OK, GTC_CLAMPED or, for the
+/* Position of an input in its range, clamped; gain in 2^-27. Returns GTC_OK, GTC_CLAMPED or, for the
  * mark of a missing number, which lies below every range, GTC_E_ARG. */
 static inline int FN(position)(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
                                uint_least32_t *position)
@@ -151,19 +210,27 @@ static inline int FN(position)(int_least32_t x, const int_least32_t range[2], in
 
     GTC_ASSERT_RANGE(span < 0x4000000U);
     if (offset > span) {
-        status = (x == GTC_TEMP_MISSING) ? GTC_E_ARG : GTC_CLAMPED;
-        offset = (x < range[0]) ? 0U : span;
+        if (x == GTC_TEMP_MISSING) {
+            return GTC_E_ARG;
+        }
+        offset = span & (0U - (uint_least32_t)(x > range[0]));
+        status = GTC_CLAMPED;
     }
-    *position = FN(high)(offset << 6, (uint_least32_t)gain);
+    *position = FN(high)(offset << 5, (uint_least32_t)gain);
     return status;
 }
 
-/* Where the inputs lie. */
+/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or GTC_E_ARG. */
 static inline int FN(locate)(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
 {
-    const int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
+    int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
+    int other;
 
-    return status | FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
+    if (status >= 0) {
+        other = FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
+        status = (other < 0) ? other : (status | other);
+    }
+    return status;
 }
 
 /* Cells of the inputs, T and slope, among n each. */
@@ -188,51 +255,58 @@ static inline int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_
 }
 
 /* Takes one Gaussian into the sum. */
-static inline uint_least64_t FN(gaussian)(uint_least64_t sum, const gtc_word_t *center, const POINT *in)
+static inline FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
+                                          const POINT *in, uint_least32_t g)
 {
-    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
-                                                 FN(argument)(&center[2], in->x_slope));
+    uint_least32_t u;
 
-    return (u < Q31_CUT) ? FN(accumulate)(sum, center[4].integer, FN(exp2)(u)) : sum;
+    u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
+                                 FN(argument)(&center[2], in->x_slope));
+#if defined(__ARM_FEATURE_SAT)
+    u = __usat((int_least32_t)u, 29);
+    return FN(accumulate)(sum, center[4].integer, FN(exp2)(u, g));
+#else
+    return (u <= Q31_LAST) ? FN(accumulate)(sum, center[4].integer, FN(exp2)(u, g)) : sum;
+#endif
 }
 
 /* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
  * larger. A file of its own, because few tables need it. */
-uint_least64_t FN(narrow)(uint_least64_t sum, const gtc_word_t *center, const gtc_word_t *end,
-                          POINT in, uint_least32_t narrow);
+FN(sum_t) FN(narrow)(FN(sum_t) sum, const gtc_word_t *center, const gtc_word_t *end,
+                          uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
 
 /* One network: w0 + linear part + its Gaussians. */
 static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
                                         const gtc_word_t *center, const POINT *in)
 {
     const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
-    uint_least64_t sum;
+    /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
+    const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
+    FN(sum_t) sum = {0};
     gtc_word_t bias;
 
-    /* In 2^-31 of the result's unit; half a unit rounds it. */
-    sum = ((uint_least64_t)(int_least64_t)network[1].integer << 31) | 0x40000000U;
-    sum = FN(accumulate)(sum, network[2].integer, in->x_temp << 15);
-    sum = FN(accumulate)(sum, network[3].integer, in->x_slope << 15);
+    sum = FN(accumulate)(sum, network[2].integer, (int_least32_t)(in->x_temp << 13));
+    sum = FN(accumulate)(sum, network[3].integer, (int_least32_t)(in->x_slope << 13));
     if (table->scale[2] != 0) {
-        sum = FN(narrow)(sum, center, end, *in, (uint_least32_t)table->scale[2]);
+        sum = FN(narrow)(sum, center, end, in->x_temp, in->x_slope,
+                         (uint_least32_t)table->scale[2]);
     } else {
 #if GTC_UNROLL
         if ((network[0].bits & 1U) != 0U) {
-            sum = FN(gaussian)(sum, center, in);
+            sum = FN(gaussian)(sum, center, in, g);
             center = &center[GTC_CENTER_WORDS];
         }
-        for (; center != end; center = &center[2 * GTC_CENTER_WORDS]) {
-            sum = FN(gaussian)(sum, center, in);
-            sum = FN(gaussian)(sum, &center[GTC_CENTER_WORDS], in);
-        }
-#else
-        for (; center != end; center = &center[GTC_CENTER_WORDS]) {
-            sum = FN(gaussian)(sum, center, in);
-        }
 #endif
+        while (center != end) {
+            sum = FN(gaussian)(sum, center, in, g);
+            center = &center[GTC_CENTER_WORDS];
+#if GTC_UNROLL
+            sum = FN(gaussian)(sum, center, in, g);
+            center = &center[GTC_CENTER_WORDS];
+#endif
+        }
     }
-    GTC_ASSERT_RANGE((sum + 0x4000000000000000ULL) < 0x8000000000000000ULL);
-    bias.bits = (uint_least32_t)((sum >> 31) & 0xFFFFFFFFU);
+    bias.bits = network[1].bits + FN(units)(sum);
     return bias.integer;
 }
 

@@ -4,17 +4,17 @@
  */
 #include "gtc_num_q31.h"
 
-uint_least64_t FN(narrow)(uint_least64_t sum, const gtc_word_t *center, const gtc_word_t *end,
-                          POINT in, uint_least32_t narrow)
+FN(sum_t) FN(narrow)(FN(sum_t) sum, const gtc_word_t *center, const gtc_word_t *end,
+                          uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow)
 {
     for (; center != end; center = &center[GTC_CENTER_WORDS]) {
-        const int_least64_t a = FN(argument)(&center[0], in.x_temp);
-        const int_least64_t b = FN(argument)(&center[2], in.x_slope);
+        const int_least64_t a = FN(argument)(&center[0], x_temp);
+        const int_least64_t b = FN(argument)(&center[2], x_slope);
         const uint_least64_t square = (uint_least64_t)(a * a) + (uint_least64_t)(b * b);
         const uint_least64_t u = square >> (32U - narrow);
 
-        if (u < Q31_CUT) {
-            sum = FN(accumulate)(sum, center[4].integer, FN(exp2)((uint_least32_t)u));
+        if (u <= Q31_LAST) {
+            sum = FN(accumulate)(sum, center[4].integer, FN(exp2)((uint_least32_t)u, Q31_G));
         }
     }
     return sum;

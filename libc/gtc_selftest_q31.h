@@ -8,15 +8,17 @@
 /* 1 if long products come out whole; the operands are read where the compiler cannot foresee them. */
 static int FN(primitives_work)(void)
 {
-    static const uint_least32_t operands[3] = {0xFFFFFFFFUL, 0x80000001UL, 0x7FFFFFFFUL};
+    static const uint_least32_t operands[2] = {0x7FFFFFFFUL, 0x3FFFFFFFUL};
     const volatile uint_least32_t *const operand = operands;
     const uint_least32_t a = operand[0];
     const uint_least32_t b = operand[1];
-    const int_least32_t c = (int_least32_t)operand[2];
+    const int_least32_t c = (int_least32_t)a;
+    const int_least32_t d = (int_least32_t)b;
+    const FN(sum_t) zero = {0};
 
-    return ((FN(high)(a, b) == 0x80000000UL) && (FN(high)(a, a) == 0xFFFFFFFEUL)
+    return ((FN(high)(a, b) == 0x1FFFFFFFUL) && (FN(high_of_square)(a) == 0x3FFFFFFFUL)
             && (FN(high_of_squares)(c, -c) == 0x7FFFFFFEUL)
-            && (FN(accumulate)(1, -c, (uint_least32_t)c) == 0xC000000100000000ULL)) ? 1 : 0;
+            && (FN(units)(FN(accumulate)(zero, -d, d)) == 0x80000003UL)) ? 1 : 0;
 }
 
 #endif /* GTC_SELFTEST_Q31_H_INCLUDED */

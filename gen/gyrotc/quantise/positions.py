@@ -22,7 +22,7 @@ __all__ = ["POSITIONS", "InputScale", "Inputs", "Surface", "difference", "positi
 
 POSITIONS = 65536
 _UNITS_PER_C = 65536.0
-_GAIN_BITS = 26
+_GAIN_BITS = 27
 _SQRT_LOG2E = 1.2011224087864498
 _SQRT_LN2 = 0.8325546111576977
 # Largest |d/dx| and |d²/dx²| of 2^-(α x)², as factors of α and α².
@@ -34,7 +34,7 @@ Floats = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, slots=True)
 class InputScale:
-    """position = ((input - low) · gain) >> 26; input in 2^-16 C."""
+    """position = ((input - low) · gain) >> 27; input in 2^-16 C."""
 
     low: int
     gain: int
@@ -55,7 +55,7 @@ Inputs = tuple[InputScale, InputScale]  # T, slope
 def position_scale(low: int, high: int) -> InputScale:
     """Scale that spreads an envelope (2^-16 C) over the positions."""
     gain = (POSITIONS * 2**_GAIN_BITS - 1) // max(high - low, 1)
-    return InputScale(low, min(gain, 2**32 - 1))
+    return InputScale(low, min(gain, 2**31 - 1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,8 +74,8 @@ def table_of(model: Model) -> Table:
     parts = {
         "rounded inputs": _input_error(exact, inputs),
         "rounded parameters": difference(exact, final, _GRID_CELLS),
-        "Gaussian": (GAUSS_ERROR + 2.0**-31) * math.fsum(abs(w) for w in final.weights) + lost * 2.0**-32,
-        "rounded result": 2.0 ** -(frac_bits + 1),
+        "Gaussian": GAUSS_ERROR * math.fsum(abs(w) for w in final.weights) + lost * 2.0**-32,
+        "truncated result": 2.0**-frac_bits,
     }
     return _table(model, envelope, inputs, gaussians, whole, frac_bits, parts)
 
@@ -143,13 +143,15 @@ def _solved(exact: Surface, rounded: Surface) -> Surface:
 
 
 def _frac_bits(surface: Surface, fallback: float) -> int:
-    """Most fraction bits of a bias with which no sum leaves its word."""
+    """Most fraction bits of a bias with which all weights together stay below 2^30."""
     parts = [surface.w0, *surface.linear, *surface.weights]
     largest = max(math.fsum(abs(p) for p in parts), abs(fallback), 2.0**-30)
     bits = 30 - math.frexp(largest)[1]
+    if largest * 2.0**bits > 2**30 - 1024:  # room for the rounding of 512 weights
+        bits -= 1
     if bits < 0:
         raise CheckFailed(f"q31: weights of {largest:.3g} deg/h in all leave the range of 32 bits")
-    return min(bits + 1, 60) if largest * 2.0 ** (bits + 1) < 2**31 - 1024 else bits
+    return bits
 
 
 def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:

@@ -28,18 +28,18 @@ __all__ = [
 
 ENTRIES = 64
 CUT = 32 << 24  # u in 2^-24
-POSITION_BITS = 26  # gain of an input: position = offset * gain * 2^-26
-_TOP = 2147483603  # just under 2^31, so that truncating u errs to both sides alike
-_B = np.uint64(2977018596)  # 2^-38
-_C = np.uint64(979)  # 2^-24
-#: |2^-31 exp2(u) - 2^-v| for every v that truncates to u, from visiting every u (tests/py/test_reference.py)
-GAUSS_ERROR = 3.05e-8
+POSITION_BITS = 27  # gain of an input: position = offset * gain * 2^-27
+_H = np.uint64(1557473452)  # 2^-24
+_G = np.uint64(558709134)  # 2^-16
+_TOP = 2052389455
+#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u; proved by visiting every u (tests/py/test_reference.py)
+GAUSS_ERROR = 2.9e-8
 
 Integers = NDArray[np.int64]
 
 
 def exp2_table() -> NDArray[np.uint64]:
-    """round(2147483603 · 2^(-i/64)), i = 0 ... 63."""
+    """round(2052389455 · 2^(-i/64)), i = 0 ... 63."""
     context = Context(prec=60)
     exact = [_TOP * context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
     return np.array([int(e.to_integral_value(ROUND_HALF_EVEN)) for e in exact], dtype=np.uint64)
@@ -49,13 +49,11 @@ _TABLE = exp2_table()
 
 
 def exp2(u: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """2^-u in 2^-31, for u in 2^-24, 0 <= u < CUT."""
-    t = (u << np.uint64(14)) & np.uint64(0xFFFFFFFF)
-    slope = _B - _C * ((u >> np.uint64(4)) & np.uint64(0x3FFF))
-    drop = (t * slope) >> np.uint64(32)
+    """2^-u in 2^-29, for u in 2^-24, 0 <= u < CUT: table · ((H - t)² + G), shifted."""
+    v = _H - ((u & np.uint64(0x3FFFF)) << np.uint64(6))
+    s = ((v * v) >> np.uint64(32)) + _G
     entry = _TABLE[((u >> np.uint64(18)) & np.uint64(63)).astype(np.int64)]
-    fall = ((entry * drop) >> np.uint64(32)) >> np.uint64(6)
-    return np.asarray((entry - fall) >> (u >> np.uint64(24)))
+    return np.asarray(((entry * s) >> np.uint64(32)) >> (u >> np.uint64(24)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +71,7 @@ def normalise(table: Table, x: Integers) -> Points:
 
 
 def _position(x: Integers, low: int, gain: int) -> Integers:
-    offset = (x - low).astype(np.uint64) << np.uint64(6)
+    offset = (x - low).astype(np.uint64) << np.uint64(5)
     return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
 
 
@@ -81,8 +79,7 @@ def network_bits(table: Table, points: Points) -> Words:
     """Bits of the bias."""
     narrow = int(table.scale[2])
     _, w0, linear_t, linear_r, *_ = (int(n) for n in table.numbers(table.networks))
-    acc = (linear_t * points.x_t + linear_r * points.x_r) * 32768
-    acc = acc + w0 * 2**31 + 2**30
+    acc = (linear_t * points.x_t + linear_r * points.x_r) * 8192
     for s_t, k_t, s_r, k_r, weight in table.numbers(table.centers).reshape(-1, 5):
         a = (s_t * points.x_t + k_t).astype(np.uint64)  # squares are those of the signed number, mod 2^64
         b = (s_r * points.x_r + k_r).astype(np.uint64)
@@ -90,7 +87,7 @@ def network_bits(table: Table, points: Points) -> Words:
         inside = u < CUT
         e = exp2(np.where(inside, u, np.uint64(0))).astype(np.int64)
         acc = acc + np.where(inside, weight * e, 0)
-    return np.asarray(acc >> 31).astype(np.int32).view(np.uint32)
+    return np.asarray(w0 + (acc >> 29)).astype(np.int32).view(np.uint32)
 
 
 def cells(table: Table, points: Points) -> Integers:
