@@ -10,7 +10,7 @@ into training samples.
 from __future__ import annotations
 
 from .believe import BELIEVED, HELD, RESTART, believe
-from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow
+from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow, positions, with_missing
 from .numbers import F32, Q31, Arithmetic
 from .training import Blocks, missed_before, run_blocks, samples_per_block
 
@@ -31,6 +31,8 @@ __all__ = [
     "expand_missed",
     "follow",
     "missed_before",
+    "positions",
     "run_blocks",
     "samples_per_block",
+    "with_missing",
 ]

@@ -40,15 +40,14 @@ def believe(
         with np.errstate(invalid="ignore", over="ignore"):
             regular[1:] = pair & arithmetic.is_near(x[1:], x[:-1], max_step, step, 1)
     events = np.flatnonzero(~regular)
-    sounds = np.flatnonzero(sound)
     judge = _Judge(arithmetic, max_step, step)
     i = 0
     while i < x.size:
         if not sound[i]:
-            k = np.searchsorted(sounds, i)
-            after = int(sounds[k]) if k < sounds.size else x.size
-            judge.hold(after - i)
-            i = after
+            rest = sound[i:]
+            gap = int(np.argmax(rest)) if rest.any() else rest.size
+            judge.hold(gap)
+            i += gap
             continue
         verdict[i] = judge.take(x[i])
         i += 1

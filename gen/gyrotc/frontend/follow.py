@@ -15,10 +15,21 @@ from numpy.typing import NDArray
 from .believe import HELD, RESTART, believe
 from .numbers import Arithmetic, Numbers
 
-__all__ = ["FALLBACK", "KEEP", "MAP", "Settings", "Steps", "expand_missed", "follow"]
+__all__ = [
+    "FALLBACK",
+    "KEEP",
+    "MAP",
+    "Settings",
+    "Steps",
+    "expand_missed",
+    "follow",
+    "positions",
+    "with_missing",
+]
 
 MAP, KEEP, FALLBACK = 0, 1, 2
 _WARMING = 1  # GTC_WARMING
+_PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +74,28 @@ def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.i
     """Counts of missing samples as `gtc_<n>_missed` shortens them: by whole blocks."""
     n = settings.samples_per_block
     most = settings.hold_blocks + settings.slope_blocks + 2
-    blocks = missed // n
-    return np.asarray(np.where(blocks > most, missed - (blocks - most) * n, missed))
+    many = np.flatnonzero(missed >= (most + 1) * n)
+    shortened = missed.copy() if many.size else missed
+    shortened[many] -= (missed[many] // n - most) * n
+    return shortened
+
+
+def positions(missed: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number of each row's sample where `missed` samples come before the row."""
+    position = np.arange(missed.size)
+    if missed.any():
+        position += np.cumsum(missed)
+    return position
+
+
+def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.int64]) -> Numbers:
+    """Samples at their positions, missing ones between them."""
+    n = int(position[-1]) + 1 if position.size else 0
+    if n == x.size:
+        return x
+    samples = arithmetic.missing(n)
+    samples[position] = x
+    return samples
 
 
 def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
@@ -114,14 +145,26 @@ def _block_means(
     arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
 ) -> tuple[NDArray[np.bool_], Numbers]:
     """Which blocks are valid, and their means (0 where no sample was believed)."""
-    blocks = -(-x.size // n)
-    padded = np.zeros(blocks * n, dtype=x.dtype)
-    padded[: x.size] = np.where(verdict != HELD, x, 0)
-    used = np.zeros(blocks * n, dtype=np.bool_)
-    used[: x.size] = verdict != HELD
+    used = verdict != HELD
     for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
         used[i - i % n : i] = False
-    values, there = padded.reshape(blocks, n), used.reshape(blocks, n)
+    step = n * max(1, _PART // n)
+    parts = [
+        _means(arithmetic, x[start : start + step], used[start : start + step], n)
+        for start in range(0, max(x.size, 1), step)
+    ]
+    valid, mean = zip(*parts, strict=True)
+    return np.concatenate(valid), np.concatenate(mean)
+
+
+def _means(
+    arithmetic: Arithmetic, x: Numbers, used: NDArray[np.bool_], n: int
+) -> tuple[NDArray[np.bool_], Numbers]:
+    """`_block_means` of a part that begins with a block."""
+    blocks = -(-x.size // n)
+    values, there = np.zeros((blocks, n), dtype=x.dtype), np.zeros((blocks, n), dtype=np.bool_)
+    values.reshape(-1)[: x.size] = np.where(used, x, 0)
+    there.reshape(-1)[: x.size] = used
     count = np.count_nonzero(there, axis=1)
     base = values[np.arange(blocks), np.argmax(there, axis=1)]
     d = np.where(there, arithmetic.diff(values, base[:, None]), values.dtype.type(0))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .follow import FALLBACK, KEEP, Settings, Steps, expand_missed, follow
-from .numbers import F32, Numbers
+from .follow import FALLBACK, KEEP, Settings, Steps, expand_missed, follow, positions, with_missing
+from .numbers import F32
 
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
@@ -46,9 +46,12 @@ def samples_per_block(block_s: float, row_period_s: float) -> int:
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
     """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    gaps = np.diff(time_s, prepend=time_s[:1]) / row_period_s
-    missed = np.where(gaps > _GAP, np.rint(gaps) - 1.0, 0.0)
-    return np.asarray(np.minimum(missed, _MAX_MISSED).astype(np.int64))
+    gaps = np.diff(time_s)
+    gaps /= row_period_s
+    late = np.flatnonzero(gaps > _GAP)
+    missed = np.zeros(time_s.size, dtype=np.int64)
+    missed[late + 1] = np.minimum(np.rint(gaps[late]) - 1.0, _MAX_MISSED).astype(np.int64)
+    return missed
 
 
 def run_blocks(
@@ -83,8 +86,8 @@ def run_blocks(
         max_slope=np.float32(max_rate_c_per_min * block_s / 60.0),
     )
     missed = expand_missed(missed_before(rows.time_s, run.row_period_s), settings)
-    position = np.arange(missed.size) + np.cumsum(missed)
-    samples = _with_missing(F32.numbers(rows.temperature_c), position)
+    position = positions(missed)
+    samples = with_missing(F32, F32.numbers(rows.temperature_c), position)
     steps = follow(F32, samples, settings)
     n = settings.samples_per_block
     n_blocks = steps.valid.size
@@ -100,15 +103,6 @@ def run_blocks(
         rate_dph=rate,
         rows=count,
     )
-
-
-def _with_missing(x: Numbers, position: NDArray[np.int64]) -> Numbers:
-    """Samples at their positions, missing ones between them."""
-    if x.size == 0:
-        return x
-    samples = F32.missing(int(position[-1]) + 1)
-    samples[position] = x
-    return samples
 
 
 def _in_force(
@@ -135,8 +129,11 @@ def _mean_rate(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Mean measured rate and number of rows in the span, for each block."""
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
-    count = np.bincount(block[counted], minlength=n_blocks)
-    total = np.bincount(block[counted], weights=rows.rate_dph[counted], minlength=n_blocks)
+    rate = rows.rate_dph
+    if not counted.all():
+        block, rate = block[counted], rate[counted]
+    count = np.bincount(block, minlength=n_blocks)
+    total = np.bincount(block, weights=rate, minlength=n_blocks)
     with np.errstate(invalid="ignore"):
         mean = total / count
     return mean, count.astype(np.int64)

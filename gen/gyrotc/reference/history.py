@@ -13,7 +13,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, expand_missed, follow
+from ..frontend import (
+    F32,
+    FALLBACK,
+    KEEP,
+    MAP,
+    Q31,
+    Arithmetic,
+    Settings,
+    Steps,
+    expand_missed,
+    follow,
+    positions,
+    with_missing,
+)
 from ..table import Table, Words
 from .maps import evaluate_map
 
@@ -66,10 +79,9 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     """
     settings = _settings(table, samples_per_block)
     shortened = expand_missed(np.asarray(missed, dtype=np.int64), settings)
-    position = np.arange(shortened.size) + np.cumsum(shortened)
+    position = positions(shortened)
     arithmetic = _arithmetic(table)
-    samples = arithmetic.missing(int(position[-1]) + 1 if position.size else 0)
-    samples[position] = table.numbers(np.asarray(channels)[:, 0])
+    samples = with_missing(arithmetic, table.numbers(np.asarray(channels)[:, 0]), position)
     steps = follow(arithmetic, samples, settings)
     status, bits = _corrections(table, steps)
 
