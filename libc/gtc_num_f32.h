@@ -51,47 +51,28 @@ static inline int FN(is_missing)(float x)
 
 /* ---- the map ---------------------------------------------------------------------------- */
 
-/* 2^(-i/64) */
+/* With H and G: ((f - H)^2 + G) c = 2^(-f/64) (1 + 6.7e-9), |f| <= 1/2. The table holds the bits of
+ * c 2^(-i/64), and i in the bits from which i is subtracted again with the exponent. */
+#define F32_H 0x1.71549ep+6F
+#define F32_G 0x1.0a69ccp+13F
 static const uint_least32_t FN(exp2_table)[64] = {
-    0x3F800000UL, 0x3F7D3E0CUL, 0x3F7A83B3UL, 0x3F77D0DFUL, 0x3F75257DUL, 0x3F728177UL,
-    0x3F6FE4BAUL, 0x3F6D4F30UL, 0x3F6AC0C7UL, 0x3F68396AUL, 0x3F65B907UL, 0x3F633F89UL,
-    0x3F60CCDFUL, 0x3F5E60F5UL, 0x3F5BFBB8UL, 0x3F599D16UL, 0x3F5744FDUL, 0x3F54F35BUL,
-    0x3F52A81EUL, 0x3F506334UL, 0x3F4E248CUL, 0x3F4BEC15UL, 0x3F49B9BEUL, 0x3F478D75UL,
-    0x3F45672AUL, 0x3F4346CDUL, 0x3F412C4DUL, 0x3F3F179AUL, 0x3F3D08A4UL, 0x3F3AFF5BUL,
-    0x3F38FBAFUL, 0x3F36FD92UL, 0x3F3504F3UL, 0x3F3311C4UL, 0x3F3123F6UL, 0x3F2F3B79UL,
-    0x3F2D583FUL, 0x3F2B7A3AUL, 0x3F29A15BUL, 0x3F27CD94UL, 0x3F25FED7UL, 0x3F243516UL,
-    0x3F227043UL, 0x3F20B051UL, 0x3F1EF532UL, 0x3F1D3EDAUL, 0x3F1B8D3AUL, 0x3F19E046UL,
-    0x3F1837F0UL, 0x3F16942DUL, 0x3F14F4F0UL, 0x3F135A2BUL, 0x3F11C3D3UL, 0x3F1031DCUL,
-    0x3F0EA43AUL, 0x3F0D1ADFUL, 0x3F0B95C2UL, 0x3F0A14D5UL, 0x3F08980FUL, 0x3F071F62UL,
-    0x3F05AAC3UL, 0x3F043A29UL, 0x3F02CD87UL, 0x3F0164D2UL
+    0x3875FE11UL, 0x387557B6UL, 0x3874B8A9UL, 0x387420D7UL, 0x3873902CUL, 0x38730694UL,
+    0x387283FAUL, 0x3872084DUL, 0x38719379UL, 0x3871256BUL, 0x3870BE10UL, 0x38705D57UL,
+    0x3870032BUL, 0x386FAF7DUL, 0x386F6239UL, 0x386F1B4EUL, 0x386EDAABUL, 0x386EA03DUL,
+    0x386E6BF5UL, 0x386E3DC1UL, 0x386E1590UL, 0x386DF352UL, 0x386DD6F6UL, 0x386DC06CUL,
+    0x386DAFA5UL, 0x386DA48FUL, 0x386D9F1CUL, 0x386D9F3CUL, 0x386DA4E0UL, 0x386DAFF7UL,
+    0x386DC075UL, 0x386DD648UL, 0x386DF164UL, 0x386E11B8UL, 0x386E3737UL, 0x386E61D3UL,
+    0x386E917DUL, 0x386EC628UL, 0x386EFFC5UL, 0x386F3E47UL, 0x386F81A1UL, 0x386FC9C5UL,
+    0x387016A6UL, 0x38706837UL, 0x3870BE6BUL, 0x38711935UL, 0x38717889UL, 0x3871DC59UL,
+    0x3872449BUL, 0x3872B140UL, 0x3873223EUL, 0x38739789UL, 0x38741113UL, 0x38748ED3UL,
+    0x387510BBUL, 0x387596C2UL, 0x387620DAUL, 0x3876AEFAUL, 0x38774116UL, 0x3877D722UL,
+    0x38787115UL, 0x38781DC7UL, 0x38776105UL, 0x3876ABCFUL
 };
 
-/* 2^(-f/64) = 1 - f (P1 - f P2) + 8.4e-9, 0 <= f < 1 */
-#define F32_P1 0x1.62e36cp-7F
-#define F32_P2 0x1.e98446p-15F
-
-/* 2^(-u/64); 0 for u >= 2048, where the result would be below 2^-32. */
-static inline float FN(gauss)(float u)
-{
-    gtc_word_t e;
-    int_least32_t n;
-    float f;
-    float h;
-
-    if (!(u < 2048.0F)) {
-        return 0.0F;
-    }
-    n = (int_least32_t)u;
-    f = (float)n;
-    f = u - f;
-    h = f * F32_P2;
-    h = F32_P1 - h;
-    h = f * h;
-    h = 1.0F - h;
-    e.bits = FN(exp2_table)[(uint_least32_t)n & 63U] - (((uint_least32_t)n >> 6) << 23);
-    e.value = e.value * h;
-    return e.value;
-}
+/* 1.5 * 2^23: what is added to it is rounded to an integer, which then stands in the low bits. */
+#define F32_ROUND 12582912.0F
+#define F32_ROUND_BITS 0x4B400000U
+#define F32_CUT 2048U
 
 /* Moves x into a range; returns GTC_OK or GTC_CLAMPED. */
 static inline int FN(clamp)(float *x, const gtc_word_t range[2])
@@ -148,6 +129,37 @@ static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT 
     return status;
 }
 
+/* acc + weight * 2^(-u/64), u of the center's record; from u = 2048 on, or where u is not a number, acc. */
+static inline float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
+{
+    gtc_word_t whole;
+    gtc_word_t e;
+    float u;
+    float f;
+
+    u = in->z_temp - center[0].value;
+    u = u * center[1].value;
+    u = u * u;
+    f = in->z_slope - center[2].value;
+    f = f * center[3].value;
+    f = f * f;
+    u = u + f;
+    whole.value = u + F32_ROUND;
+    if (whole.bits >= (F32_ROUND_BITS + F32_CUT)) {
+        return acc;
+    }
+    e.bits = FN(exp2_table)[whole.bits & 63U] - ((whole.bits << 17) & 0xFFFFFFFFU);
+    f = whole.value - F32_ROUND;
+    f = u - f;
+    f = f - F32_H;
+    f = f * f;
+    f = f + F32_G;
+    f = e.value * f;
+    f = center[4].value * f;
+    f = acc + f;
+    return f;
+}
+
 /* One network: w0 + linear part + its Gaussians. */
 static inline float FN(network)(const TABLE *table, const gtc_word_t *network,
                                 const gtc_word_t *center, const POINT *in)
@@ -161,20 +173,19 @@ static inline float FN(network)(const TABLE *table, const gtc_word_t *network,
     acc = acc + term;
     term = network[3].value * in->z_slope;
     acc = acc + term;
-    for (; center != end; center = &center[GTC_CENTER_WORDS]) {
-        float u;
-        float q;
-
-        u = in->z_temp - center[0].value;
-        u = u * center[1].value;
-        u = u * u;
-        q = in->z_slope - center[2].value;
-        q = q * center[3].value;
-        q = q * q;
-        u = u + q;
-        q = FN(gauss)(u);
-        q = center[4].value * q;
-        acc = acc + q;
+#if GTC_UNROLL
+    if ((network[0].bits & 1U) != 0U) {
+        acc = FN(gaussian)(acc, center, in);
+        center = &center[GTC_CENTER_WORDS];
+    }
+#endif
+    while (center != end) {
+        acc = FN(gaussian)(acc, center, in);
+        center = &center[GTC_CENTER_WORDS];
+#if GTC_UNROLL
+        acc = FN(gaussian)(acc, center, in);
+        center = &center[GTC_CENTER_WORDS];
+#endif
     }
     return acc;
 }

@@ -23,7 +23,7 @@ _UNIT = 2.0**-24  # largest relative error of one rounding
 _GRID = 2.0**-20  # centers lie on it
 _INPUT_GRID = 2.0**-21  # largest error of a normalised input by its rounding to the grid
 _GAIN = 8.0 * math.sqrt(math.log2(math.e))  # u = 64 log2(e) d²/δ²
-_POLYNOMIAL = 8.5e-9  # of 2^(-f/64), relative
+_POLYNOMIAL = 6.7e-9  # of 2^(-f/64), relative
 _TINY = 2.0**-80  # smaller weights could make subnormal products
 _MAX_ABS_Z = 8.0
 
@@ -158,7 +158,8 @@ def _bound(
     # u: gain, product, square (twice the error of its root), sum: 2 (1 + 1 + 1) + 1 + 1 roundings at most,
     # and x exp(-x) <= 1/e.
     argument = 8.0 * _UNIT / math.e
-    kernel = (0.5 + 0.5 + 1.0 + 1.0 + 1.0) * _UNIT + argument + _POLYNOMIAL + 2.0**-32
+    # f - H, its square, + G, the table's entry, the product with it, the product with the weight.
+    kernel = (0.7 + 0.5 + 1.0 + 1.0 + 1.0 + 1.0) * _UNIT + argument + _POLYNOMIAL + 2.0**-32
     start = abs(network.w0) + float(linear @ largest)
     partial = start + np.cumsum(weights)  # largest magnitude of each partial sum
     return {

@@ -15,40 +15,42 @@ from numpy.typing import NDArray
 
 from ..table import Table, Words
 
-__all__ = ["CUT", "ENTRIES", "P1", "P2", "cells", "exp2_table", "gauss", "network_bits", "normalise"]
+__all__ = ["ENTRIES", "cells", "exp2_table", "gauss", "network_bits", "normalise"]
 
 ENTRIES = 64
-CUT = np.float32(32 * ENTRIES)
-#: 2^(-f/64) = 1 - f (P1 - f P2) + 8.4e-9 on 0 <= f < 1
-P1 = np.float32(float.fromhex("0x1.62e36cp-7"))
-P2 = np.float32(float.fromhex("0x1.e98446p-15"))
-_ONE, _EIGHT = np.float32(1.0), np.float32(8.0)
+_CUT = 32 * ENTRIES
+#: ((f - H)² + G) c = 2^(-f/64) (1 + 6.7e-9) for |f| <= 1/2
+_H = np.float32(float.fromhex("0x1.71549ep+6"))
+_G = np.float32(float.fromhex("0x1.0a69ccp+13"))
+_C = Decimal(float.fromhex("0x1.ebfc21c077705p-15"))
+_ROUND = np.float32(1.5 * 2**23)  # added and subtracted again: rounds to an integer
+_EIGHT = np.float32(8.0)
 
 
 def exp2_table() -> Words:
-    """Bits of 2^(-i/64), i = 0 ... 63, rounded to float32."""
+    """Bits of c 2^(-i/64) in float32, plus i · 2^17; i = 0 ... 63."""
     context = Context(prec=60)
-    exact = [context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
+    exact = [_C * context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
     # float() rounds to float64 first; at 24 of 53 bits no entry lies near a tie.
-    return np.array([float(e) for e in exact], dtype=np.float32).view(np.uint32)
+    bits = np.array([float(e) for e in exact], dtype=np.float32).view(np.uint32)
+    return np.asarray(bits + (np.arange(ENTRIES, dtype=np.uint32) << np.uint32(17)))
 
 
 _TABLE = exp2_table()
 
 
 def gauss(u: NDArray[np.float32]) -> NDArray[np.float32]:
-    """2^(-u/64); 0 for u >= 2048. u >= 0."""
-    inside = u < CUT
-    v = np.where(inside, u, np.float32(0.0))
-    n = v.astype(np.int32)
-    f = v - n.astype(np.float32)
-    h = f * P2
-    h = P1 - h
-    h = f * h
-    h = _ONE - h
-    bits = _TABLE[n & (ENTRIES - 1)] - ((n >> 6).astype(np.uint32) << np.uint32(23))
-    e = bits.view(np.float32) * h
-    return np.asarray(np.where(inside, e, np.float32(0.0)))
+    """2^(-u/64), u >= 0; 0 where u rounds to 2048 or more, or is not a number."""
+    whole = u + _ROUND
+    n = whole.view(np.uint32) - _ROUND.view(np.uint32)
+    inside = n < _CUT
+    n = np.where(inside, n, np.uint32(0))
+    bits = _TABLE[n & np.uint32(ENTRIES - 1)] - (n << np.uint32(17))
+    f = np.where(inside, u, np.float32(0.0)) - np.where(inside, whole - _ROUND, np.float32(0.0))
+    f = f - _H
+    f = f * f
+    f = f + _G
+    return np.asarray(np.where(inside, bits.view(np.float32) * f, np.float32(0.0)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,10 +42,10 @@ static const gtc_word_t f32_sigma[2] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
-    V(40.390213F), V(0.0698402897F), V(-0.12677373F), B(0x0UL),
+    V(40.390213F), V(0.0698402897F), V(-0.12677367F), B(0x0UL),
     V(20.780426F), V(-0.360319406F), V(-0.642388165F), B(0x4UL),
-    V(1.17063987F), V(0.209520876F), V(-0.402597129F), B(0x0UL),
-    V(-18.439146F), V(-0.220638841F), V(0.361409187F), B(0x0UL),
+    V(1.17063987F), V(0.209520876F), V(-0.4025971F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(0.361409217F), B(0x0UL),
     V(41.9510651F), V(0.349201441F), V(-0.300033271F), B(0x0UL),
     V(22.34128F), V(-0.0809582546F), V(-0.784616113F), B(0x0UL),
     V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
@@ -79,7 +79,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x7b3f8558UL,
+    .crc = 0x5782dcaeUL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
@@ -88,14 +88,14 @@ const gtc_f32_table_t gtc_test_1_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xfc006f23UL), B(0x1fffe117UL), B(0xefffe680UL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
+    B(0x3UL), B(0xfe003739UL), B(0x0fffef80UL), B(0xf7fff36dUL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[15] = {
-    B(0x00006017UL), B(0xf3fd50ccUL), B(0x00002670UL), B(0xe994133eUL), B(0x17fff998UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a208UL), B(0x00000000UL), B(0x00000000UL), B(0xd7ffd497UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db78UL), B(0x09ffebd7UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x0bfffc7eUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xebffeaadUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x04fff603UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -105,19 +105,19 @@ static const gtc_word_t q31_coverage[1] = {
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t q31_sigma[2] = {
-    B(0x0051eb85UL), B(0x00a3d70aUL),
+    B(0x0028f5c3UL), B(0x0051eb85UL),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xfbf16b88UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xeb71a5a6UL), B(0x4UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xf31e5490UL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x0b90af27UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xf6664785UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xe6e47c53UL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x03ae4bc9UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x099d4537UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xfdf8b3e2UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf5b8d257UL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xf98f2b22UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x05c85763UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xfb3321e4UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xf3723d95UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x01d725c5UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x04cea125UL), B(0x2UL),
 };
 
 const gtc_q31_table_t gtc_test_1_q31 = {
@@ -128,11 +128,11 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .slope_blocks = 4UL,
     .hold_blocks = 2UL,
     .stuck_samples = 12UL,
-    .bias_frac_bits = 29UL,
+    .bias_frac_bits = 28UL,
     .max_step = 32768L,
     .max_slope = 65536L,
-    .fallback = 201326592L,
-    .scale = { 838860L, 67108863L, 0L },
+    .fallback = 100663296L,
+    .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
     .n_centers = 3UL,
@@ -147,7 +147,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x3e7aa1dbUL,
+    .crc = 0x413d38e7UL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
