@@ -5,8 +5,25 @@ chamber programme → air → thermal nodes → cavity → bias → noise → ro
 
 from __future__ import annotations
 
-from .campaign import simulate
-from .scenario import names, read
+from typing import TYPE_CHECKING, Any
+
 from .truth import Truth, read_truth
 
+if TYPE_CHECKING:
+    from .campaign import simulate
+    from .scenario import names, read
+
 __all__ = ["Truth", "names", "read", "read_truth", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    """What simulates is imported when it is asked for: who only reads the truth needs no solvers."""
+    if name in ("names", "read"):
+        from . import scenario
+
+        return getattr(scenario, name)
+    if name == "simulate":
+        from .campaign import simulate
+
+        return simulate
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc
 
 from gyrotc.train.data import TrainingData, average
 
@@ -52,7 +52,7 @@ def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
         return "too few samples to test the residual"
     runs, index = np.unique(run, return_inverse=True)
     total = np.bincount(index, weight * residual) / np.sqrt(np.bincount(index, weight))
-    if stats.chi2.sf(float(np.sum((total / sigma) ** 2)), len(runs)) < _SIGNIFICANCE:
+    if chdtrc(len(runs), float(np.sum((total / sigma) ** 2))) < _SIGNIFICANCE:
         return "run means of the residual scatter more than its noise allows"
     clipped = np.clip(scaled / sigma, -_CLIP, _CLIP)
     power = float(np.sum(clipped**2))
@@ -61,6 +61,6 @@ def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
         pairs = run[lag:] == run[:-lag]
         rho = float(np.sum(clipped[lag:][pairs] * clipped[:-lag][pairs])) / power
         statistic += n * (n + 2) * rho**2 / (n - lag)
-    if stats.chi2.sf(statistic, _LAGS) < _SIGNIFICANCE:
+    if chdtrc(_LAGS, statistic) < _SIGNIFICANCE:
         return "the residual is correlated in time"
     return ""
