@@ -58,7 +58,7 @@ real: setup
 ## training beside its peers, in an environment of its own (build/bench): docs/results.md
 bench: setup
 	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
-	@build/bench/bin/python -m pip install -q --disable-pip-version-check "./gen[bench]"
+	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
 ## remove what was built (not .venv)

@@ -15,7 +15,7 @@ from typing import Any
 from . import learning, pieces, problems, selection
 
 WIDTHS = (0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6)
-LIMIT_S = 300  # CPU seconds of a process; the system ends it there
+LIMIT_S = 150  # CPU seconds of a process; the system ends it there
 _SHORT_S = 1.0
 _REPEATS = 5
 

@@ -36,11 +36,11 @@ Say = Callable[[str], None]
 def speed(say: Say) -> dict[str, Any]:
     """All tables of the section on speed."""
     return {
+        "raw": _raw(say),
         "selection": [_selection(*cell, say) for cell in _SELECTIONS],
         "learning": [_learning(scenario, say) for scenario in ("paper", "paper-ripple-strong")],
         "kohonen": _each(pieces.KOHONEN, ["172800", "300"], "kohonen", say),
         "varpro": _each(pieces.VARPRO, [], "varpro", say),
-        "raw": _raw(say),
     }
 
 
