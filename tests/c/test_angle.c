@@ -1,0 +1,151 @@
+/* test_angle.c - bias times time as an angle, and what rounding leaves. */
+#include "test_num.h"
+
+/* The correction of the test table at 17.5 C, put in force. */
+static state_t in_force(num_t *bias)
+{
+    state_t state = started();
+
+    CHECK(feed(&state, C(17.5), 1) >= 0);
+    *bias = bias_of(&state);
+    return state;
+}
+
+/* What a call left over, exactly: a product of two floats fits in a double, one of two integers of
+ * 32 bits in 64. LIMIT: half a unit of the angle and, in float32, half a last place of an angle
+ * below 128 arcsec. */
+#if TEST_Q31
+typedef long long exact_t;
+#define MS 1000
+#define LONGEST 1000000000
+#define LIMIT 500000
+#define REST(bias, dt, angle) (((exact_t)(bias) * (dt)) - ((exact_t)(angle) * 1000000))
+#define IS_ON_GRID(angle) 1
+#else
+typedef double exact_t;
+#define MS 0.001F
+#define LONGEST 1000.0F
+#define LIMIT (0.7501 / 65536.0)
+#define REST(bias, dt, angle) (((exact_t)(bias) * (exact_t)(dt)) - (exact_t)(angle))
+#define IS_ON_GRID(angle) (((double)(angle) * 65536.0) == (double)(long)((double)(angle) * 65536.0))
+#endif
+
+/* Asks `calls` times, with the steps in turn: the sum is never further than LIMIT from
+ * bias * t. */
+static void sums_to_bias_times_time(const num_t *steps, int n_steps, int calls)
+{
+    num_t bias;
+    state_t state = in_force(&bias);
+    exact_t rest = 0;
+    int i;
+
+    for (i = 0; i < calls; i++) {
+        const num_t dt = steps[i % n_steps];
+        num_t angle = 0;
+
+        CHECK(FN(angle)(&state, dt, &angle) >= 0);
+        CHECK(IS_ON_GRID(angle));
+        rest += REST(bias, dt, angle);
+        CHECK((rest <= LIMIT) && (rest >= -LIMIT));
+    }
+}
+
+TEST(the_sum_stays_within_a_unit)
+{
+    static const num_t steps[7] = {MS, 10 * MS, MS / 7, 0, 1000 * MS, MS / 3, 6000 * MS};
+    int i;
+
+    for (i = 0; i < 7; i++) {
+        sums_to_bias_times_time(&steps[i], 1, 50000);
+    }
+    sums_to_bias_times_time(steps, 7, 100000);
+}
+
+TEST(it_returns_the_status_in_force)
+{
+    state_t state = started();
+    num_t angle = 1;
+
+    CHECK_INT(GTC_HELD, FN(angle)(&state, MS, &angle));
+    CHECK(same(0, angle));
+    CHECK_INT(GTC_WARMING, feed(&state, C(17.5), 1));
+    CHECK_INT(GTC_WARMING, FN(angle)(&state, MS, &angle));
+}
+
+TEST(bad_arguments_write_nothing)
+{
+    num_t bias;
+    state_t state = in_force(&bias);
+    const state_t before = state;
+    state_t none = state;
+    num_t angle = 7;
+
+    none.table = NULL;
+    CHECK_INT(GTC_E_ARG, FN(angle)(NULL, MS, &angle));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, MS, NULL));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&none, MS, &angle));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, MISSING, &angle));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, -MS, &angle));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, LONGEST + MS, &angle));
+    CHECK(same(7, angle));
+    CHECK(memcmp(&before, &state, sizeof state) == 0);
+}
+
+#if TEST_Q31
+TEST(an_angle_beyond_32_bits_is_refused)
+{
+    num_t bias;
+    state_t state = in_force(&bias);
+    num_t angle = 7;
+
+    /* 2147484 units a second are too many for 1000 s, and just not for 999.999 s. */
+    state.bias = 2147484;
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, LONGEST, &angle));
+    CHECK_INT(7, angle);
+    CHECK_INT(GTC_WARMING, FN(angle)(&state, 999999000, &angle));
+    CHECK_INT(2147481853L, angle);
+    state.bias = -2147484;
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, LONGEST, &angle));
+    CHECK_INT(GTC_WARMING, FN(angle)(&state, 999999000, &angle));
+}
+#else
+TEST(large_angles_carry_what_a_float_cannot_hold)
+{
+    static const float biases[4] = {7.5e6F, -7.4999995e6F, 1.0e5F, -123456.7F};
+    static const float steps[3] = {0.001F, 0.01F, 1000.0F};
+    int i;
+    int k;
+
+    for (i = 0; i < 12; i++) {
+        num_t bias;
+        state_t state = in_force(&bias);
+        double rest = 0.0;
+
+        state.bias = biases[i % 4];
+        for (k = 0; k < 20000; k++) {
+            float angle = 0.0F;
+            double size;
+
+            CHECK_INT(GTC_WARMING, FN(angle)(&state, steps[i % 3], &angle));
+            size = (angle < 0.0F) ? -(double)angle : (double)angle;
+            /* The product of two floats is exact in float64, and so is every rest. */
+            rest += ((double)state.bias * (double)steps[i % 3]) - (double)angle;
+            CHECK((rest <= (size / 16777216.0 * 1.0001)) && (rest >= (-size / 16777216.0 * 1.0001)));
+        }
+        CHECK(((double)state.angle[0] + (double)state.angle[1]) == rest);
+    }
+}
+#endif
+
+int main(void)
+{
+    RUN(the_sum_stays_within_a_unit);
+    RUN(it_returns_the_status_in_force);
+    RUN(bad_arguments_write_nothing);
+#if TEST_Q31
+    RUN(an_angle_beyond_32_bits_is_refused);
+#else
+    RUN(large_angles_carry_what_a_float_cannot_hold);
+#endif
+    return test_end();
+}
