@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -630,11 +631,27 @@ def summary(result: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Entry point: errors become one message on stderr and the exit status of interfaces.md."""
+    """Entry point: the command's exit status, without tearing the interpreter down.
+
+    Arrow's read-ahead threads may still hold a Python file when the interpreter goes; it would end them inside C++
+    code, which aborts the process after its work is done.
+    """
+    status = _status()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def _status() -> int:
+    """Runs the command; errors become one message on stderr and their exit status."""
     try:
         app(standalone_mode=True)
     except GyrotcError as error:
         print(f"gyrotc: {error}", file=sys.stderr)
-        sys.exit(error.exit_status)
+        return error.exit_status
     except BrokenPipeError:
-        sys.exit(0)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    return 0
