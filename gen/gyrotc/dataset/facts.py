@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from .records import EarthRate, Floats, Rows, Run
 
@@ -17,9 +18,13 @@ _CELL_ROWS = 5
 _HOLD_C_PER_MIN = 0.1
 _JUMP_SIGMAS = 10.0
 _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
+_HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
 _MAX_JUMPS = 20
 _OUTLIER_SIGMAS = 8.0
 _MAD_TO_SIGMA = 1.4826
+_PART = 2**16  # rows that are looked at together
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +98,11 @@ class RunFacts:
 def facts_of(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
-    time, temperature = rows.time_s[inside], rows.temperature_c[inside]
-    measured = inside & np.isfinite(rows.rate_dph)
-    rate = rows.rate_dph[measured]
+    time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
+    rate = _those(rows.rate_dph, inside & np.isfinite(rows.rate_dph))
     step = np.diff(time)
     gaps = step > _GAP_PERIODS * run.row_period_s
-    levels = np.unique(temperature)
+    levels = np.unique(temperature[_changes(temperature)])
     resolution = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
     cells_t, slopes = _cells(time, temperature, run.row_period_s)
     noise = _robust_sigma(np.diff(rate)) / np.sqrt(2.0)
@@ -122,7 +126,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         temperatures_c=cells_t,
         hold_share=float(np.mean(np.abs(slopes) < _HOLD_C_PER_MIN)) if len(slopes) else 1.0,
         mean_dph=float(rate.mean()) if len(rate) else 0.0,
-        largest_dph=float(np.abs(rate).max()) if len(rate) else 0.0,
+        largest_dph=float(max(rate.max(), -rate.min())) if len(rate) else 0.0,
         noise_dph=float(noise),
         outliers=_outliers(rate, float(noise)),
         stuck_s=_longest_stretch(rate) * run.row_period_s,
@@ -131,19 +135,32 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
     )
 
 
+def _those(values: Floats, chosen: Mask) -> Floats:
+    """The chosen values; the same array where that is all of them."""
+    return values if chosen.all() else values[chosen]
+
+
+def _changes(values: Floats) -> NDArray[np.int64]:
+    """Rows that differ from the one before, and the first row."""
+    return np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+
+
 def _robust_sigma(values: Floats) -> float:
-    """Standard deviation about 0 from the median magnitude, or the RMS where more than half are 0."""
+    """Standard deviation about 0 from the median magnitude, or the RMS where more than half are 0.
+
+    `values` are lost: they make room for the magnitudes.
+    """
     if len(values) == 0:
         return 0.0
-    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(values)))
+    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(values, out=values), overwrite_input=True))
     return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
 
 
 def _cells(time: Floats, temperature: Floats, period_s: float) -> tuple[Floats, Floats]:
     """Mean temperature of cells and its rate (C/min) by central differences; empty for fewer than three cells."""
     length = max(_CELL_S, _CELL_ROWS * period_s)
-    number = np.floor((time - time[0]) / length).astype(np.int64)
-    starts = np.flatnonzero(np.r_[True, np.diff(number) != 0])
+    number = (time - time[0]) / length
+    starts = _changes(np.floor(number, out=number))
     count = np.diff(np.r_[starts, len(time)])
     full = count * period_s >= 0.5 * length
     mean_t = (np.add.reduceat(temperature, starts) / count)[full]
@@ -154,41 +171,53 @@ def _cells(time: Floats, temperature: Floats, period_s: float) -> tuple[Floats, 
 
 
 def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, ...]:
-    """Steps that stand out from the steps around them, by noise, by resolution and by rate."""
+    """Steps that stand out from the steps around them, by noise, by resolution and by rate.
+
+    A thermometer that is slower than the rows holds its value; its step has had that time to grow.
+    """
     if len(temperature) < 7:
         return ()
-    step = np.diff(temperature)
-    around = np.median(sliding_window_view(np.pad(step, 2, mode="reflect"), 5), axis=1)
-    departure = np.abs(step - around)
+    departure = _departures(np.diff(temperature))
     noise = _MAD_TO_SIGMA * float(np.median(departure))
-    limit = _JUMP_SIGMAS * noise + 2.0 * resolution
-    found = np.flatnonzero((departure > limit) & (departure > _JUMP_C_PER_MIN / 60.0 * np.diff(time)))
+    found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
+    changes = _changes(temperature)
+    last = changes[np.searchsorted(changes, found, side="right") - 1]
+    taken = np.maximum(time[found + 1] - time[found], np.minimum(time[found + 1] - time[last], _HOLD_S))
+    jumps = found[departure[found] > _JUMP_C_PER_MIN / 60.0 * taken]
     return tuple(
-        Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in found[:_MAX_JUMPS]
+        Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS]
     )
+
+
+def _departures(step: Floats) -> Floats:
+    """Magnitudes of the differences from the median of the two before, the value itself, and the two after."""
+    padded = np.pad(step, 2, mode="reflect")
+    result = np.empty_like(step)
+    for start in range(0, len(step), _PART):
+        around = sliding_window_view(padded[start : start + _PART + 4], 5)
+        part = slice(start, start + len(around))
+        result[part] = np.abs(step[part] - np.partition(around, 2, axis=1)[:, 2])
+    return result
 
 
 def _outliers(rate: Floats, noise: float) -> int:
     """Rows that depart from both neighbours to the same side (at the ends: from the two next rows)."""
     if len(rate) < 3 or noise == 0.0:
         return 0
-    left = rate - np.r_[rate[2], rate[:-1]]
-    right = rate - np.r_[rate[1:], rate[-3]]
-    nearer = np.where(np.sign(left) == np.sign(right), np.minimum(np.abs(left), np.abs(right)), 0.0)
-    return int(np.sum(nearer > _OUTLIER_SIGMAS * noise))
+    limit = _OUTLIER_SIGMAS * noise
+    step = np.diff(np.r_[rate[2], rate, rate[-3]])
+    up, down = step > limit, step < -limit
+    return int(np.count_nonzero((up[:-1] & down[1:]) | (down[:-1] & up[1:])))
 
 
 def _longest_stretch(values: Floats) -> int:
     """Number of rows in the longest stretch of one identical value."""
     if len(values) == 0:
         return 0
-    edges = np.flatnonzero(np.r_[True, np.diff(values) != 0.0, True])
-    return int(np.diff(edges).max())
+    return int(np.diff(np.r_[_changes(values), len(values)]).max())
 
 
-def _constant(
-    rows: Rows, inside: np.ndarray[tuple[int], np.dtype[np.bool_]], rate: Floats
-) -> tuple[str, ...]:
-    columns = {"temperature": rows.temperature_c[inside], "rate": rate}
-    columns |= {f"channel {name}": values[inside] for name, values in rows.channels.items()}
+def _constant(rows: Rows, inside: Mask, rate: Floats) -> tuple[str, ...]:
+    columns = {"temperature": _those(rows.temperature_c, inside), "rate": rate}
+    columns |= {f"channel {name}": _those(values, inside) for name, values in rows.channels.items()}
     return tuple(name for name, values in columns.items() if len(values) and np.ptp(values) == 0.0)
