@@ -66,8 +66,10 @@ class Steps:
     mean: Numbers
 
     def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Index of the correction in force at each sample; -1 before the first."""
-        return np.asarray(np.searchsorted(self.at, samples, side="right") - 1)
+        """Index of the correction in force at each of the ascending `samples`; -1 before the first."""
+        first = np.searchsorted(samples, self.at, side="left")
+        made = np.bincount(first, minlength=samples.size + 1)[: samples.size]
+        return np.asarray(np.cumsum(made) - 1)
 
 
 def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:

@@ -85,14 +85,17 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     steps = follow(arithmetic, samples, settings)
     status, bits = _corrections(table, steps)
 
-    at_rows = steps.in_force(position) + 1
-    before = steps.in_force(np.maximum(position - 1, 0)) + 1
-    held = np.where(steps.believed[position], 0, _HELD)
+    in_force = steps.in_force(position) + 1
+    gaps = np.flatnonzero(shortened)
+    missed_status = np.zeros(shortened.size, dtype=np.int32)
+    missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | _HELD
+    held = np.where(steps.believed[position], np.int32(0), np.int32(_HELD))
+    at_rows = status[in_force]
     return Replay(
-        sample_status=(status[at_rows] | held).astype(np.int32),
-        status=status[at_rows],
-        bits=bits[at_rows],
-        missed_status=np.where(shortened > 0, status[before] | _HELD, 0).astype(np.int32),
+        sample_status=at_rows | held,
+        status=at_rows,
+        bits=bits[in_force],
+        missed_status=missed_status,
         block_valid=steps.valid[position // samples_per_block],
     )
 

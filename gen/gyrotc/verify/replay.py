@@ -7,7 +7,7 @@ file of the emulator's host), and so come the results out.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,22 +102,33 @@ def replay_on(target: Target, program: Path, history: History) -> Replayed:
         CheckFailed: The program did not run to its end.
     """
     word = np.dtype("<u4" if target.byte_order == "little" else ">u4")
-    stream = np.concatenate([history.missed[:, None].astype(word), history.channels.astype(word)], axis=1)
-    head = np.array([history.samples_per_block, len(stream)], dtype=word)
-    done = run_program(target, program, data=head.tobytes() + stream.astype(word).tobytes())
-    if done.returncode != 0 or len(done.stdout) != 12 * len(stream):
+    n = len(history.missed)
+    done = run_program(target, program, data=_stream(history, word))
+    if done.returncode != 0 or len(done.stdout) != 12 * n:
         raise CheckFailed(
             f"the replay ended with status {done.returncode} after {len(done.stdout) // 12} "
-            f"of {len(stream)} rows {done.stderr[:200]}"
+            f"of {n} rows {done.stderr[:200]}"
         )
-    got = np.frombuffer(done.stdout, dtype=word).astype(np.uint32).reshape(-1, 3)
     answers = history.reference
-    want = np.stack([answers.sample_status, answers.status, answers.bits.view(np.int32)], axis=1)
-    wrong = np.flatnonzero(np.any(got != want.view(np.uint32), axis=1))
-    first = tuple(_difference(int(k), got[k], want.view(np.uint32)[k]) for k in wrong[:_SHOWN_MISMATCHES])
-    return Replayed(got[:, 2], got[:, 1].view(np.int32), int(wrong.size), first)
+    want = (answers.sample_status.view(np.uint32), answers.status.view(np.uint32), answers.bits)
+    got = tuple(np.frombuffer(done.stdout, dtype=word).reshape(-1, 3).T)
+    wrong = np.flatnonzero((got[0] != want[0]) | (got[1] != want[1]) | (got[2] != want[2]))
+    first = tuple(_difference(int(k), got, want) for k in wrong[:_SHOWN_MISMATCHES])
+    bits, status = got[2].astype(np.uint32), got[1].astype(np.uint32).view(np.int32)
+    return Replayed(bits, status, int(wrong.size), first)
 
 
-def _difference(row: int, got: Words, want: Words) -> str:
-    texts = [" ".join(f"{word:08x}" for word in words) for words in (got, want)]
+def _stream(history: History, word: np.dtype[np.uint32]) -> bytes:
+    """Standard input of the replay program."""
+    n, n_channels = history.channels.shape
+    stream = np.empty(2 + n * (1 + n_channels), dtype=word)
+    stream[:2] = history.samples_per_block, n
+    rows = stream[2:].reshape(n, 1 + n_channels)
+    rows[:, 0] = history.missed
+    rows[:, 1:] = history.channels
+    return stream.tobytes()
+
+
+def _difference(row: int, got: Sequence[Words], want: Sequence[Words]) -> str:
+    texts = [" ".join(f"{int(words[row]):08x}" for words in side) for side in (got, want)]
     return f"row {row}: statuses and bits {texts[0]}, reference {texts[1]}"
