@@ -27,6 +27,7 @@ __all__ = ["CsvFile"]
 
 _BLOCK_BYTES = 2**20
 _LONGEST_LINE = 2**20
+_LF, _CR = 10, 13
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
 
@@ -52,34 +53,34 @@ class CsvFile(Source):
             with path.open("rb") as file:
                 head = file.readline(_LONGEST_LINE)
             self.names = _header(name, head)
+            self._head = len(head)
             self.size, self.torn = _without_torn_line(path, size, len(head), len(self.names))
             self.keep_as_read()
         except OSError as error:
             raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
 
     def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
-        """As `Source.read`, fast: by pyarrow, one block after the other."""
+        """As `Source.read`, fast: by pyarrow, a few lines at a time.
+
+        pyarrow's own streaming reader reads ahead in threads of its own, which outlive a file given up half-way.
+        """
         unique = [f"{index} {name}" for index, name in enumerate(self.names)]
+        options = pacsv.ConvertOptions(
+            column_types=dict.fromkeys(unique, pa.float64()),
+            include_columns=[unique[self.names.index(name)] for name in columns],
+        )
+        at_once = pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=unique)
         most = self._most_rows()
         read = {name: np.empty(most) for name in columns}
         at = 0
         try:
-            with Prefix(self.path, self.size) as prefix:
-                for batch in pacsv.open_csv(
-                    prefix,
-                    pacsv.ReadOptions(
-                        use_threads=False, block_size=_BLOCK_BYTES, skip_rows=1, column_names=unique
-                    ),
-                    convert_options=pacsv.ConvertOptions(
-                        column_types=dict.fromkeys(unique, pa.float64()),
-                        include_columns=[unique[self.names.index(name)] for name in columns],
-                    ),
-                ):
-                    for column, values in zip(read.values(), batch.columns, strict=True):
-                        if values.null_count:
-                            return None
-                        column[at : at + len(batch)] = values.to_numpy()
-                    at += len(batch)
+            for lines in self._blocks_of_lines():
+                table = pacsv.read_csv(pa.BufferReader(lines), at_once, convert_options=options)
+                for column, values in zip(read.values(), table.columns, strict=True):
+                    if values.null_count:
+                        return None
+                    column[at : at + len(table)] = values.to_numpy()
+                at += len(table)
         except pa.ArrowInvalid:
             return None
         return {name: column[:at] for name, column in read.items()}
@@ -89,8 +90,29 @@ class CsvFile(Source):
         ends = 0
         with Prefix(self.path, self.size) as prefix:
             while block := prefix.read(_BLOCK_BYTES):
-                ends += block.count(b"\n") + block.count(b"\r")
+                octets = np.frombuffer(block, dtype=np.uint8)
+                ends += np.count_nonzero(octets == _LF) + np.count_nonzero(octets == _CR)
         return ends + 1
+
+    def _blocks_of_lines(self) -> Iterator[bytes]:
+        """Whole lines below the header, about `_BLOCK_BYTES` at a time.
+
+        Raises:
+            pa.ArrowInvalid: A line is far too long.
+        """
+        with Prefix(self.path, self.size) as prefix:
+            prefix.read(self._head)
+            rest = b""
+            while block := prefix.read(_BLOCK_BYTES):
+                block = rest + block
+                end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
+                if end == 0 and len(block) > _LONGEST_LINE:
+                    raise pa.ArrowInvalid("no line end")
+                if block[:end].strip():
+                    yield block[:end]
+                rest = block[end:]
+            if rest.strip():
+                yield rest
 
     def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
         """As `Source.scan`, line by line."""
