@@ -83,10 +83,12 @@ typedef struct {
     float mean;                    /* last valid block mean, C */
     float bias;                    /* in force, deg/h */
     float angle[2];                /* carried remainder, arcsec */
-    float window[GTC_MAX_SLOPE_BLOCKS];  /* block means, C */
-    float channel[GTC_MAX_TERMS];        /* block sums of auxiliary channels */
-    float term[GTC_MAX_TERMS][2];        /* states of the terms */
-    float elapsed;                 /* blocks since init */
+    uint_least32_t elapsed;        /* blocks since init */
+    uint_least32_t off_blocks;     /* blocks without power before it */
+    float window[GTC_MAX_SLOPE_BLOCKS];         /* block means, newest first, C */
+    float term[GTC_MAX_TERMS][2];               /* states of the terms */
+    float channel[GTC_MAX_TERMS];               /* block sums of auxiliary channels ... */
+    uint_least32_t channel_valid[GTC_MAX_TERMS]; /* ... and samples in them */
 } gtc_f32_state_t;
 
 typedef struct {
@@ -110,14 +112,16 @@ typedef struct {
     int_least32_t bias;            /* 2^-bias_frac_bits deg/h */
     int_least64_t sum;
     int_least64_t angle;           /* carried remainder */
+    uint_least32_t elapsed;
+    uint_least32_t off_blocks;
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS];
-    int_least64_t channel[GTC_MAX_TERMS];
     int_least32_t term[GTC_MAX_TERMS][2];
-    int_least32_t elapsed;
+    int_least64_t channel[GTC_MAX_TERMS];
+    uint_least32_t channel_valid[GTC_MAX_TERMS];
 } gtc_q31_state_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (12 + GTC_MAX_SLOPE_BLOCKS + (3 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (12 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
  * no flushed subnormals that the table needs), checksum over its values, its known answers.
@@ -150,7 +154,7 @@ GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *t
                                 uint_least32_t samples_per_block);
 
 /* One sample: channels[0] is the temperature, further ones (n_channels of the table) are the
- * auxiliary channels. A missing, stuck or impossible temperature is held, never an error.
+ * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit). A missing, stuck or impossible temperature is held, never an error.
  * Returns the status of the correction in force, with GTC_HELD if this sample was not believed;
  * GTC_E_ARG for a NULL pointer.
  * Cost: about 30 operations; the call that opens a block also makes the correction (one
@@ -168,16 +172,18 @@ GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
 /* The angle to subtract from an angle increment over dt; what rounding leaves is carried on.
- * f32: dt in s, angle in arcsec, a multiple of 2^-16. q31: dt in microseconds, angle in
- * 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t.
- * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s). */
+ * f32: dt in s, angle in arcsec, a multiple of 2^-16 while it is below 64. q31: dt in microseconds,
+ * angle in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t.
+ * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or, in
+ * q31, an angle beyond 32 bits). */
 GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);
 GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_state_t *state, int_least32_t dt, int_least32_t *angle);
 
 /* State over power cycles. `save` writes GTC_SAVE_WORDS words with version, the table's checksum
  * and a CRC. `restore` starts `state` for `table` as gtc_<n>_init() would, then takes over what
- * survives `off_blocks` blocks without power (memories and plays always, the slope window only
- * if off_blocks is 0); a torn or foreign image leaves `state` unwritten.
+ * survives `off_blocks` blocks without power: memories (they go on relaxing towards the first
+ * temperature) and plays always; the slope window and the correction, held, only if off_blocks is
+ * 0. A torn or foreign image leaves `state` unwritten.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE or GTC_E_ID. */
 GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
 GTC_MUST_CHECK int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);

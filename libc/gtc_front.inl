@@ -8,29 +8,62 @@
 /* Samples since the last believed one are counted no further than this. */
 #define MAX_GAP 65535UL
 
+/* Blocks since the start, too: all warm-up is over then. */
+#define MAX_ELAPSED 0xFFFFFFUL
+
 /* So many suspects in a row that agree are the new truth. */
 #define NEW_TRUTH 3U
 
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
+/* Lets every term take note that a block of mean temperature state->mean ends. */
+static void FN(step_terms)(STATE *state)
+{
+    const TABLE *const table = state->table;
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        table->term_code[i]->step(state, i, state->mean);
+    }
+}
+
 /* Makes the correction for an input and puts it in force. */
 static void FN(correct)(STATE *state, NUM temp, NUM slope, int_least32_t remarks)
 {
+    const TABLE *const table = state->table;
+    EFFECT effect;
     NUM bias = NUM_ZERO;
-    const int status = FN(map)(state->table, temp, slope, &bias);
+    uint_least32_t i;
+    int status;
 
-    state->bias = bias;
-    state->status = remarks | (int_least32_t)status;
+    effect.temp = temp;
+    effect.slope = slope;
+    effect.added = NUM_ZERO;
+    effect.remarks = remarks;
+    for (i = 0U; i < table->n_terms; i++) {
+        table->term_code[i]->apply(state, i, temp, &effect);
+    }
+    status = FN(map)(table, effect.temp, effect.slope, &bias);
+    state->bias = FN(total)(bias, effect.added);
+    state->status = effect.remarks | (int_least32_t)status;
 }
 
 /* Begins again at x: slope 0, nothing in the window, the block's samples so far dropped. */
 static void FN(restart)(STATE *state, NUM x)
 {
+    const TABLE *const table = state->table;
+    uint_least32_t i;
+
     state->filled = 0U;
     state->window_valid = 0U;
     state->held_blocks = 0U;
     state->valid = 0U;
     state->mean = x;
+    if (state->gap == 0U) {
+        for (i = 0U; i < table->n_terms; i++) {
+            table->term_code[i]->begin(state, i, x);
+        }
+    }
     FN(correct)(state, x, NUM_ZERO, GTC_WARMING);
 }
 
@@ -91,6 +124,7 @@ static void FN(bridge)(STATE *state)
     const TABLE *const table = state->table;
 
     FN(push)(state, 0U);
+    FN(step_terms)(state);
     if (state->held_blocks <= table->hold_blocks) {
         state->held_blocks++;
     }
@@ -102,9 +136,16 @@ static void FN(bridge)(STATE *state)
     }
 }
 
+/* Blocks that have passed since the start. */
+static void FN(pass)(STATE *state, uint_least32_t blocks)
+{
+    state->elapsed = ((MAX_ELAPSED - state->elapsed) > blocks) ? (state->elapsed + blocks) : MAX_ELAPSED;
+}
+
 /* The running block is complete: its mean and slope make the next correction. */
 static void FN(close)(STATE *state)
 {
+    FN(pass)(state, 1U);
     if (state->gap == 0U) {
         /* nothing was ever believed: no correction yet */
     } else if ((2U * state->valid) >= state->samples_per_block) {
@@ -114,6 +155,7 @@ static void FN(close)(STATE *state)
         state->mean = FN(mean)(state->base, state->sum, state->valid);
         state->held_blocks = 0U;
         FN(push)(state, 1U);
+        FN(step_terms)(state);
         remarks = FN(window_slope)(state, &slope);
         FN(correct)(state, state->mean, slope, remarks);
     } else {
@@ -212,6 +254,7 @@ static int FN(take)(STATE *state, NUM x)
 int FN(init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
 {
     const STATE zero = {0};
+    uint_least32_t i;
 
     if ((state == NULL) || (table == NULL) || (samples_per_block < 1U)
         || (samples_per_block > MAX_SAMPLES_PER_BLOCK)) {
@@ -226,11 +269,16 @@ int FN(init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
     state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
     state->received = NUM_MISSING_BITS;
     state->status = GTC_HELD;
+    for (i = 0U; i < GTC_MAX_TERMS; i++) {
+        state->term[i][0] = FN(missing)();
+        state->term[i][1] = FN(missing)();
+    }
     return GTC_OK;
 }
 
 int FN(sample)(STATE *state, const NUM *channels)
 {
+    uint_least32_t i;
     int remark;
 
     if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
@@ -240,6 +288,11 @@ int FN(sample)(STATE *state, const NUM *channels)
         FN(close)(state);
     }
     state->position++;
+    for (i = 0U; i < state->table->n_terms; i++) {
+        const uint_least32_t channel = state->table->terms[(i * GTC_TERM_WORDS) + 1U].bits;
+
+        state->table->term_code[i]->take(state, i, channels[channel]);
+    }
     remark = FN(take)(state, channels[0]);
     return (int)state->status | remark;
 }
@@ -260,6 +313,7 @@ int FN(missed)(STATE *state, uint_least32_t count)
     blocks = count / state->samples_per_block;
     if (blocks > most) {
         count -= (blocks - most) * state->samples_per_block;
+        FN(pass)(state, blocks - most);
     }
     state->suspects = 0U;
     FN(hold)(state, count);

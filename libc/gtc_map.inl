@@ -34,6 +34,12 @@ int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     if (!FN(is_covered)(table, &in)) {
         status |= GTC_UNCOVERED;
     }
+#if GTC_WITH_BANK
+    if (table->n_networks > 1U) {
+        *bias = FN(blend)(table, &in);
+        return status;
+    }
+#endif
     *bias = FN(network)(table, table->networks, table->centers, &in);
     return status;
 }

@@ -21,6 +21,7 @@
 #define FN(name) gtc_f32_##name
 #define TABLE gtc_f32_table_t
 #define STATE gtc_f32_state_t
+#define EFFECT gtc_f32_effect_t
 #define NUM float
 #define WIDE float
 #define NUM_ZERO 0.0F
@@ -47,6 +48,14 @@ static inline uint_least32_t FN(bits)(float x)
 static inline int FN(is_missing)(float x)
 {
     return ((FN(bits)(x) & 0x7F800000UL) == 0x7F800000UL) ? 1 : 0;
+}
+
+static inline float FN(missing)(void)
+{
+    gtc_word_t word;
+
+    word.bits = NUM_MISSING_BITS;
+    return word.value;
 }
 
 /* ---- the map ---------------------------------------------------------------------------- */
@@ -129,11 +138,30 @@ static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT 
     return status;
 }
 
-/* acc + weight * 2^(-u/64), u of the center's record; from u = 2048 on, or where u is not a number, acc. */
-static inline float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
+/* 2^(-u/64), u >= 0; 0 from 2048 on, and where u is not a number. */
+static inline float FN(exp2)(float u)
 {
     gtc_word_t whole;
     gtc_word_t e;
+    float f;
+
+    whole.value = u + F32_ROUND;
+    if (whole.bits >= (F32_ROUND_BITS + F32_CUT)) {
+        return 0.0F;
+    }
+    e.bits = FN(exp2_table)[whole.bits & 63U] - ((whole.bits << 17) & 0xFFFFFFFFU);
+    f = whole.value - F32_ROUND;
+    f = u - f;
+    f = f - F32_H;
+    f = f * f;
+    f = f + F32_G;
+    f = e.value * f;
+    return f;
+}
+
+/* acc + weight * 2^(-u/64), u of the center's record. */
+static inline float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
+{
     float u;
     float f;
 
@@ -144,17 +172,7 @@ static inline float FN(gaussian)(float acc, const gtc_word_t *center, const POIN
     f = f * center[3].value;
     f = f * f;
     u = u + f;
-    whole.value = u + F32_ROUND;
-    if (whole.bits >= (F32_ROUND_BITS + F32_CUT)) {
-        return acc;
-    }
-    e.bits = FN(exp2_table)[whole.bits & 63U] - ((whole.bits << 17) & 0xFFFFFFFFU);
-    f = whole.value - F32_ROUND;
-    f = u - f;
-    f = f - F32_H;
-    f = f * f;
-    f = f + F32_G;
-    f = e.value * f;
+    f = FN(exp2)(u);
     f = center[4].value * f;
     f = acc + f;
     return f;
@@ -216,6 +234,71 @@ static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_lea
     cell[0] = FN(cell)(in->temp, &table->envelope[0], n[0]);
     cell[1] = FN(cell)(in->slope, &table->envelope[2], n[1]);
 }
+
+/* ---- the bank of networks --------------------------------------------------------------- */
+
+#if GTC_WITH_BANK
+#define SHARE float
+#define FULL_SHARE 1.0F
+#define IN_TEMP(in) ((in)->temp)
+#define IN_SLOPE(in) ((in)->slope)
+
+/* Sum of shares times results, and of shares. */
+typedef struct {
+    float total;
+    float share;
+} FN(blend_t);
+#define BLEND FN(blend_t)
+
+/* Result of a table with several networks. */
+float FN(blend)(const TABLE *table, const POINT *in);
+
+static inline void FN(edges)(const TABLE *table, float edges[4])
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < 4U; i++) {
+        edges[i] = table->envelope[i].value;
+    }
+}
+
+static inline float FN(lesser)(float a, float b)
+{
+    return (a < b) ? a : b;
+}
+
+/* Where x is on the way between two different numbers; 0 before `from`. */
+static inline float FN(fraction)(float from, float x, float to)
+{
+    float way;
+    float whole;
+
+    way = x - from;
+    whole = to - from;
+    way = way / whole;
+    return (way > 0.0F) ? way : 0.0F;
+}
+
+static inline BLEND FN(mixed)(BLEND blend, float share, float bias)
+{
+    float product;
+
+    product = share * bias;
+    blend.total = blend.total + product;
+    blend.share = blend.share + share;
+    return blend;
+}
+
+static inline float FN(unmixed)(BLEND blend, float otherwise)
+{
+    float bias = otherwise;
+
+    if (blend.share > 0.0F) {
+        bias = blend.total / blend.share;
+    }
+    return bias;
+}
+#endif
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
@@ -288,6 +371,118 @@ static inline float FN(quotient)(float num, uint_least32_t den)
 
     q = num / divisor;
     return q;
+}
+
+/* bias + what the terms add */
+static inline float FN(total)(float bias, float added)
+{
+    float total;
+
+    total = bias + added;
+    return total;
+}
+
+/* ---- the terms -------------------------------------------------------------------------- */
+
+static inline float FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
+{
+    return state->table->terms[(term * GTC_TERM_WORDS) + 2U + k].value;
+}
+
+/* First-order memory: z, and the number kept for more digits (here none). */
+static inline void FN(settle)(float z[2], float x)
+{
+    z[0] = x;
+    z[1] = 0.0F;
+}
+
+/* z + gain (x - z) */
+static inline void FN(follow)(float z[2], float x, float gain)
+{
+    float d;
+
+    d = x - z[0];
+    d = gain * d;
+    z[0] = z[0] + d;
+}
+
+/* What is left of a difference after so many blocks, each of which takes the share `gain`. */
+static inline float FN(power)(float gain, uint_least32_t blocks)
+{
+    float factor;
+    float left = 1.0F;
+
+    factor = 1.0F - gain;
+    for (; (blocks != 0U) && (left > 0x1p-30F); blocks >>= 1) {
+        if ((blocks & 1U) != 0U) {
+            left = left * factor;
+        }
+        factor = factor * factor;
+    }
+    left = 1.0F - left;
+    return left;
+}
+
+/* factor (a - b) */
+static inline float FN(scaled_difference)(float a, float b, float factor)
+{
+    float d;
+
+    d = a - b;
+    d = factor * d;
+    return d;
+}
+
+/* rate (a - b), a slope. */
+static inline float FN(slope_of)(float a, float b, float rate)
+{
+    return FN(scaled_difference)(a, b, rate);
+}
+
+/* amplitude * cos(2 pi (x * frequency + phase)): the phase in turns, reduced to its fraction. */
+static inline float FN(wave)(float x, float frequency, float phase, float amplitude)
+{
+    float turns;
+    float whole;
+    float t;
+    float s;
+    float h;
+
+    turns = x * frequency;
+    turns = turns + phase;
+    whole = turns + F32_ROUND;
+    whole = whole - F32_ROUND;
+    t = turns - whole;
+    if (t < 0.0F) {
+        t = -t;
+    }
+    t = 4.0F * t;
+    t = 1.0F - t;
+    /* sin(pi/2 t) = cos(2 pi turns), 3.4e-9 */
+    s = t * t;
+    h = 0x1.3c4b2cp-13F * s;
+    h = h - 0x1.3232fap-8F;
+    h = h * s;
+    h = h + 0x1.46676ep-4F;
+    h = h * s;
+    h = h - 0x1.4abbb6p-1F;
+    h = h * s;
+    h = h + 0x1.921fb4p+0F;
+    h = h * t;
+    h = amplitude * h;
+    return h;
+}
+
+/* amplitude * exp(-blocks * gain) */
+static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitude)
+{
+    const float n = (float)blocks;
+    float value;
+
+    value = n * gain;
+    value = FN(exp2)(value);
+    value = amplitude * value;
+    return value;
 }
 
 #endif /* GTC_NUM_F32_H_INCLUDED */

@@ -18,6 +18,7 @@
 #define FN(name) gtc_q31_##name
 #define TABLE gtc_q31_table_t
 #define STATE gtc_q31_state_t
+#define EFFECT gtc_q31_effect_t
 #define NUM int_least32_t
 #define WIDE int_least64_t
 #define NUM_ZERO 0
@@ -50,6 +51,11 @@ static inline uint_least32_t FN(bits)(int_least32_t x)
 static inline int FN(is_missing)(int_least32_t x)
 {
     return (x == GTC_TEMP_MISSING) ? 1 : 0;
+}
+
+static inline int_least32_t FN(missing)(void)
+{
+    return GTC_TEMP_MISSING;
 }
 
 /* With H, t in 2^-24 and G in 2^-16: ((H - t)^2 + G) table[i] = 2^(-(i + t)/64) (1 + 6.7e-9), 0 <= t < 1.
@@ -310,8 +316,6 @@ static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *ne
     return bias.integer;
 }
 
-/* ---- the front end ---------------------------------------------------------------------- */
-
 /* num / den, rounded to nearest, halves away from zero; den > 0. */
 static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
 {
@@ -320,6 +324,63 @@ static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
 
     return (num < 0) ? -q : q;
 }
+
+/* ---- the bank of networks --------------------------------------------------------------- */
+
+#if GTC_WITH_BANK
+#define SHARE int_least32_t
+#define FULL_SHARE 0x1000000 /* 1 in 2^-24 */
+#define IN_TEMP(in) ((int_least32_t)(in)->x_temp)
+#define IN_SLOPE(in) ((int_least32_t)(in)->x_slope)
+
+/* Sum of shares times results, and of shares. */
+typedef struct {
+    int_least64_t total;
+    uint_least32_t share;
+} FN(blend_t);
+#define BLEND FN(blend_t)
+
+/* Result of a table with several networks. */
+int_least32_t FN(blend)(const TABLE *table, const POINT *in);
+
+/* Regions are in positions; so are the edges of the envelope. */
+static inline void FN(edges)(const TABLE *table, int_least32_t edges[4])
+{
+    (void)table;
+    edges[0] = 0;
+    edges[1] = 65535;
+    edges[2] = 0;
+    edges[3] = 65535;
+}
+
+static inline int_least32_t FN(lesser)(int_least32_t a, int_least32_t b)
+{
+    return (a < b) ? a : b;
+}
+
+/* Where x is on the way between two different positions, in 2^-24; 0 before `from`. */
+static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, int_least32_t to)
+{
+    const int_least32_t way = (to > from) ? (x - from) : (from - x);
+    const int_least32_t whole = (to > from) ? (to - from) : (from - to);
+
+    return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
+}
+
+static inline BLEND FN(mixed)(BLEND blend, int_least32_t share, int_least32_t bias)
+{
+    blend.total += (int_least64_t)share * bias;
+    blend.share += (uint_least32_t)share;
+    return blend;
+}
+
+static inline int_least32_t FN(unmixed)(BLEND blend, int_least32_t otherwise)
+{
+    return (blend.share != 0U) ? (int_least32_t)FN(divided)(blend.total, blend.share) : otherwise;
+}
+#endif
+
+/* ---- the front end ---------------------------------------------------------------------- */
 
 static inline int_least32_t FN(step_per_sample)(const TABLE *table, uint_least32_t samples_per_block)
 {
@@ -364,6 +425,116 @@ static inline int_least32_t FN(quotient)(int_least64_t num, uint_least32_t den)
 {
     GTC_ASSERT_RANGE(gtc_q31_is_32_bits(FN(divided)(num, den)));
     return (int_least32_t)FN(divided)(num, den);
+}
+
+/* The nearest number of 32 bits, the mark of a missing one left out. */
+static inline int_least32_t FN(saturated)(int_least64_t x)
+{
+    int_least64_t y = x;
+
+    if (y > 2147483647) {
+        y = 2147483647;
+    } else if (y < -2147483647) {
+        y = -2147483647;
+    } else {
+        /* it fits */
+    }
+    return (int_least32_t)y;
+}
+
+/* bias + what the terms add */
+static inline int_least32_t FN(total)(int_least32_t bias, int_least64_t added)
+{
+    return FN(saturated)(bias + added);
+}
+
+/* ---- the terms -------------------------------------------------------------------------- */
+
+static inline int_least32_t FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
+{
+    return state->table->terms[(term * GTC_TERM_WORDS) + 2U + k].integer;
+}
+
+/* floor(x / 2^n) */
+static inline int_least64_t FN(floored)(int_least64_t x, uint_least32_t n)
+{
+    return (x >= 0) ? (int_least64_t)((uint_least64_t)x >> n)
+                    : (-(int_least64_t)((uint_least64_t)(-(x + 1)) >> n) - 1);
+}
+
+/* First-order memory: z in 2^-16 C, and its fraction in 2^-32 C. */
+static inline void FN(settle)(int_least32_t z[2], int_least32_t x)
+{
+    z[0] = x;
+    z[1] = 0;
+}
+
+/* z + gain (x - z), gain in 2^-31 */
+static inline void FN(follow)(int_least32_t z[2], int_least32_t x, int_least32_t gain)
+{
+    int_least64_t fine = ((int_least64_t)z[0] * 65536) + z[1];
+    const int_least64_t d = ((int_least64_t)x * 65536) - fine;
+
+    fine += FN(floored)(FN(floored)(d, 10U) * gain, 21U);
+    z[0] = (int_least32_t)FN(floored)(fine, 16U);
+    z[1] = (int_least32_t)(fine - ((int_least64_t)z[0] * 65536));
+}
+
+/* What is left of a difference after so many blocks, each of which takes the share `gain`. */
+static inline int_least32_t FN(power)(int_least32_t gain, uint_least32_t blocks)
+{
+    uint_least32_t factor = 0x7FFFFFFFU - (uint_least32_t)gain;
+    uint_least32_t left = 0x7FFFFFFFU;
+
+    for (; blocks != 0U; blocks >>= 1) {
+        if ((blocks & 1U) != 0U) {
+            left = (uint_least32_t)(((uint_least64_t)left * factor) >> 31);
+        }
+        factor = (uint_least32_t)(((uint_least64_t)factor * factor) >> 31);
+    }
+    return (int_least32_t)(0x7FFFFFFFU - left);
+}
+
+/* factor (a - b), factor in units of the bias for each C */
+static inline int_least64_t FN(scaled_difference)(int_least32_t a, int_least32_t b, int_least32_t factor)
+{
+    return FN(floored)(((int_least64_t)a - b) * factor, 16U);
+}
+
+/* rate (a - b), a slope; rate in 2^-24 */
+static inline int_least32_t FN(slope_of)(int_least32_t a, int_least32_t b, int_least32_t rate)
+{
+    return FN(saturated)(FN(floored)(((int_least64_t)a - b) * rate, 24U));
+}
+
+/* amplitude * exp(-blocks * gain), gain in 2^-28 of a factor 1/2 */
+static inline int_least64_t FN(fading)(uint_least32_t blocks, int_least32_t gain, int_least32_t amplitude)
+{
+    const uint_least64_t u = ((uint_least64_t)blocks * (uint_least32_t)gain) >> 4;
+
+    if (u > Q31_LAST) {
+        return 0;
+    }
+    return FN(floored)((int_least64_t)amplitude * FN(exp2)((uint_least32_t)u, Q31_G), 29U);
+}
+
+/* amplitude * cos(2 pi (x * frequency + phase)); frequency in 2^-32 turns for each C, phase in 2^-32. */
+static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, int_least32_t phase,
+                                     int_least32_t amplitude)
+{
+    const int_least64_t turns = FN(floored)((int_least64_t)x * frequency, 16U) + phase;
+    const uint_least32_t part = (uint_least32_t)((uint_least64_t)turns & 0xFFFFFFFFU);
+    /* A quarter turn less the distance from the nearest whole turn. */
+    const int_least64_t t = 1073741824 - (int_least64_t)((part > 0x80000000U) ? (0U - part) & 0xFFFFFFFFU : part);
+    const int_least64_t s = (t * t) >> 30;
+    int_least64_t h = 161942;
+
+    h = FN(floored)(h * s, 30U) - 5016767;
+    h = FN(floored)(h * s, 30U) + 85564854;
+    h = FN(floored)(h * s, 30U) - 693597876;
+    h = FN(floored)(h * s, 30U) + 1686629674;
+    h = FN(floored)(h * t, 30U);
+    return FN(floored)(amplitude * h, 30U);
 }
 
 #endif /* GTC_NUM_Q31_H_INCLUDED */

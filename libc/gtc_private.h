@@ -26,6 +26,58 @@ uint_least32_t gtc_crc_word(uint_least32_t crc, uint_least32_t word);
 /* The same for n words of a table; n may be 0. */
 uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_least32_t n);
 
+/* What terms make of the inputs and add to the bias. */
+typedef struct {
+    float temp;
+    float slope;
+    float added;
+    int_least32_t remarks;
+} gtc_f32_effect_t;
+
+typedef struct {
+    int_least32_t temp;
+    int_least32_t slope;
+    int_least64_t added;
+    int_least32_t remarks;
+} gtc_q31_effect_t;
+
+/* Functions of one kind of term; i is the number of the term in its table.
+ * begin: first believed temperature x; take: a sample x of the term's channel; step: a block ends,
+ * of mean temperature x; apply: changes inputs, adds to the bias, at temperature x. */
+struct gtc_f32_term_code {
+    uint_least32_t kind;
+    uint_least32_t survives; /* 1: its state is taken over after a time without power */
+    void (*begin)(gtc_f32_state_t *state, uint_least32_t i, float x);
+    void (*take)(gtc_f32_state_t *state, uint_least32_t i, float x);
+    void (*step)(gtc_f32_state_t *state, uint_least32_t i, float x);
+    void (*apply)(const gtc_f32_state_t *state, uint_least32_t i, float x, gtc_f32_effect_t *effect);
+};
+
+struct gtc_q31_term_code {
+    uint_least32_t kind;
+    uint_least32_t survives;
+    void (*begin)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
+    void (*take)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
+    void (*step)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
+    void (*apply)(const gtc_q31_state_t *state, uint_least32_t i, int_least32_t x,
+                  gtc_q31_effect_t *effect);
+};
+
+extern const struct gtc_f32_term_code gtc_f32_term_memory;
+extern const struct gtc_f32_term_code gtc_f32_term_play;
+extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
+extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
+extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
+extern const struct gtc_q31_term_code gtc_q31_term_memory;
+extern const struct gtc_q31_term_code gtc_q31_term_play;
+extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
+extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
+extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
+
+/* For hooks that a kind of term does not need. */
+void gtc_f32_nothing(gtc_f32_state_t *state, uint_least32_t i, float x);
+void gtc_q31_nothing(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
+
 /* 1 if this build of the runtime can use the table, else 0. */
 int gtc_f32_is_usable(const gtc_f32_table_t *table);
 int gtc_q31_is_usable(const gtc_q31_table_t *table);

@@ -69,10 +69,31 @@ static int FN(envelope_fits)(const TABLE *table)
             && (MEMBER(table->envelope[2]) <= MEMBER(table->envelope[3]))) ? 1 : 0;
 }
 
+/* Every term comes with its code and reads a channel that is there. */
+static int FN(terms_fit)(const TABLE *table)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+
+        if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != term[0].bits)
+            || (term[1].bits >= table->n_channels)) {
+            return 0;
+        }
+    }
+    return ((table->n_channels >= 1U) && (table->n_channels <= (1U + GTC_MAX_TERMS))) ? 1 : 0;
+}
+
+/* One network, or several where the code of the hand-over is there. */
+static int FN(networks_fit)(const TABLE *table)
+{
+    return ((table->n_networks == 1U) || ((GTC_WITH_BANK != 0) && (table->n_networks > 1U))) ? 1 : 0;
+}
+
 int FN(is_usable)(const TABLE *table)
 {
     return ((table->layout == GTC_TABLE_LAYOUT) && FN(arrays_fit)(table)
-            && FN(settings_fit)(table) && (table->n_networks == 1U) && (table->n_terms == 0U)
-            && (table->n_channels == 1U) && FN(centers_fit)(table)
-            && FN(envelope_fits)(table)) ? 1 : 0;
+            && FN(settings_fit)(table) && FN(networks_fit)(table) && FN(terms_fit)(table)
+            && FN(centers_fit)(table) && FN(envelope_fits)(table)) ? 1 : 0;
 }

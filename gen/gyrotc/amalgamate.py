@@ -34,9 +34,16 @@ def runtime_folders() -> tuple[Path, Path]:
     raise InputError(str(here), "the C runtime is missing", "folders include and libc")
 
 
-def amalgamate(include_dir: Path, libc_dir: Path) -> tuple[str, str]:
-    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone."""
+def amalgamate(include_dir: Path, libc_dir: Path, *, bank: bool = False) -> tuple[str, str]:
+    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone.
+
+    Args:
+        include_dir, libc_dir: As `runtime_folders` gives them.
+        bank: Banks of networks are compiled in by default (GTC_WITH_BANK 1).
+    """
     header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
+    if bank:
+        header = header.replace("#define GTC_WITH_BANK 0", "#define GTC_WITH_BANK 1")
     common = sorted(p for p in libc_dir.glob("gtc_*.c") if not _arithmetic(p.name))
     parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
     seen: set[str] = set()

@@ -220,7 +220,7 @@ def emit_texts(
         "main.c": "main.c.j2",
     }
     texts = {name: environment.get_template(t).render(values).encode("ascii") for name, t in named.items()}
-    header, source = amalgamate(*runtime_folders())
+    header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"

@@ -17,6 +17,10 @@ _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing
 FLAGS = ["-std=c99", "-pedantic", "-ffp-contract=off", *(f"-W{name}" for name in _WARNINGS.split())]
 
 
+TERMS = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
+ALL = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")
+
+
 def _table_struct() -> type[ctypes.Structure]:
     """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
@@ -103,6 +107,9 @@ class Runtime:
             setattr(struct, name, words.ctypes.data if words.size else None)
             if width:
                 setattr(struct, f"n_{name}", words.size // width)
+        for i, kind in enumerate(table.terms[:: ARRAYS["terms"]].tolist()):
+            code = ctypes.c_char.in_dll(self.library, f"gtc_{table.numeric}_term_{TERMS[kind]}")
+            struct.term_code[i] = ctypes.addressof(code)
         return struct, keep
 
     def _function(self, table: Table, name: str) -> Any:
@@ -125,6 +132,6 @@ def runtime(compiler: str = "gcc", options: tuple[str, ...] = ("-O2",)) -> Runti
     library = folder / "libgtc.so"
     sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "py" / "libc_shim.c"]
     folders = [f"-I{ROOT / name}" for name in ("include", "libc", "tests/py")]
-    command = [compiler, *FLAGS, *options, "-shared", "-fPIC", *folders, "-o", str(library)]
+    command = [compiler, *FLAGS, *ALL, *options, "-shared", "-fPIC", *folders, "-o", str(library)]
     subprocess.run([*command, *map(str, sources)], check=True)
     return Runtime(ctypes.CDLL(str(library)))

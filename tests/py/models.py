@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gyrotc.model import Coverage, Envelope, Model, Network, Scale
+from gyrotc.model import Coverage, Envelope, Model, Network, Scale, Term
 
 
 def random_model(seed: int, **changes: Any) -> Model:
@@ -55,6 +55,79 @@ def random_model(seed: int, **changes: Any) -> Model:
         "seed": seed,
     }
     return Model(**(values | changes))
+
+
+def random_terms(seed: int) -> tuple[Term, ...]:
+    """One to four terms of any kind."""
+    rng = np.random.default_rng([seed, 1])
+    tau, amplitude = float(rng.uniform(15.0, 4000.0)), float(rng.normal(0.0, 0.01))
+    every = (
+        Term(id="cavity_lag", parameters={"tau_s": tau}),
+        Term(
+            id="thermal_gradient",
+            parameters={"tau_s": float(rng.uniform(5.0, 9000.0)), "amplitude_dph_per_c": amplitude},
+        ),
+        Term(
+            id="hysteresis",
+            parameters={"width_c": float(rng.uniform(0.1, 3.0)), "amplitude_dph_per_c": -amplitude},
+        ),
+        Term(id="warm_up", parameters={"tau_s": tau, "amplitude_dph": 3.0 * amplitude}),
+        Term(
+            id="path_length_periodicity",
+            parameters={
+                "period_c": float(rng.uniform(3.0, 30.0)),
+                "amplitude_dph": abs(amplitude),
+                "phase_rad": float(rng.uniform(-9.0, 9.0)),
+            },
+        ),
+        Term(
+            id="auxiliary",
+            parameters={"slope_dph_per_unit": amplitude, "reference": float(rng.normal(12.0, 3.0))},
+            channel="supply_v",
+        ),
+        Term(
+            id="auxiliary",
+            parameters={"slope_dph_per_unit": 0.1 * amplitude, "reference": 0.0},
+            channel="magnetic_ut",
+        ),
+    )
+    chosen = rng.permutation(len(every))[: int(rng.integers(1, 5))]
+    return tuple(every[k] for k in chosen)
+
+
+def bank_of(model: Model) -> Model:
+    """The same model with its network thrice: regions that overlap in T, and two of them in the slope."""
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    network = model.networks[0]
+
+    def part(t: tuple[float, float], r: tuple[float, float], factor: float) -> Network:
+        region = Envelope(
+            temperature_c=(t0 + t[0] * (t1 - t0), t0 + t[1] * (t1 - t0)),
+            slope_c_per_min=(r0 + r[0] * (r1 - r0), r0 + r[1] * (r1 - r0)),
+        )
+        return network.model_copy(update={"region": region, "w0": factor * network.w0 + 0.001 * factor})
+
+    return model.model_copy(
+        update={
+            "networks": (
+                part((0.0, 0.6), (0.0, 1.0), 1.0),
+                part((0.4, 1.0), (0.0, 0.7), 1.5),
+                part((0.4, 1.0), (0.5, 1.0), -0.5),
+            )
+        }
+    )
+
+
+def random_channels(model: Model, seed: int, rows: int) -> np.ndarray:
+    """Auxiliary channels of a history, with gaps, shape (rows, n)."""
+    rng = np.random.default_rng([seed, 2])
+    names = {t.channel for t in model.terms if t.channel}
+    channels = 12.0 + np.cumsum(rng.normal(0.0, 0.01, (rows, len(names))), axis=0)
+    for column in channels.T:
+        for _ in range(rows // 60):
+            at, length = int(rng.integers(0, rows)), int(rng.integers(1, 60))
+            column[at : at + length] = rng.choice([np.nan, 40.0])
+    return channels
 
 
 def random_history(

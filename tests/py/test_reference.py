@@ -12,7 +12,7 @@ from gyrotc.reference import evaluate_map, replay
 from gyrotc.reference.q31 import GAUSS_ERROR, exp2
 from gyrotc.table import f32_words
 from libc_build import runtime
-from models import random_history, random_model
+from models import bank_of, random_channels, random_history, random_model, random_terms
 
 COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
 BUILDS = [
@@ -58,6 +58,42 @@ def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> Non
     np.testing.assert_array_equal(want.status, status[:, 2])
     np.testing.assert_array_equal(want.bits, bits)
     assert c.out_of_range() == 0
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("seed", range(40))
+def test_terms_agree_bit_for_bit(numeric: str, seed: int) -> None:
+    model = random_model(seed, terms=random_terms(seed))
+    table = quantise(model, numeric)
+    samples_per_block = int(np.random.default_rng(seed).choice([1, 2, 7, 50]))
+    x, missed = random_history(model, seed, 1500, samples_per_block)
+    missed[700] = 10**6
+    channels = table.encode_inputs(np.column_stack([x, random_channels(model, seed, 1500)]))
+    want = replay(table, channels, missed=missed, samples_per_block=samples_per_block)
+    c = runtime("gcc", ("-O2", COUNTED))
+    assert c.check(table) == 0
+    status, bits = c.steps(table, channels, missed, samples_per_block)
+    np.testing.assert_array_equal(want.sample_status, status[:, 1])
+    np.testing.assert_array_equal(want.status, status[:, 2])
+    np.testing.assert_array_equal(want.bits, bits)
+    assert c.out_of_range() == 0
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("seed", range(10))
+def test_banks_agree_bit_for_bit_and_keep_to_their_bound(numeric: str, seed: int) -> None:
+    model = bank_of(random_model(seed))
+    table = quantise(model, numeric)
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    points = np.random.default_rng(seed).uniform([t0, r0 / 6.0], [t1, r1 / 6.0], (4000, 2))
+    inputs = table.encode_inputs(points)
+    status, bits = evaluate_map(table, inputs)
+    got_status, got_bits = runtime().maps(table, inputs)
+    np.testing.assert_array_equal(status, got_status)
+    np.testing.assert_array_equal(bits, got_bits)
+    t, slope = table.decode_inputs(inputs).T
+    worst = np.max(np.abs(table.decode_bias(bits) - model.map_dph(t, 6.0 * slope)))
+    assert worst <= table.error_bound_dph
 
 
 def test_every_status_bit_was_seen_in_the_histories() -> None:

@@ -50,7 +50,8 @@ class Steps:
 
     `believed[i]`: sample i was believed. For correction k: it is in force from sample `at[k]` on (at the
     same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
-    before it stays, held) or FALLBACK; `remarks`: GTC_WARMING or 0. Where `kind` is not MAP, temperature,
+    before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
+    GTC_WARMING or 0. Where `kind` is not MAP, temperature,
     slope and remarks are those of the last map. Before the first one the correction is
     0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete; its missing end counts
     as not valid).
@@ -62,6 +63,7 @@ class Steps:
     temperature: Numbers
     slope: Numbers
     remarks: NDArray[np.int32]
+    is_restart: NDArray[np.bool_]
     valid: NDArray[np.bool_]
     mean: Numbers
 
@@ -129,6 +131,7 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
         temperature=np.concatenate([closings.temperature, starts.temperature])[made],
         slope=np.concatenate([closings.slope, starts.slope])[made],
         remarks=np.concatenate([closings.remarks, starts.remarks])[made],
+        is_restart=order >= closings.at.size,
         valid=valid,
         mean=mean,
     )

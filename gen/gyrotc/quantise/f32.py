@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckFailed
-from ..model import Model, Network
+from ..model import Envelope, Model, Network
 from ..table import Table, Words, f32_words
+from .bank import handover_error_dph, regions
 from .common import STEEPEST, max_slope_c, shared
 from .gradient import largest_gradient
+from .terms import f32_terms
 
 __all__ = ["table_of"]
 
@@ -26,6 +28,7 @@ _GAIN = 8.0 * math.sqrt(math.log2(math.e))  # u = 64 log2(e) d²/δ²
 _POLYNOMIAL = 6.7e-9  # of 2^(-f/64), relative
 _TINY = 2.0**-80  # smaller weights could make subnormal products
 _MAX_ABS_Z = 8.0
+_SHARE = 8.0 * _UNIT  # error of a share of a bank: difference, quotient, sum, product
 
 
 def table_of(model: Model) -> Table:
@@ -34,18 +37,30 @@ def table_of(model: Model) -> Table:
     Raises:
         CheckFailed: The model needs what the float32 runtime does not have.
     """
-    if len(model.networks) > 1 or model.terms:
-        raise CheckFailed("f32: this version has no model banks and no extension terms")
     per_block = model.block_s / 60.0
     center, half = model.scale.temperature_c
     scale = f32_words([center, 1.0 / half, 1.0 / (model.scale.slope_c_per_min * per_block)])
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     envelope = f32_words([t0, t1, r0 * per_block, r1 * per_block])
     _check_range(scale, envelope)
-    network = model.networks[0]
-    centers = _centers(network, scale, per_block)
-    head = np.concatenate([np.array([len(network.weights)], np.uint32), _head(network), envelope])
-    parts = _bound(network, scale, envelope, centers, per_block)
+    centers = [_centers(network, scale, per_block) for network in model.networks]
+    heads = [
+        np.concatenate([np.array([len(n.weights)], np.uint32), _head(n), _region(region, per_block)])
+        for n, region in zip(model.networks, regions(model), strict=True)
+    ]
+    bounds = [
+        _bound(network, scale, envelope, own, per_block)
+        for network, own in zip(model.networks, centers, strict=True)
+    ]
+    parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
+    if len(model.networks) > 1:
+        errors = _input_errors(scale, envelope) / _numbers(scale)[1:]
+        parts["hand-over"] = handover_error_dph(
+            model,
+            error_t_c=float(errors[0]),
+            error_r_c_per_min=float(errors[1]) / per_block,
+            share_error=_SHARE,
+        )
     return Table(
         numeric="f32",
         **shared(model),
@@ -55,9 +70,9 @@ def table_of(model: Model) -> Table:
         fallback=_word(model.fallback_dph),
         scale=tuple(scale.tolist()),
         envelope=tuple(envelope.tolist()),
-        networks=head,
-        centers=centers.view(np.uint32).reshape(-1),
-        terms=np.zeros(0, dtype=np.uint32),
+        networks=np.concatenate(heads),
+        centers=np.concatenate(centers).view(np.uint32).reshape(-1),
+        terms=f32_terms(model),
         sigma=f32_words(model.uncertainty_dph.rows if model.uncertainty_dph else []),
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
@@ -135,18 +150,36 @@ def _gradient(
     )
 
 
+def _largest(scale: Words, envelope: Words) -> NDArray[np.float64]:
+    """Largest |z| over the envelope, shape (2,)."""
+    t0, t1, r0, r1 = _numbers(envelope).tolist()
+    corners = np.abs([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
+    return np.asarray(np.max(corners, axis=0))
+
+
+def _input_errors(scale: Words, envelope: Words) -> NDArray[np.float64]:
+    """Largest errors of the normalised inputs, shape (2,).
+
+    Offset, gain, subtraction and product are rounded, then z itself; the envelope's edges likewise.
+    """
+    t0, t1, r0, r1 = _numbers(envelope).tolist()
+    offset = float(_numbers(scale)[0])
+    reach = np.array([max(abs(t0), abs(t1), abs(offset)), max(abs(r0), abs(r1))])
+    edges = reach * _numbers(scale)[1:] * np.array([2.0, 1.0]) * _UNIT
+    return np.asarray(_largest(scale, envelope) * 4.0 * _UNIT + edges + _INPUT_GRID)
+
+
+def _region(region: Envelope, per_block: float) -> Words:
+    (t0, t1), (r0, r1) = region.temperature_c, region.slope_c_per_min
+    return f32_words([t0, t1, r0 * per_block, r1 * per_block])
+
+
 def _bound(
     network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32], per_block: float
 ) -> dict[str, float]:
     """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
-    t0, t1, r0, r1 = _numbers(envelope).tolist()
-    offset = float(_numbers(scale)[0])
-    corners = np.abs([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
-    largest = np.max(corners, axis=0)  # |z|
-    # z: its offset, gain, subtraction and product are rounded, then z itself; envelope edges likewise.
-    reach = np.array([max(abs(t0), abs(t1), abs(offset)), max(abs(r0), abs(r1))])
-    gains = _numbers(scale)[1:]
-    z_error = largest * 4.0 * _UNIT + reach * gains * np.array([2.0, 1.0]) * _UNIT + _INPUT_GRID
+    largest = _largest(scale, envelope)
+    z_error = _input_errors(scale, envelope)
     weights = np.abs(np.array(network.weights, dtype=np.float64))
     linear = np.abs(np.array(network.linear))
     steep = np.zeros((len(weights), 2))

@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckFailed
-from ..model import Model
+from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
 from ..table import Table
+from .bank import handover_error_dph, regions
 from .common import max_slope_c, shared
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
 from .solve import gram, solve
+from .terms import q31_terms, term_size_dph
 
 __all__ = ["table_of"]
 
@@ -32,6 +34,7 @@ _MAX_FACTOR = 65535  # of s
 _SOLVE_POINTS = 256
 _RIDGE = 1e-6
 _GRID_CELLS = 512
+_SHARE = 2.0**-18  # error of a share of a bank
 
 Floats = NDArray[np.floating[Any]]
 
@@ -44,11 +47,28 @@ class _Gaussians:
     offset: NDArray[np.int64]  # k
     fraction: int
 
+    def fits(self) -> bool:
+        """Whether every argument, and every factor of one, keeps to its word."""
+        reach = np.maximum(np.abs(self.offset), np.abs(self.offset + self.factor * (POSITIONS - 1)))
+        return bool(
+            np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR
+        )
+
     def on(self, surface: Surface) -> Surface:
         """The surface with these Gaussians in place of its own."""
         alpha = self.factor * 2.0**-self.fraction
         center = np.divide(-self.offset, self.factor, out=np.zeros(alpha.shape), where=self.factor > 0)
         return replace(surface, alpha=alpha, center=center)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fixed:
+    """One network in fixed point, but for the unit of its weights."""
+
+    exact: Surface
+    gaussians: _Gaussians
+    solved: Surface
+    lost: float  # |weights| of Gaussians that are nowhere felt
 
 
 def table_of(model: Model) -> Table:
@@ -57,27 +77,48 @@ def table_of(model: Model) -> Table:
     Raises:
         CheckFailed: The model cannot be held in fixed point, with the reason.
     """
-    if len(model.networks) > 1 or model.terms:
-        raise CheckFailed("q31: this version has no model banks and no extension terms")
     per_block = model.block_s / 60.0
     envelope = _envelope(model, per_block)
     inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
-    exact = surface_of(model.networks[0], model.scale, per_block, inputs)
-    felt = _felt(exact)
-    lost = float(np.add.accumulate([0.0, *np.abs(exact.weights[~felt])])[-1])
-    exact = _chosen(exact, felt)
-    gaussians = _rounded(exact)
-    solved = _solved(exact, gaussians.on(exact))
-    frac_bits = _frac_bits(solved, model.fallback_dph)
-    whole = _whole(solved, frac_bits)
-    final = _in_dph(gaussians.on(solved), whole, frac_bits)
-    parts = {
-        "rounded inputs": _input_error(exact, inputs),
-        "rounded parameters": difference(exact, final, _GRID_CELLS),
-        "Gaussian": GAUSS_ERROR * math.fsum(abs(w) for w in final.weights) + lost * 2.0**-32,
+    surfaces = [surface_of(n, model.scale, per_block, inputs) for n in model.networks]
+    felt = [_felt(surface) for surface in surfaces]
+    chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
+    fraction = min(_fraction(surface) for surface in chosen)
+    networks = [
+        _fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)
+    ]
+    largest = max(_size(network.solved) for network in networks)
+    frac_bits = _frac_bits(max(largest, abs(model.fallback_dph)) + term_size_dph(model))
+    bounds = [_bound(network, inputs, frac_bits) for network in networks]
+    parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
+    if len(networks) > 1:
+        # Regions are rounded to positions, too.
+        parts["hand-over"] = handover_error_dph(
+            model,
+            error_t_c=1.5 / inputs[0].per_unit / _INPUT,
+            error_r_c_per_min=1.5 / inputs[1].per_unit / _INPUT / per_block,
+            share_error=_SHARE,
+        )
+    return _table(model, envelope, inputs, networks, frac_bits, parts)
+
+
+def _fixed(whole: Surface, part: Surface, keep: NDArray[np.bool_], fraction: int) -> _Fixed:
+    gaussians = _rounded(part, fraction)
+    lost = math.fsum(np.abs(whole.weights[~keep]))
+    return _Fixed(part, gaussians, _solved(part, gaussians.on(part)), lost)
+
+
+def _bound(network: _Fixed, inputs: Inputs, frac_bits: int) -> dict[str, float]:
+    """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
+    whole = _whole(network.solved, frac_bits)
+    final = _in_dph(network.gaussians.on(network.solved), whole, frac_bits)
+    size = math.fsum(abs(w) for w in final.weights)
+    return {
+        "rounded inputs": _input_error(network.exact, inputs),
+        "rounded parameters": difference(network.exact, final, _GRID_CELLS),
+        "Gaussian": GAUSS_ERROR * size + network.lost * 2.0**-32,
         "truncated result": 2.0**-frac_bits,
     }
-    return _table(model, envelope, inputs, gaussians, whole, frac_bits, parts)
 
 
 def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
@@ -102,19 +143,19 @@ def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
     )
 
 
-def _rounded(surface: Surface) -> _Gaussians:
-    """s and k of every Gaussian, with as many fraction bits as the farthest argument leaves."""
-    center = surface.center
-    farthest = np.maximum(np.abs(center), np.abs(center - POSITIONS)) * surface.alpha
-    largest = float(np.max(farthest, initial=1.0))
-    fraction = min(_FINEST, 31 - math.frexp(largest)[1])
-    while True:
-        factor = np.rint(surface.alpha * 2.0**fraction).astype(np.int64)
-        offset = np.rint(-factor * center).astype(np.int64)
-        reach = np.maximum(np.abs(offset), np.abs(offset + factor * (POSITIONS - 1)))
-        if np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(factor, initial=0) <= _MAX_FACTOR:
-            return _Gaussians(factor, offset, fraction)
+def _fraction(surface: Surface) -> int:
+    """As many fraction bits as the farthest argument leaves."""
+    fraction = _FINEST
+    while not _rounded(surface, fraction).fits():
         fraction -= 1
+    return fraction
+
+
+def _rounded(surface: Surface, fraction: int) -> _Gaussians:
+    """s and k of every Gaussian."""
+    factor = np.rint(surface.alpha * 2.0**fraction).astype(np.int64)
+    offset = np.rint(-factor * surface.center).astype(np.int64)
+    return _Gaussians(factor, offset, fraction)
 
 
 def _columns(surface: Surface) -> tuple[Floats, Floats]:
@@ -142,10 +183,14 @@ def _solved(exact: Surface, rounded: Surface) -> Surface:
     return replace(exact, w0=float(values[0]), linear=values[1:3], weights=values[3:])
 
 
-def _frac_bits(surface: Surface, fallback: float) -> int:
-    """Most fraction bits of a bias with which all weights together stay below 2^30."""
-    parts = [surface.w0, *surface.linear, *surface.weights]
-    largest = max(math.fsum(abs(p) for p in parts), abs(fallback), 2.0**-30)
+def _size(surface: Surface) -> float:
+    """Largest sum that the surface's parts can make, deg/h."""
+    return math.fsum(abs(p) for p in (surface.w0, *surface.linear, *surface.weights))
+
+
+def _frac_bits(size: float) -> int:
+    """Most fraction bits of a bias with which a sum of this size stays below 2^30."""
+    largest = max(size, 2.0**-30)
     bits = 30 - math.frexp(largest)[1]
     if largest * 2.0**bits > 2**30 - 1024:  # room for the rounding of 512 weights
         bits -= 1
@@ -176,17 +221,18 @@ def _table(
     model: Model,
     envelope: tuple[int, int, int, int],
     inputs: Inputs,
-    gaussians: _Gaussians,
-    whole: NDArray[np.int64],
+    networks: list[_Fixed],
     frac_bits: int,
     parts: dict[str, float],
 ) -> Table:
     unit = 2.0**frac_bits
-    narrow = 2 * (_FINEST - gaussians.fraction)
-    records = np.stack(
-        [*np.stack([gaussians.factor, gaussians.offset], axis=2).reshape(len(whole) - 3, 4).T, whole[3:]],
-        axis=1,
-    )
+    narrow = 2 * (_FINEST - networks[0].gaussians.fraction)
+    wholes = [_whole(network.solved, frac_bits) for network in networks]
+    heads = [
+        [len(whole) - 3, *whole[:3], *_region(region, inputs, model)]
+        for whole, region in zip(wholes, regions(model), strict=True)
+    ]
+    records = [_records(n.gaussians, whole) for n, whole in zip(networks, wholes, strict=True)]
     return Table(
         numeric="q31",
         **shared(model),
@@ -196,14 +242,32 @@ def _table(
         fallback=_word(round(model.fallback_dph * unit)),
         scale=(inputs[0].gain, inputs[1].gain, narrow),
         envelope=tuple(_word(v) for v in envelope),
-        networks=_words(np.concatenate([[len(whole) - 3], whole[:3], envelope])),
-        centers=_words(records),
-        terms=np.zeros(0, dtype=np.uint32),
+        networks=_words(heads),
+        centers=_words(np.concatenate(records)),
+        terms=q31_terms(model, frac_bits),
         sigma=_words(np.rint(np.array(model.uncertainty_dph.rows) * unit) if model.uncertainty_dph else []),
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
     )
+
+
+def _records(gaussians: _Gaussians, whole: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Records of the centers, shape (n, 5): s, k, s, k, weight."""
+    pairs = np.stack([gaussians.factor, gaussians.offset], axis=2).reshape(len(whole) - 3, 4)
+    return np.concatenate([pairs, whole[3:, None]], axis=1)
+
+
+def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
+    """A network's region in positions."""
+    per_block = model.block_s / 60.0
+    edges = []
+    for scale, pair, unit in zip(
+        inputs, (region.temperature_c, region.slope_c_per_min), (1.0, per_block), strict=True
+    ):
+        for value in pair:
+            edges.append(min(max(round(scale.position(value * unit * _INPUT)), 0), POSITIONS - 1))
+    return edges
 
 
 def _word(value: int) -> int:

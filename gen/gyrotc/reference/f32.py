@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import Table, Words
+from ..table import ARRAYS, Table, Words
 
-__all__ = ["ENTRIES", "cells", "exp2_table", "gauss", "network_bits", "normalise"]
+__all__ = ["ENTRIES", "biases", "cells", "exp2_table", "gauss", "normalise"]
 
 ENTRIES = 64
 _CUT = 32 * ENTRIES
@@ -24,7 +24,7 @@ _H = np.float32(float.fromhex("0x1.71549ep+6"))
 _G = np.float32(float.fromhex("0x1.0a69ccp+13"))
 _C = Decimal(float.fromhex("0x1.ebfc21c077705p-15"))
 _ROUND = np.float32(1.5 * 2**23)  # added and subtracted again: rounds to an integer
-_EIGHT = np.float32(8.0)
+_ONE, _EIGHT = np.float32(1.0), np.float32(8.0)
 
 
 def exp2_table() -> Words:
@@ -73,20 +73,60 @@ def normalise(table: Table, x: NDArray[np.float32]) -> Points:
     return Points(x, z_t, z_r)
 
 
-def network_bits(table: Table, points: Points) -> Words:
-    """Bits of the bias."""
+def biases(table: Table, points: Points) -> Words:
+    """Bits of the map's results."""
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    counts = table.networks.reshape(-1, ARRAYS["networks"])[:, 0].astype(np.int64)
+    if len(networks) == 1:
+        return _network(table, networks[0], 0, int(counts[0]), points).view(np.uint32)
+    total, shares = np.zeros_like(points.z_t), np.zeros_like(points.z_t)
+    first = 0
+    for network, count in zip(networks, counts, strict=True):
+        share = _share(table, network, points)
+        used = share > 0
+        product = share * _network(table, network, first, int(count), points)
+        total = np.where(used, total + product, total)
+        shares = np.where(used, shares + share, shares)
+        first += int(count)
+    quotient = total / np.where(shares > 0, shares, _ONE)
+    fallback = table.numbers([table.fallback])[0]
+    return np.asarray(np.where(shares > 0, quotient, fallback)).view(np.uint32)
+
+
+def _network(
+    table: Table, network: NDArray[np.float32], first: int, count: int, points: Points
+) -> NDArray[np.float32]:
+    """One network, whose centers are `first` ... `first + count - 1`."""
     z_t, z_r = points.z_t, points.z_r
-    network = table.numbers(table.networks)
     acc = network[1] + network[2] * z_t
     acc = acc + network[3] * z_r
+    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])[first : first + count]
     with np.errstate(under="ignore"):
-        for c_t, g_t, c_r, g_r, weight in table.numbers(table.centers).reshape(-1, 5):
+        for c_t, g_t, c_r, g_r, weight in centers:
             u = (z_t - c_t) * g_t
             u = u * u
             q = (z_r - c_r) * g_r
             q = q * q
             acc = acc + weight * gauss(u + q)
-    return np.asarray(acc).view(np.uint32)
+    return np.asarray(acc)
+
+
+def _share(table: Table, network: NDArray[np.float32], points: Points) -> NDArray[np.float32]:
+    """Share of a network, before the blend is divided by their sum."""
+    envelope = table.numbers(table.envelope)
+    share = np.full_like(points.z_t, _ONE)
+    for k in (0, 1):
+        low, high = network[4 + 2 * k : 6 + 2 * k]
+        if low > envelope[2 * k]:
+            share = np.minimum(share, _fraction(low, points.x[:, k], high))
+        if high < envelope[2 * k + 1]:
+            share = np.minimum(share, _fraction(high, points.x[:, k], low))
+    return share
+
+
+def _fraction(start: Any, x: NDArray[np.float32], end: Any) -> NDArray[np.float32]:
+    way = (x - start) / (end - start)
+    return np.asarray(np.where(way > 0, way, np.float32(0.0)))
 
 
 def cells(table: Table, points: Points) -> NDArray[np.int64]:

@@ -1,38 +1,22 @@
-"""Whole histories: the front end's corrections evaluated, and the status of every call.
-
-The static map is evaluated for all corrections at once; what depends on the order (held, fallen
-back) was settled by `frontend.follow`.
-"""
+"""Whole histories: what every call of the step functions answers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frontend import (
-    F32,
-    FALLBACK,
-    KEEP,
-    MAP,
-    Q31,
-    Arithmetic,
-    Settings,
-    Steps,
-    expand_missed,
-    follow,
-    positions,
-    with_missing,
-)
+from ..frontend import follow
 from ..table import Table, Words
+from .corrections import Stream, arithmetic_of, corrections, settings_of
 from .maps import evaluate_map
 
 __all__ = ["Replay", "answers", "replay"]
 
-_HELD, _FALLBACK = 8, 16  # as in gtc.h
+_HELD = 8  # GTC_HELD
 
 
 class Event(Protocol):
@@ -63,7 +47,6 @@ class Replay:
     sample_status: NDArray[np.int32]  # what `sample` returns
     status: NDArray[np.int32]  # what `bias` returns after it
     bits: Words  # of the bias that it writes
-
     missed_status: NDArray[np.int32]  # what `missed` returns before the row (0 where nothing was missed)
     block_valid: NDArray[np.bool_]  # the row's own block has enough believed samples
 
@@ -77,17 +60,14 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         missed: Samples that did not arrive before each row, shape (n,).
         samples_per_block: As given to `gtc_<n>_init`.
     """
-    settings = _settings(table, samples_per_block)
-    shortened = expand_missed(np.asarray(missed, dtype=np.int64), settings)
-    position = positions(shortened)
-    arithmetic = _arithmetic(table)
-    samples = with_missing(arithmetic, table.numbers(np.asarray(channels)[:, 0]), position)
-    steps = follow(arithmetic, samples, settings)
-    status, bits = _corrections(table, steps)
-
+    settings = settings_of(table, samples_per_block)
+    stream = Stream.of_rows(table, settings, np.asarray(channels), np.asarray(missed, dtype=np.int64))
+    steps = follow(arithmetic_of(table), stream.samples, settings)
+    status, bits = corrections(table, steps, stream, samples_per_block)
+    position = stream.position
     in_force = steps.in_force(position) + 1
-    gaps = np.flatnonzero(shortened)
-    missed_status = np.zeros(shortened.size, dtype=np.int32)
+    gaps = np.flatnonzero(stream.missed)
+    missed_status = np.zeros(position.size, dtype=np.int32)
     missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | _HELD
     held = np.where(steps.believed[position], np.int32(0), np.int32(_HELD))
     at_rows = status[in_force]
@@ -114,68 +94,31 @@ def answers(table: Table, vectors: Vectors) -> NDArray[np.uint32]:
 
 
 def _step_answers(table: Table, events: Iterable[Event], samples_per_block: int) -> NDArray[np.uint32]:
-    """Answers of the step functions; each event is one row, or samples missed before the next row."""
-    settings = _settings(table, samples_per_block)
-    arithmetic = _arithmetic(table)
-    parts: list[NDArray[Any]] = []
-    ends: list[int] = []
-    missing: list[bool] = []
-    total = 0
+    """Answers of the step functions; each event is a row, or samples missed before the next row."""
+    settings = settings_of(table, samples_per_block)
+    rows: list[tuple[int, ...]] = []
+    missed: list[int] = []
+    kinds: list[bool] = []
+    waiting = 0
     for event in events:
+        kinds.append(bool(event.missed))
         if event.missed:
-            count = int(expand_missed(np.array([event.missed]), settings)[0])
-            parts.append(arithmetic.missing(count))
+            waiting += event.missed
         else:
-            count = 1
-            parts.append(table.numbers([event.channels[0]]))
-        total += count
-        ends.append(total - 1)
-        missing.append(bool(event.missed))
-    last = np.array(ends, dtype=np.int64)
-    steps = follow(arithmetic, np.concatenate(parts), settings)
-    status, bits = _corrections(table, steps)
+            rows.append(event.channels)
+            missed.append(waiting)
+            waiting = 0
+    if waiting:  # the history ends with missing samples: one more holds their place
+        rows.append(tuple([int(table.encode_inputs(np.nan))] * table.n_channels))
+        missed.append(waiting)
+    channels = np.array(rows, dtype=np.uint32)
+    stream = Stream.of_rows(table, settings, channels, np.array(missed, dtype=np.int64))
+    steps = follow(arithmetic_of(table), stream.samples, settings)
+    status, bits = corrections(table, steps, stream, samples_per_block)
+    was_missed = np.array(kinds)
+    row = np.cumsum(~was_missed) - 1
+    last = np.where(was_missed, stream.position[np.minimum(row + 1, len(rows) - 1)] - 1, stream.position[row])
     k = steps.in_force(last) + 1
-    held = np.where(np.array(missing) | ~steps.believed[last], _HELD, 0)
+    held = np.where(was_missed | ~steps.believed[last], _HELD, 0)
     call = status[k] | held
     return np.stack([(call + 256 * status[k]).astype(np.uint32), bits[k]], axis=1)
-
-
-def _settings(table: Table, samples_per_block: int) -> Settings:
-    number = table.numbers([table.max_step, table.max_slope])
-    return Settings(
-        samples_per_block=samples_per_block,
-        slope_blocks=table.slope_blocks,
-        hold_blocks=table.hold_blocks,
-        stuck_samples=table.stuck_samples,
-        max_step=number[0],
-        max_slope=number[1],
-    )
-
-
-def _arithmetic(table: Table) -> Arithmetic:
-    return F32 if table.numeric == "f32" else Q31
-
-
-def _corrections(table: Table, steps: Steps) -> tuple[NDArray[np.int32], Words]:
-    """Status and bits of every correction, after one entry for the time before the first."""
-    inputs = np.stack([_bits(table, steps.temperature), _bits(table, steps.slope)], axis=1)
-    made = np.flatnonzero(steps.kind == MAP)
-    status = np.zeros(steps.kind.size, dtype=np.int32)
-    bits = np.zeros(steps.kind.size, dtype=np.uint32)
-    status[made], bits[made] = evaluate_map(table, inputs[made])
-    status[made] |= steps.remarks[made]
-    source = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
-    status, bits = status[source], bits[source]
-    status[steps.kind == KEEP] |= _HELD
-    fallen = steps.kind == FALLBACK
-    status[fallen] = _HELD | _FALLBACK
-    bits[fallen] = table.fallback
-    return np.concatenate([[np.int32(_HELD)], status]).astype(np.int32), np.concatenate(
-        [[np.uint32(0)], bits]
-    ).astype(np.uint32)
-
-
-def _bits(table: Table, numbers: NDArray[Any]) -> Words:
-    if table.numeric == "f32":
-        return np.asarray(numbers, dtype=np.float32).view(np.uint32)
-    return np.asarray(numbers, dtype=np.int64).astype(np.int32).view(np.uint32)

@@ -34,7 +34,7 @@ def evaluate_map(table: Table, inputs: Words) -> tuple[NDArray[np.int32], Words]
     kernel = f32 if table.numeric == "f32" else q31
     points = kernel.normalise(table, x)
     status = status | np.where(_is_covered(table, kernel.cells(table, points)), 0, UNCOVERED)
-    bias = kernel.network_bits(table, points)
+    bias = kernel.biases(table, points)
     status = np.where(usable, status, E_ARG).astype(np.int32)
     return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
 

@@ -11,7 +11,8 @@ from decimal import ROUND_HALF_EVEN, Context, Decimal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import Table, Words
+from ..frontend.numbers import divided
+from ..table import ARRAYS, Table, Words
 
 __all__ = [
     "CUT",
@@ -19,10 +20,10 @@ __all__ = [
     "GAUSS_ERROR",
     "POSITION_BITS",
     "Points",
+    "biases",
     "cells",
     "exp2",
     "exp2_table",
-    "network_bits",
     "normalise",
 ]
 
@@ -34,6 +35,9 @@ _G = np.uint64(558709134)  # 2^-16
 _TOP = 2052389455
 #: |2^-29 exp2(u) - 2^-v| for every v that truncates to u; proved by visiting every u (tests/py/test_reference.py)
 GAUSS_ERROR = 2.9e-8
+
+_FULL_SHARE = 2**24
+_LAST_POSITION = 65535
 
 Integers = NDArray[np.int64]
 
@@ -75,19 +79,52 @@ def _position(x: Integers, low: int, gain: int) -> Integers:
     return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
 
 
-def network_bits(table: Table, points: Points) -> Words:
-    """Bits of the bias."""
+def biases(table: Table, points: Points) -> Words:
+    """Bits of the map's results."""
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    if len(networks) == 1:
+        return _bits(_network(table, networks[0], 0, points))
+    total: Integers = np.zeros_like(points.x_t)
+    shares: Integers = np.zeros_like(points.x_t)
+    first = 0
+    for network in networks:
+        share: Integers = np.minimum(_share(network[4:6], points.x_t), _share(network[6:8], points.x_r))
+        total = total + share * _network(table, network, first, points)
+        shares = shares + share
+        first += int(network[0])
+    blended = divided(total, np.maximum(shares, 1))
+    return _bits(np.where(shares > 0, blended, table.numbers([table.fallback])[0]))
+
+
+def _bits(bias: Integers) -> Words:
+    return bias.astype(np.int32).view(np.uint32)
+
+
+def _network(table: Table, network: Integers, first: int, points: Points) -> Integers:
+    """One network, whose centers stand from record `first` on; units of the bias."""
     narrow = int(table.scale[2])
-    _, w0, linear_t, linear_r, *_ = (int(n) for n in table.numbers(table.networks))
+    count, w0, linear_t, linear_r = (int(n) for n in network[:4])
     acc = (linear_t * points.x_t + linear_r * points.x_r) * 8192
-    for s_t, k_t, s_r, k_r, weight in table.numbers(table.centers).reshape(-1, 5):
+    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])[first : first + count]
+    for s_t, k_t, s_r, k_r, weight in centers:
         a = (s_t * points.x_t + k_t).astype(np.uint64)  # squares are those of the signed number, mod 2^64
         b = (s_r * points.x_r + k_r).astype(np.uint64)
         u = (a * a + b * b) >> np.uint64(32 - narrow)
         inside = u < CUT
         e = exp2(np.where(inside, u, np.uint64(0))).astype(np.int64)
         acc = acc + np.where(inside, weight * e, 0)
-    return np.asarray(w0 + (acc >> 29)).astype(np.int32).view(np.uint32)
+    return np.asarray(w0 + (acc >> 29))
+
+
+def _share(region: Integers, x: Integers) -> Integers:
+    """Share of a network by one input, in 2^-24, before the blend is divided by their sum."""
+    low, high = (int(edge) for edge in region)
+    share = np.full_like(x, _FULL_SHARE)
+    if low > 0:
+        share = np.minimum(share, np.maximum(x - low, 0) * _FULL_SHARE // np.int64(high - low))
+    if high < _LAST_POSITION:
+        share = np.minimum(share, np.maximum(high - x, 0) * _FULL_SHARE // np.int64(high - low))
+    return share
 
 
 def cells(table: Table, points: Points) -> Integers:

@@ -88,7 +88,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xfe003739UL), B(0x0fffef80UL), B(0xf7fff36dUL), B(0xffec0000UL), B(0x003c0000UL), B(0xffff8000UL), B(0x00008000UL),
+    B(0x3UL), B(0xfe003739UL), B(0x0fffef80UL), B(0xf7fff36dUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
@@ -147,7 +147,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x413d38e7UL,
+    .crc = 0x491c375aUL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
