@@ -121,7 +121,7 @@ typedef struct {
 } gtc_q31_state_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (12 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (26 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
  * no flushed subnormals that the table needs), checksum over its values, its known answers.
@@ -154,7 +154,8 @@ GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *t
                                 uint_least32_t samples_per_block);
 
 /* One sample: channels[0] is the temperature, further ones (n_channels of the table) are the
- * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit). A missing, stuck or impossible temperature is held, never an error.
+ * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit). A missing, stuck
+ * or impossible temperature is held, never an error.
  * Returns the status of the correction in force, with GTC_HELD if this sample was not believed;
  * GTC_E_ARG for a NULL pointer.
  * Cost: about 30 operations; the call that opens a block also makes the correction (one
@@ -172,19 +173,25 @@ GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
 /* The angle to subtract from an angle increment over dt; what rounding leaves is carried on.
- * f32: dt in s, angle in arcsec, a multiple of 2^-16 while it is below 64. q31: dt in microseconds,
- * angle in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t.
+ * f32: dt in s, angle in arcsec, a multiple of 2^-16. q31: dt in microseconds, angle in
+ * 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t; in f32, where
+ * angles reach 128 arcsec, within one last place of the largest. t is the sum of the dt given:
+ * 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact.
  * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or, in
- * q31, an angle beyond 32 bits). */
+ * q31, an angle beyond 32 bits); then nothing is lost, the remainder is as it was. */
 GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);
 GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_state_t *state, int_least32_t dt, int_least32_t *angle);
 
 /* State over power cycles. `save` writes GTC_SAVE_WORDS words with version, the table's checksum
  * and a CRC. `restore` starts `state` for `table` as gtc_<n>_init() would, then takes over what
- * survives `off_blocks` blocks without power: memories (they go on relaxing towards the first
- * temperature) and plays always; the slope window and the correction, held, only if off_blocks is
- * 0. A torn or foreign image leaves `state` unwritten.
- * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE or GTC_E_ID. */
+ * survives `off_blocks` whole blocks without power:
+ *   0: everything. The state goes on bit for bit where it was saved, in the middle of a block, too;
+ *      tell it the samples in between by gtc_<n>_missed(). With other samples_per_block than it
+ *      was saved with, only what survives longer.
+ *   more: memories, which go on relaxing towards the first temperature, and plays.
+ * A torn or foreign image leaves `state` unwritten. examples/two_slots keeps it over power cuts.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: saved by another arithmetic or version), GTC_E_IMAGE or
+ * GTC_E_ID. Cost: about 40 operations a word. */
 GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
 GTC_MUST_CHECK int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
 GTC_MUST_CHECK int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,

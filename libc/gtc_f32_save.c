@@ -3,4 +3,5 @@
  * SPDX-License-Identifier: MIT
  */
 #include "gtc_num_f32.h"
+#include "gtc_save_f32.h"
 #include "gtc_save.inl"

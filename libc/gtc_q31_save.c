@@ -3,4 +3,5 @@
  * SPDX-License-Identifier: MIT
  */
 #include "gtc_num_q31.h"
+#include "gtc_save_q31.h"
 #include "gtc_save.inl"

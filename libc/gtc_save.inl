@@ -1,16 +1,116 @@
 /* gtc_save.inl - a state over power cycles, in the numbers included before.
  *
- * Words: magic, options, checksum of the table, gap, filled, window_valid, held_blocks, status, mean,
- * last, bias; the window; the states of the terms; CRC-32 over all before it.
+ * docs/numerics.md, section 7, gives the words. One text serves both directions, so that they cannot
+ * drift apart.
  *
  * SPDX-License-Identifier: MIT
  */
 
+/* Changes with the order of the words. */
 #define SAVE_MAGIC 0x47545331UL
-#define SAVE_HEAD 11U
 
-/* A build with other options has another number of words. */
-#define SAVE_OPTIONS (ARITHMETIC + (256UL * GTC_MAX_SLOPE_BLOCKS) + (65536UL * GTC_MAX_TERMS))
+/* What another build may have otherwise. */
+#define SAVE_OPTIONS \
+    (ARITHMETIC + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
+
+#define SAVE_HEAD 3U
+
+/* Where the next word goes to, or, if that is NULL, comes from. */
+typedef struct {
+    gtc_word_t *to;
+    const gtc_word_t *from;
+} FN(cursor_t);
+
+static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
+{
+    if (at->to != NULL) {
+        at->to[0].bits = *bits;
+        at->to = &at->to[1];
+    } else {
+        *bits = at->from[0].bits;
+        at->from = &at->from[1];
+    }
+}
+
+static void FN(carry)(FN(cursor_t) *at, NUM *x)
+{
+    gtc_word_t word;
+
+    ELEMENT(word) = *x;
+    FN(carry_bits)(at, &word.bits);
+    *x = ELEMENT(word);
+}
+
+static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
+{
+    gtc_word_t words[2];
+
+    FN(split)(*x, words);
+    FN(carry_bits)(at, &words[0].bits);
+    FN(carry_bits)(at, &words[1].bits);
+    *x = FN(join)(words);
+}
+
+/* The front end: everything that the running block and the next correction depend on. */
+static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
+{
+    gtc_word_t status;
+    uint_least32_t i;
+
+    status.integer = state->status;
+    FN(carry_bits)(at, &status.bits);
+    state->status = status.integer;
+    FN(carry_bits)(at, &state->samples_per_block);
+    FN(carry_bits)(at, &state->position);
+    FN(carry_bits)(at, &state->valid);
+    FN(carry_bits)(at, &state->gap);
+    FN(carry_bits)(at, &state->suspects);
+    FN(carry_bits)(at, &state->received);
+    FN(carry_bits)(at, &state->repeats);
+    FN(carry_bits)(at, &state->held_blocks);
+    FN(carry_bits)(at, &state->filled);
+    FN(carry_bits)(at, &state->window_valid);
+    FN(carry)(at, &state->last);
+    FN(carry)(at, &state->candidate);
+    FN(carry)(at, &state->base);
+    FN(carry)(at, &state->mean);
+    FN(carry)(at, &state->bias);
+    FN(carry_wide)(at, &state->sum);
+    for (i = 0U; i < GTC_MAX_SLOPE_BLOCKS; i++) {
+        FN(carry)(at, &state->window[i]);
+    }
+}
+
+/* The terms, and the time by which they go. */
+static void FN(carry_terms)(FN(cursor_t) *at, STATE *state)
+{
+    uint_least32_t i;
+
+    FN(carry_bits)(at, &state->elapsed);
+    FN(carry_bits)(at, &state->off_blocks);
+    for (i = 0U; i < GTC_MAX_TERMS; i++) {
+        FN(carry)(at, &state->term[i][0]);
+        FN(carry)(at, &state->term[i][1]);
+        FN(carry_wide)(at, &state->channel[i]);
+        FN(carry_bits)(at, &state->channel_valid[i]);
+    }
+}
+
+/* All of a state but what init() makes of table and samples_per_block. */
+static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
+{
+    FN(cursor_t) at;
+    gtc_word_t angle[2];
+
+    at.to = to;
+    at.from = from;
+    FN(carry_front)(&at, state);
+    FN(carry_terms)(&at, state);
+    FN(split_angle)(state, angle);
+    FN(carry_bits)(&at, &angle[0].bits);
+    FN(carry_bits)(&at, &angle[1].bits);
+    FN(join_angle)(state, angle);
+}
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
 {
@@ -19,42 +119,27 @@ static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
 
 int FN(save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
 {
-    uint_least32_t i;
+    STATE copy;
 
     if ((state == NULL) || (words == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
     }
+    copy = *state;
     words[0].bits = SAVE_MAGIC;
     words[1].bits = SAVE_OPTIONS;
     words[2].bits = state->table->crc;
-    words[3].bits = state->gap;
-    words[4].bits = state->filled;
-    words[5].bits = state->window_valid;
-    words[6].bits = state->held_blocks;
-    words[7].integer = state->status;
-    ELEMENT(words[8]) = state->mean;
-    ELEMENT(words[9]) = state->last;
-    ELEMENT(words[10]) = state->bias;
-    for (i = 0U; i < GTC_MAX_SLOPE_BLOCKS; i++) {
-        ELEMENT(words[SAVE_HEAD + i]) = state->window[i];
-    }
-    for (i = 0U; i < GTC_MAX_TERMS; i++) {
-        gtc_word_t *const pair = &words[SAVE_HEAD + GTC_MAX_SLOPE_BLOCKS + (2U * i)];
-
-        ELEMENT(pair[0]) = state->term[i][0];
-        ELEMENT(pair[1]) = state->term[i][1];
-    }
-    words[GTC_SAVE_WORDS - 1].bits = FN(save_crc)(words);
+    FN(carry_state)(&copy, &words[SAVE_HEAD], NULL);
+    words[GTC_SAVE_WORDS - 1U].bits = FN(save_crc)(words);
     return GTC_OK;
 }
 
-/* Whether the words are a state of this table in this build. */
+/* Whether the words are a whole state of this table, saved by a build like this one. */
 static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS])
 {
     int status = GTC_OK;
 
     if ((words[0].bits != SAVE_MAGIC)
-        || (words[GTC_SAVE_WORDS - 1].bits != FN(save_crc)(words))) {
+        || (words[GTC_SAVE_WORDS - 1U].bits != FN(save_crc)(words))) {
         status = GTC_E_IMAGE;
     } else if (words[1].bits != SAVE_OPTIONS) {
         status = GTC_E_LAYOUT;
@@ -66,53 +151,43 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
     return status;
 }
 
-/* The window and the correction go on where they were; samples since then count as held. */
-static void FN(resume)(STATE *state, const gtc_word_t words[GTC_SAVE_WORDS])
+/* A state that has just been started takes over the terms that outlast a time without power. If
+ * the saved one had not begun either, it had itself been without power before. */
+static void FN(outlast)(STATE *state, const STATE *saved, uint_least32_t off_blocks)
 {
+    const uint_least32_t before = (saved->gap == 0U) ? saved->off_blocks : 0U;
     uint_least32_t i;
 
-    state->gap = (words[3].bits == 0U) ? 0U : state->samples_per_block;
-    state->filled = words[4].bits;
-    state->window_valid = words[5].bits;
-    state->held_blocks = words[6].bits;
-    state->status = words[7].integer | GTC_HELD;
-    state->mean = ELEMENT(words[8]);
-    state->last = ELEMENT(words[9]);
-    state->bias = ELEMENT(words[10]);
-    for (i = 0U; i < GTC_MAX_SLOPE_BLOCKS; i++) {
-        state->window[i] = ELEMENT(words[SAVE_HEAD + i]);
+    state->off_blocks = ((0xFFFFFFFFUL - before) > off_blocks) ? (before + off_blocks) : 0xFFFFFFFFUL;
+    for (i = 0U; i < state->table->n_terms; i++) {
+        if (state->table->term_code[i]->survives != 0U) {
+            state->term[i][0] = saved->term[i][0];
+            state->term[i][1] = saved->term[i][1];
+        }
     }
 }
 
 int FN(restore)(STATE *state, const TABLE *table, uint_least32_t samples_per_block,
                 const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
 {
-    STATE fresh;
-    uint_least32_t i;
+    STATE saved;
     int status;
 
     if ((state == NULL) || (words == NULL)) {
         return GTC_E_ARG;
     }
-    status = FN(init)(&fresh, table, samples_per_block);
+    status = FN(init)(&saved, table, samples_per_block);
     if (status == GTC_OK) {
         status = FN(inspect)(table, words);
     }
-    if (status != GTC_OK) {
-        return status;
-    }
-    fresh.off_blocks = off_blocks;
-    for (i = 0U; i < table->n_terms; i++) {
-        const gtc_word_t *const pair = &words[SAVE_HEAD + GTC_MAX_SLOPE_BLOCKS + (2U * i)];
-
-        if ((off_blocks == 0U) || (table->term_code[i]->survives != 0U)) {
-            fresh.term[i][0] = ELEMENT(pair[0]);
-            fresh.term[i][1] = ELEMENT(pair[1]);
+    if (status == GTC_OK) {
+        FN(carry_state)(&saved, NULL, &words[SAVE_HEAD]);
+        if ((off_blocks == 0U) && (saved.samples_per_block == samples_per_block)) {
+            *state = saved;
+        } else {
+            status = FN(init)(state, table, samples_per_block);
+            FN(outlast)(state, &saved, off_blocks);
         }
     }
-    if (off_blocks == 0U) {
-        FN(resume)(&fresh, words);
-    }
-    *state = fresh;
-    return GTC_OK;
+    return status;
 }

@@ -1,0 +1,245 @@
+/* test_save.c - a state over power cycles: it goes on bit for bit, or nothing is taken over. */
+#include "test_num.h"
+
+#define WORDS GTC_SAVE_WORDS
+
+/* A temperature history with faults in it, the same for every state. */
+static void walk(state_t *state, int from, int to)
+{
+    int i;
+
+    for (i = from; i < to; i++) {
+        num_t temp = (num_t)(C(15) + ((C(1) / 64) * (num_t)i));
+
+        if ((i % 11) == 7) {
+            temp = MISSING;
+        } else if ((i % 17) == 5) {
+            temp += C(3);
+        } else {
+            /* as it is */
+        }
+        if ((i % 29) == 13) {
+            CHECK(FN(missed)(state, (uint_least32_t)i % 7U) >= 0);
+        }
+        CHECK(FN(sample)(state, &temp) >= 0);
+    }
+}
+
+static num_t angle_of(state_t *state)
+{
+    num_t angle = 0;
+
+    CHECK(FN(angle)(state, (num_t)C(0.0625), &angle) >= 0);
+    return angle;
+}
+
+static void saved(const state_t *state, gtc_word_t words[WORDS])
+{
+    memset(words, 0x5A, WORDS * sizeof words[0]);
+    CHECK_INT(GTC_OK, FN(save)(state, words));
+}
+
+/* Restores; an error must leave the state unwritten. */
+static int restored(state_t *state, const gtc_word_t words[WORDS], uint_least32_t off_blocks)
+{
+    state_t before;
+    int status;
+
+    memset(state, 0xA5, sizeof *state);
+    memcpy(&before, state, sizeof before);
+    status = FN(restore)(state, &TABLE, N, words, off_blocks);
+    CHECK(status <= 0);
+    CHECK((status == GTC_OK) || (memcmp(state, &before, sizeof before) == 0));
+    return status;
+}
+
+/* At every sample of three windows, so at every place of a block. */
+TEST(a_restored_state_goes_on_as_if_nothing_had_happened)
+{
+    gtc_word_t words[WORDS];
+    int cut;
+    int i;
+
+    for (cut = 0; cut < 60; cut++) {
+        state_t state = started();
+        state_t other;
+
+        walk(&state, 0, cut);
+        (void)angle_of(&state);
+        saved(&state, words);
+        CHECK_INT(GTC_OK, restored(&other, words, 0U));
+        for (i = cut; i < (cut + 60); i++) {
+            CHECK_INT(status_of(&state), status_of(&other));
+            CHECK(same(bias_of(&state), bias_of(&other)));
+            CHECK(same(angle_of(&state), angle_of(&other)));
+            walk(&state, i, i + 1);
+            walk(&other, i, i + 1);
+        }
+    }
+}
+
+TEST(a_saved_state_is_the_same_words_again)
+{
+    gtc_word_t words[WORDS];
+    gtc_word_t again[WORDS];
+    state_t state = started();
+    state_t other;
+
+    walk(&state, 0, 47);
+    (void)angle_of(&state);
+    saved(&state, words);
+    CHECK_INT(GTC_OK, restored(&other, words, 0U));
+    saved(&other, again);
+    CHECK(memcmp(words, again, sizeof words) == 0);
+}
+
+TEST(after_a_time_without_power_the_window_starts_again)
+{
+    gtc_word_t words[WORDS];
+    state_t state = started();
+    state_t fresh = started();
+    state_t other;
+    int i;
+
+    walk(&state, 0, 47);
+    saved(&state, words);
+    CHECK_INT(GTC_OK, restored(&other, words, 3U));
+    for (i = 47; i < 100; i++) {
+        CHECK_INT(status_of(&fresh), status_of(&other));
+        CHECK(same(bias_of(&fresh), bias_of(&other)));
+        CHECK(same(angle_of(&fresh), angle_of(&other)));
+        walk(&fresh, i, i + 1);
+        walk(&other, i, i + 1);
+    }
+}
+
+TEST(another_sample_rate_starts_the_window_again)
+{
+    gtc_word_t words[WORDS];
+    state_t state = started();
+
+    walk(&state, 0, 47);
+    saved(&state, words);
+    CHECK_INT(GTC_OK, FN(restore)(&state, &TABLE, N + 1U, words, 0U));
+    CHECK_INT(GTC_HELD, status_of(&state));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15), 1));
+}
+
+TEST(every_flipped_bit_is_refused)
+{
+    gtc_word_t words[WORDS];
+    state_t state = started();
+    uint_least32_t i;
+
+    walk(&state, 0, 47);
+    saved(&state, words);
+    for (i = 0; i < (WORDS * 32U); i++) {
+        words[i / 32U].bits ^= 1UL << (i % 32U);
+        CHECK_INT(GTC_E_IMAGE, restored(&state, words, 0U));
+        CHECK_INT(GTC_E_IMAGE, restored(&state, words, 1U));
+        words[i / 32U].bits ^= 1UL << (i % 32U);
+    }
+    CHECK_INT(GTC_OK, restored(&state, words, 0U));
+}
+
+/* One word of another saved state, or all up to one: what a power cut leaves. */
+TEST(torn_images_are_refused)
+{
+    gtc_word_t words[WORDS];
+    gtc_word_t later[WORDS];
+    gtc_word_t torn[WORDS];
+    state_t state = started();
+    int i;
+
+    walk(&state, 0, 47);
+    saved(&state, words);
+    walk(&state, 47, 94);
+    saved(&state, later);
+    for (i = 0; i < WORDS; i++) {
+        if (words[i].bits != later[i].bits) {
+            memcpy(torn, words, sizeof torn);
+            torn[i] = later[i];
+            CHECK_INT(GTC_E_IMAGE, restored(&state, torn, 0U));
+            memcpy(torn, words, sizeof torn);
+            memcpy(torn, later, (size_t)i * sizeof torn[0]);
+            CHECK((memcmp(torn, words, sizeof torn) == 0)
+                  || (restored(&state, torn, 0U) == GTC_E_IMAGE));
+        }
+    }
+}
+
+TEST(a_state_of_another_table_is_refused)
+{
+    gtc_word_t words[WORDS];
+    state_t state = started();
+    table_t other = TABLE;
+
+    saved(&state, words);
+    other.crc ^= 1U;
+    CHECK_INT(GTC_E_ID, FN(restore)(&state, &other, N, words, 0U));
+    CHECK(state.table == &TABLE);
+}
+
+TEST(erased_memory_is_refused)
+{
+    gtc_word_t words[WORDS];
+    state_t state;
+
+    memset(words, 0xFF, sizeof words);
+    CHECK_INT(GTC_E_IMAGE, restored(&state, words, 0U));
+    memset(words, 0, sizeof words);
+    CHECK_INT(GTC_E_IMAGE, restored(&state, words, 0U));
+}
+
+TEST(a_state_of_the_other_arithmetic_is_refused)
+{
+    gtc_word_t words[WORDS];
+    state_t state;
+#if TEST_Q31
+    gtc_f32_state_t other;
+
+    CHECK_INT(GTC_OK, gtc_f32_init(&other, &gtc_test_1_f32, N));
+    CHECK_INT(GTC_OK, gtc_f32_save(&other, words));
+#else
+    gtc_q31_state_t other;
+
+    CHECK_INT(GTC_OK, gtc_q31_init(&other, &gtc_test_1_q31, N));
+    CHECK_INT(GTC_OK, gtc_q31_save(&other, words));
+#endif
+    CHECK_INT(GTC_E_LAYOUT, restored(&state, words, 0U));
+}
+
+TEST(bad_arguments_are_refused)
+{
+    gtc_word_t words[WORDS];
+    state_t state = started();
+    state_t none = state;
+    table_t unusable = TABLE;
+
+    saved(&state, words);
+    none.table = NULL;
+    unusable.layout = 2U;
+    CHECK_INT(GTC_E_ARG, FN(save)(NULL, words));
+    CHECK_INT(GTC_E_ARG, FN(save)(&state, NULL));
+    CHECK_INT(GTC_E_ARG, FN(save)(&none, words));
+    CHECK_INT(GTC_E_ARG, FN(restore)(NULL, &TABLE, N, words, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(&state, NULL, N, words, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, N, NULL, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, 0U, words, 0U));
+    CHECK_INT(GTC_E_LAYOUT, FN(restore)(&state, &unusable, N, words, 0U));
+}
+
+int main(void)
+{
+    RUN(a_restored_state_goes_on_as_if_nothing_had_happened);
+    RUN(a_saved_state_is_the_same_words_again);
+    RUN(after_a_time_without_power_the_window_starts_again);
+    RUN(another_sample_rate_starts_the_window_again);
+    RUN(every_flipped_bit_is_refused);
+    RUN(torn_images_are_refused);
+    RUN(a_state_of_another_table_is_refused);
+    RUN(erased_memory_is_refused);
+    RUN(a_state_of_the_other_arithmetic_is_refused);
+    RUN(bad_arguments_are_refused);
+    return test_end();
+}
