@@ -146,10 +146,16 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         "refused": refused,
         "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
         "meta": dict(dataset.meta),
-        "files": {
-            p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files
-        },
+        "files": {p.relative_to(folder).as_posix(): _sha256(p) for p in files},
     }
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(2**20):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 @contextmanager

@@ -44,7 +44,7 @@ class Replayed:
     """
 
     bias_dph: NDArray[np.float64]
-    status: NDArray[np.int64]
+    status: NDArray[np.int32]
     scored: NDArray[np.bool_]
     mismatches: int
 
@@ -122,7 +122,7 @@ def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[
         raise CheckFailed(f"{run.file}: {error}") from error
     return Replayed(
         bias_dph=table.decode_bias(replayed.bits),
-        status=replayed.status.astype(np.int64),
+        status=replayed.status,
         scored=history.reference.block_valid,
         mismatches=replayed.mismatches,
     )
@@ -140,15 +140,14 @@ def _one_run(
 ) -> _Part:
     rows = run.rows()
     replayed = replay_run(rows, run, model, table, program)
-    span = run.in_span(rows.time_s)
-    scored = span & replayed.scored
-    after = rows.rate_dph - replayed.bias_dph
+    inside = run.in_span(rows.time_s)
+    span = slice(None) if inside.all() else inside  # no copies of a whole file
     averages = average(
         rows.time_s[span],
         rows.temperature_c[span],
         rows.rate_dph[span],
-        after[span],
-        scored=scored[span],
+        (rows.rate_dph - replayed.bias_dph)[span],
+        scored=replayed.scored[span],
         average_s=average_s,
     )
     if trace is not None:
@@ -165,7 +164,7 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
     return stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
 
 
-def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: NDArray[np.bool_]) -> None:
+def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     columns = (
         rows.time_s[span],

@@ -34,20 +34,17 @@ def _bins(time_s: Array, scored: NDArray[np.bool_], average_s: float) -> tuple[N
     """Bin of every row (from the first row on) and their number; a bin less than half full gets -1."""
     if time_s.size == 0:
         return np.zeros(0, dtype=np.int64), 0
-    period = float(np.median(np.diff(time_s))) if time_s.size > 1 else average_s
+    period = float(np.median(np.diff(time_s), overwrite_input=True)) if time_s.size > 1 else average_s
     # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
-    raw = np.floor((time_s - time_s[0] + 1e-3 * period) / max(average_s, period)).astype(np.int64)
+    passed = time_s - time_s[0]
+    passed += 1e-3 * period
+    passed /= max(average_s, period)
+    raw = np.floor(passed, out=passed).astype(np.int64)
     full = max(average_s, period) / period
-    count = np.bincount(raw[scored], minlength=int(raw[-1]) + 1)
+    count = np.bincount(raw if scored.all() else raw[scored], minlength=int(raw[-1]) + 1)
     keep = count >= max(0.5 * full, 1.0)
     number = np.where(keep, np.cumsum(keep) - 1, -1)
     return np.where(scored, number[raw], -1), int(keep.sum())
-
-
-def _means(bins: NDArray[np.int64], n: int, values: Array) -> Array:
-    used = bins >= 0
-    total = np.bincount(bins[used], weights=values[used], minlength=n)
-    return np.asarray(total / np.bincount(bins[used], minlength=n))
 
 
 def average(
@@ -62,12 +59,19 @@ def average(
     """Averages the scored rows of one run over `average_s`; bins less than half full are left out."""
     scored = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
     bins, n = _bins(time_s, scored, average_s)
-    finite_t = np.where(np.isfinite(temperature_c), temperature_c, 0.0)
+    # Without copies where every row counts: a file of 100 Hz fills memory.
+    used = slice(None) if np.all(bins >= 0) else bins >= 0
+    bins = bins[used]
+    count = np.bincount(bins, minlength=n)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(bins, weights=values[used], minlength=n) / count)
+
     return Averages(
-        time_s=_means(bins, n, time_s),
-        before_dph=_means(bins, n, before_dph),
-        after_dph=_means(bins, n, after_dph),
-        temperature_c=_means(bins, n, finite_t),
+        time_s=mean(time_s),
+        before_dph=mean(before_dph),
+        after_dph=mean(after_dph),
+        temperature_c=mean(np.where(np.isfinite(temperature_c), temperature_c, 0.0)),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from .errors import InputError
@@ -96,16 +97,11 @@ def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | No
     path = next((folder / n for n in names if (folder / n).is_file()), None)
     if path is None:
         return None
-    table = pacsv.read_csv(path)
-    column = {name: table[name].to_numpy().astype(np.float64) for name in table.column_names}
-    return average(
-        column["time_s"],
-        column["temperature_c"],
-        column["rate_dph"],
-        column["compensated_dph"],
-        scored=np.ones(table.num_rows, dtype=bool),
-        average_s=average_s,
-    )
+    names = ["time_s", "temperature_c", "rate_dph", "compensated_dph"]
+    types = pacsv.ConvertOptions(include_columns=names, column_types=dict.fromkeys(names, pa.float64()))
+    table = pacsv.read_csv(path, pacsv.ReadOptions(use_threads=False), convert_options=types)
+    scored = np.ones(table.num_rows, dtype=bool)
+    return average(*(table[name].to_numpy() for name in names), scored=scored, average_s=average_s)
 
 
 def _sci(value: float | None, digits: int = 2) -> str:
