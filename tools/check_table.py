@@ -142,7 +142,7 @@ class Image:
             return math.fsum(total)
         gain_t, gain_r, narrow = self.member["scale"]
         t, r = (min(max(round(v * 65536.0), e[k]), e[k + 1]) for v, k in ((temperature, 0), (slope, 2)))
-        x = (((t - e[0]) * gain_t) >> 26, ((r - e[2]) * gain_r) >> 26)
+        x = (((t - e[0]) * gain_t) >> 27, ((r - e[2]) * gain_r) >> 27)
         total = [network[1], network[2] * x[0] / 65536.0, network[3] * x[1] / 65536.0]
         for s_t, k_t, s_r, k_r, weight in centers:
             u = ((s_t * x[0] + k_t) ** 2 + (s_r * x[1] + k_r) ** 2) / 2.0 ** (56 - narrow)
