@@ -45,10 +45,10 @@ static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
 {
     gtc_word_t words[2];
 
-    FN(split)(*x, words);
+    FN(to_words)(*x, words);
     FN(carry_bits)(at, &words[0].bits);
     FN(carry_bits)(at, &words[1].bits);
-    *x = FN(join)(words);
+    *x = FN(from_words)(words);
 }
 
 /* The front end: everything that the running block and the next correction depend on. */
@@ -106,10 +106,10 @@ static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from
     at.from = from;
     FN(carry_front)(&at, state);
     FN(carry_terms)(&at, state);
-    FN(split_angle)(state, angle);
+    FN(angle_to_words)(state, angle);
     FN(carry_bits)(&at, &angle[0].bits);
     FN(carry_bits)(&at, &angle[1].bits);
-    FN(join_angle)(state, angle);
+    FN(angle_from_words)(state, angle);
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])

@@ -5,24 +5,24 @@
 #ifndef GTC_SAVE_F32_H_INCLUDED
 #define GTC_SAVE_F32_H_INCLUDED
 
-static void FN(split)(float x, gtc_word_t words[2])
+static void FN(to_words)(float x, gtc_word_t words[2])
 {
     words[0].value = x;
     words[1].bits = 0U;
 }
 
-static float FN(join)(const gtc_word_t words[2])
+static float FN(from_words)(const gtc_word_t words[2])
 {
     return words[0].value;
 }
 
-static void FN(split_angle)(const STATE *state, gtc_word_t words[2])
+static void FN(angle_to_words)(const STATE *state, gtc_word_t words[2])
 {
     words[0].value = state->angle[0];
     words[1].value = state->angle[1];
 }
 
-static void FN(join_angle)(STATE *state, const gtc_word_t words[2])
+static void FN(angle_from_words)(STATE *state, const gtc_word_t words[2])
 {
     state->angle[0] = words[0].value;
     state->angle[1] = words[1].value;
