@@ -1,4 +1,4 @@
-"""Writes the table that the C tests use; run it again after a change of layout or rounding."""
+"""Writes the tables that the C tests use; run it again after a change of layout or rounding."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from gyrotc.emit import emit_texts, quantise_all
 from gyrotc.model import load_model
 
 HERE = Path(__file__).resolve().parent
-FILES = ("gtc_test_1.h", "gtc_test_1.c")
-
 
 if __name__ == "__main__":
-    model = load_model(HERE / "model.json")
-    texts = emit_texts(model, quantise_all(model, None))
-    for name in FILES:
-        (HERE / "table" / name).write_bytes(texts[name])
+    for path in sorted(HERE.glob("model*.json")):
+        model = load_model(path)
+        texts = emit_texts(model, quantise_all(model, None))
+        for ending in ("h", "c"):
+            name = f"gtc_{model.id}.{ending}"
+            (HERE / "table" / name).write_bytes(texts[name])

@@ -1,5 +1,5 @@
 /* test_check.c - the boot self-test. */
-#include "test_num.h"
+#include "test_image.h"
 
 TEST(a_sound_table_passes)
 {
@@ -60,8 +60,29 @@ TEST(changed_members_are_found)
 #undef FOUND
 }
 
+TEST(a_known_answer_that_is_not_met_is_found)
+{
+    gtc_word_t probes[64];
+    gtc_word_t image[IMAGE_MAX];
+    table_t table = TABLE;
+    uint_least32_t k;
+
+    /* Temperature not a number; status; answer: each with the right checksum. */
+    for (k = 0U; k < 3U; k++) {
+        uint_least32_t n;
+
+        memcpy(probes, TABLE.probes, TABLE.n_probes * 4U * sizeof probes[0]);
+        table.probes = probes;
+        probes[(k == 0U) ? 0U : (k + 1U)].bits = (k == 0U) ? MISSING_BITS : 77U;
+        n = image_of(&table, image);
+        table.crc = image[n - 1U].bits;
+        CHECK_INT(GTC_E_SELF_TEST, FN(check)(&table));
+    }
+}
+
 int main(void)
 {
+    RUN(a_known_answer_that_is_not_met_is_found);
     RUN(a_sound_table_passes);
     RUN(every_flipped_bit_of_an_array_is_found);
     RUN(changed_members_are_found);

@@ -11,6 +11,9 @@
 
 #include "gtc_test.h"
 #include "gtc_test_1.h"
+#include "gtc_test_b.h"
+#include "gtc_test_h.h"
+#include "gtc_test_t.h"
 
 #if TEST_Q31
 typedef int_least32_t num_t;
@@ -18,16 +21,24 @@ typedef gtc_q31_table_t table_t;
 typedef gtc_q31_state_t state_t;
 #define FN(name) gtc_q31_##name
 #define TABLE gtc_test_1_q31
+#define BANK gtc_test_b_q31
+#define TERMS gtc_test_t_q31
+#define NARROW gtc_test_h_q31
 #define C(temperature) ((int_least32_t)((temperature) * 65536.0))
 #define MISSING GTC_TEMP_MISSING
+#define MISSING_BITS 0x80000000UL
 #else
 typedef float num_t;
 typedef gtc_f32_table_t table_t;
 typedef gtc_f32_state_t state_t;
 #define FN(name) gtc_f32_##name
 #define TABLE gtc_test_1_f32
+#define BANK gtc_test_b_f32
+#define TERMS gtc_test_t_f32
+#define NARROW gtc_test_h_f32
 #define C(temperature) ((float)(temperature))
 #define MISSING test_nan()
+#define MISSING_BITS 0x7FC00000UL
 
 static inline float test_nan(void)
 {

@@ -1,0 +1,164 @@
+/* gtc_test_b.c - bias table of gyro TEST-B. Written by gyrotc; do not edit.
+ *
+ * Make again:  gyrotc emit model.json --out .
+ * Model:       sha256 0374aec108631ddcb9a02445533048310f123884a4bd4516573b7ad2a976a4e3
+ *
+ * The numbers in this file belong to the owner of the gyro's recordings.
+ */
+#include "gtc_test_b.h"
+
+#include <stddef.h>
+
+#if GTC_TABLE_LAYOUT != 1
+#error "gtc_test_b.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#endif
+
+#define V(x) { .value = (x) } /* a float32 number */
+#define B(x) { .bits = (x) }  /* an integer */
+
+/* ---- float32 ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t f32_networks[24] = {
+    B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(30.0F), V(-0.5F), V(0.5F),
+    B(0x3UL), V(-2.0F), V(0.5F), V(-0.25F), V(10.0F), V(60.0F), V(-0.5F), V(0.166666672F),
+    B(0x0UL), V(4.0F), V(0.5F), V(-0.25F), V(10.0F), V(60.0F), V(-0.166666672F), V(0.5F),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t f32_centers[30] = {
+    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* one bit for each cell of T (fastest) and slope, low bit first */
+static const gtc_word_t f32_coverage[1] = {
+    B(0xfc7f0fUL),
+};
+
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t f32_sigma[2] = {
+    V(0.00999999978F), V(0.0199999996F),
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t f32_probes[32] = {
+    V(40.390213F), V(0.0698402897F), V(2.34005451F), B(0x0UL),
+    V(20.780426F), V(-0.360319406F), V(-1.78780854F), B(0x4UL),
+    V(1.17063987F), V(0.209520876F), V(-0.4025971F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(0.361409217F), B(0x0UL),
+    V(41.9510651F), V(0.349201441F), V(4.09978771F), B(0x0UL),
+    V(22.34128F), V(-0.0809582546F), V(-0.59620893F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
+    V(80.0F), V(0.75F), V(4.25F), B(0x2UL),
+};
+
+const gtc_f32_table_t gtc_test_b_f32 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0xc44e9858UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 12UL,
+    .bias_frac_bits = 0UL,
+    .max_step = V(0.5F),
+    .max_slope = V(1.0F),
+    .fallback = V(0.375F),
+    .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
+    .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
+    .n_networks = 3UL,
+    .n_centers = 6UL,
+    .n_channels = 1UL,
+    .n_terms = 0UL,
+    .coverage_cells = { 8UL, 3UL },
+    .sigma_cells = { 2UL, 1UL },
+    .n_probes = 8UL,
+    .networks = f32_networks,
+    .centers = f32_centers,
+    .terms = NULL,
+    .coverage = f32_coverage,
+    .sigma = f32_sigma,
+    .probes = f32_probes,
+    .crc = 0xcab1c56dUL,
+    .term_code = { NULL },
+    .serial = "TEST-B",
+};
+
+/* ---- fixed point ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t q31_networks[24] = {
+    B(0x3UL), B(0xff001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00000000UL), B(0x00009fffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xee001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000aaaaUL),
+    B(0x0UL), B(0x1e000200UL), B(0x08000030UL), B(0xfc000000UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00005555UL), B(0x0000ffffUL),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t q31_centers[30] = {
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* one bit for each cell of T (fastest) and slope, low bit first */
+static const gtc_word_t q31_coverage[1] = {
+    B(0xfc7f0fUL),
+};
+
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t q31_sigma[2] = {
+    B(0x00147ae1UL), B(0x0028f5c3UL),
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t q31_probes[32] = {
+    B(0x002863e5UL), B(0x000011e1UL), B(0x12b82300UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf1b26fe1UL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xfcc79590UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x02e42bb1UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0x20cc6225UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xfb3a97daUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x00eb92e2UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x21fffe2fUL), B(0x2UL),
+};
+
+const gtc_q31_table_t gtc_test_b_q31 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0xc44e9858UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 12UL,
+    .bias_frac_bits = 27UL,
+    .max_step = 32768L,
+    .max_slope = 65536L,
+    .fallback = 50331648L,
+    .scale = { 1677721L, 134217727L, 0L },
+    .envelope = { -1310720L, 3932160L, -32768L, 32768L },
+    .n_networks = 3UL,
+    .n_centers = 6UL,
+    .n_channels = 1UL,
+    .n_terms = 0UL,
+    .coverage_cells = { 8UL, 3UL },
+    .sigma_cells = { 2UL, 1UL },
+    .n_probes = 8UL,
+    .networks = q31_networks,
+    .centers = q31_centers,
+    .terms = NULL,
+    .coverage = q31_coverage,
+    .sigma = q31_sigma,
+    .probes = q31_probes,
+    .crc = 0x40ca99f3UL,
+    .term_code = { NULL },
+    .serial = "TEST-B",
+};
+

@@ -1,0 +1,152 @@
+/* gtc_test_h.c - bias table of gyro TEST-H. Written by gyrotc; do not edit.
+ *
+ * Make again:  gyrotc emit model.json --out .
+ * Model:       sha256 adf08e9dfa037bbd373289000f492c464a10333a630974ff949247a647933cf2
+ *
+ * The numbers in this file belong to the owner of the gyro's recordings.
+ */
+#include "gtc_test_h.h"
+
+#include <stddef.h>
+
+#if GTC_TABLE_LAYOUT != 1
+#error "gtc_test_h.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#endif
+
+#define V(x) { .value = (x) } /* a float32 number */
+#define B(x) { .bits = (x) }  /* an integer */
+
+/* ---- float32 ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t f32_networks[8] = {
+    B(0x2UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t f32_centers[10] = {
+    V(-0.75F), V(480.448975F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.020, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+};
+
+/* kind, channel, parameters */
+static const gtc_word_t f32_terms[16] = {
+    B(0x4UL), B(0x0UL), V(0.125F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* path_length_periodicity */
+    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t f32_probes[32] = {
+    V(40.390213F), V(0.0698402897F), V(-0.262384832F), B(0x0UL),
+    V(20.780426F), V(-0.360319406F), V(-0.933764219F), B(0x0UL),
+    V(1.17063987F), V(0.209520876F), V(-0.890570879F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(-0.341297567F), B(0x0UL),
+    V(41.9510651F), V(0.349201441F), V(-0.316718817F), B(0x0UL),
+    V(22.34128F), V(-0.0809582546F), V(-1.04341567F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(-0.202720672F), B(0x2UL),
+    V(80.0F), V(0.75F), V(0.297279328F), B(0x2UL),
+};
+
+extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
+
+extern const struct gtc_f32_term_code gtc_f32_term_memory;
+
+const gtc_f32_table_t gtc_test_h_f32 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0x249b7146UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 12UL,
+    .bias_frac_bits = 0UL,
+    .max_step = V(0.5F),
+    .max_slope = V(1.0F),
+    .fallback = V(0.375F),
+    .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
+    .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
+    .n_networks = 1UL,
+    .n_centers = 2UL,
+    .n_channels = 1UL,
+    .n_terms = 2UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 0UL, 0UL },
+    .n_probes = 8UL,
+    .networks = f32_networks,
+    .centers = f32_centers,
+    .terms = f32_terms,
+    .coverage = NULL,
+    .sigma = NULL,
+    .probes = f32_probes,
+    .crc = 0x20f64908UL,
+    .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
+    .serial = "TEST-H",
+};
+
+/* ---- fixed point ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t q31_networks[8] = {
+    B(0x2UL), B(0xffdffddaUL), B(0x00fffffaUL), B(0xff7ffffcUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t q31_centers[10] = {
+    B(0x0000781dUL), B(0xf0fc9c69UL), B(0x00000267UL), B(0xfe994134UL), B(0x00c000baUL), /* -10.00 C, +0.500 C/min; widths 0.020, 1.000; +7.500e-01 deg/h */
+    B(0x00000401UL), B(0xfdff820dUL), B(0x00000000UL), B(0x00000000UL), B(0xfec001b9UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+};
+
+/* kind, channel, parameters */
+static const gtc_word_t q31_terms[16] = {
+    B(0x4UL), B(0x0UL), B(0x20000000UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* path_length_periodicity */
+    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t q31_probes[32] = {
+    B(0x002863e5UL), B(0x000011e1UL), B(0xffbcd4c0UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xff10f4b0UL), B(0x0UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff1c05d1UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0xffa8a022UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xffaeed80UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xfef4e1a2UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0xffcc192eUL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x004c18a9UL), B(0x2UL),
+};
+
+extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
+
+extern const struct gtc_q31_term_code gtc_q31_term_memory;
+
+const gtc_q31_table_t gtc_test_h_q31 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0x249b7146UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 12UL,
+    .bias_frac_bits = 24UL,
+    .max_step = 32768L,
+    .max_slope = 65536L,
+    .fallback = 6291456L,
+    .scale = { 1677721L, 134217727L, 8L },
+    .envelope = { -1310720L, 3932160L, -32768L, 32768L },
+    .n_networks = 1UL,
+    .n_centers = 2UL,
+    .n_channels = 1UL,
+    .n_terms = 2UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 0UL, 0UL },
+    .n_probes = 8UL,
+    .networks = q31_networks,
+    .centers = q31_centers,
+    .terms = q31_terms,
+    .coverage = NULL,
+    .sigma = NULL,
+    .probes = q31_probes,
+    .crc = 0x20798aabUL,
+    .term_code = { &gtc_q31_term_harmonic, &gtc_q31_term_memory },
+    .serial = "TEST-H",
+};
+

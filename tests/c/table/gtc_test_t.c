@@ -1,0 +1,166 @@
+/* gtc_test_t.c - bias table of gyro TEST-T. Written by gyrotc; do not edit.
+ *
+ * Make again:  gyrotc emit model.json --out .
+ * Model:       sha256 379713d8493773e9cc1e583e62b525aeaa89b20647ae49fc604454fa192bfdcd
+ *
+ * The numbers in this file belong to the owner of the gyro's recordings.
+ */
+#include "gtc_test_t.h"
+
+#include <stddef.h>
+
+#if GTC_TABLE_LAYOUT != 1
+#error "gtc_test_t.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#endif
+
+#define V(x) { .value = (x) } /* a float32 number */
+#define B(x) { .bits = (x) }  /* an integer */
+
+/* ---- float32 ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t f32_networks[8] = {
+    B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t f32_centers[15] = {
+    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* kind, channel, parameters */
+static const gtc_word_t f32_terms[32] = {
+    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* cavity_lag */
+    B(0x2UL), B(0x0UL), V(2.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* hysteresis */
+    B(0x3UL), B(0x0UL), V(9.23324871F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
+    B(0x5UL), B(0x1UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t f32_probes[32] = {
+    V(40.390213F), V(0.0698402897F), V(-0.12677367F), B(0x0UL),
+    V(20.780426F), V(-0.360319406F), V(-0.642388165F), B(0x0UL),
+    V(1.17063987F), V(0.209520876F), V(-0.4025971F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(0.361409217F), B(0x0UL),
+    V(41.9510651F), V(0.349201441F), V(-0.300033271F), B(0x0UL),
+    V(22.34128F), V(-0.0809582546F), V(-0.784616113F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
+    V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
+};
+
+extern const struct gtc_f32_term_code gtc_f32_term_memory;
+
+extern const struct gtc_f32_term_code gtc_f32_term_play;
+
+extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
+
+extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
+
+const gtc_f32_table_t gtc_test_t_f32 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0x309a2d09UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 0UL,
+    .bias_frac_bits = 0UL,
+    .max_step = V(0.5F),
+    .max_slope = V(1.0F),
+    .fallback = V(0.375F),
+    .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
+    .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
+    .n_networks = 1UL,
+    .n_centers = 3UL,
+    .n_channels = 2UL,
+    .n_terms = 4UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 0UL, 0UL },
+    .n_probes = 8UL,
+    .networks = f32_networks,
+    .centers = f32_centers,
+    .terms = f32_terms,
+    .coverage = NULL,
+    .sigma = NULL,
+    .probes = f32_probes,
+    .crc = 0xdb963e01UL,
+    .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
+    .serial = "TEST-T",
+};
+
+/* ---- fixed point ---- */
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t q31_networks[8] = {
+    B(0x3UL), B(0xffc006e7UL), B(0x01fffdf0UL), B(0xfefffe6eUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t q31_centers[15] = {
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x017fff90UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfd7ffd56UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x009ffec0UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* kind, channel, parameters */
+static const gtc_word_t q31_terms[32] = {
+    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
+    B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
+    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x01000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
+    B(0x5UL), B(0x1UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t q31_probes[32] = {
+    B(0x002863e5UL), B(0x000011e1UL), B(0xffbf167cUL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xfeb71a4aUL), B(0x0UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff31e564UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x00b90aecUL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xff66643cUL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xfe6e47b2UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x003ae4b8UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x0099d424UL), B(0x2UL),
+};
+
+extern const struct gtc_q31_term_code gtc_q31_term_memory;
+
+extern const struct gtc_q31_term_code gtc_q31_term_play;
+
+extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
+
+extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
+
+const gtc_q31_table_t gtc_test_t_q31 = {
+    .layout = 1,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0x309a2d09UL,
+    .slope_blocks = 4UL,
+    .hold_blocks = 2UL,
+    .stuck_samples = 0UL,
+    .bias_frac_bits = 25UL,
+    .max_step = 32768L,
+    .max_slope = 65536L,
+    .fallback = 12582912L,
+    .scale = { 1677721L, 134217727L, 0L },
+    .envelope = { -1310720L, 3932160L, -32768L, 32768L },
+    .n_networks = 1UL,
+    .n_centers = 3UL,
+    .n_channels = 2UL,
+    .n_terms = 4UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 0UL, 0UL },
+    .n_probes = 8UL,
+    .networks = q31_networks,
+    .centers = q31_centers,
+    .terms = q31_terms,
+    .coverage = NULL,
+    .sigma = NULL,
+    .probes = q31_probes,
+    .crc = 0xd17a465eUL,
+    .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
+    .serial = "TEST-T",
+};
+
