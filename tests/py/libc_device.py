@@ -1,0 +1,130 @@
+"""One table on the compiled runtime, called function by function: images, states, saved states."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from conftest import ROOT
+from gyrotc.model import Model
+from gyrotc.table import Table, Words
+from libc_build import Runtime
+from models import bank_of, random_channels, random_history, random_model, random_terms
+
+E_LAYOUT, E_IMAGE, E_ID = -2, -4, -5
+OPTIONS = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4}
+
+
+def _save_words() -> int:
+    """GTC_SAVE_WORDS with default options."""
+    match = re.search(r"#define GTC_SAVE_WORDS \((.*)\)", (ROOT / "include" / "gtc.h").read_text())
+    assert match is not None
+    expression = match[1]
+    for name, value in OPTIONS.items():
+        expression = expression.replace(name, str(value))
+    terms = [t.strip(" ()").split("*") for t in expression.split("+")]
+    return sum(int(np.prod([int(factor) for factor in term])) for term in terms)
+
+
+SAVE_WORDS = _save_words()
+
+
+@dataclass
+class Device:
+    """A compiled runtime with one table, called function by function."""
+
+    runtime: Runtime
+    table: Table
+
+    def __post_init__(self) -> None:
+        self.struct, self._keep = self.runtime.struct(self.table)
+
+    def function(self, name: str) -> Any:
+        return getattr(self.runtime.library, f"gtc_{self.table.numeric}_{name}")
+
+    @cached_property
+    def state_size(self) -> int:
+        size = getattr(self.runtime.library, f"shim_{self.table.numeric}_state_size")
+        size.restype = ctypes.c_size_t
+        return int(size())
+
+    def state(self) -> ctypes.Array[ctypes.c_char]:
+        return ctypes.create_string_buffer(b"\xa5" * self.state_size, self.state_size)
+
+    def open(self, words: Words, expected_id: int | None = None) -> tuple[int, ctypes.Structure]:
+        """Status, and the table; one that is refused must be as it was."""
+        opened = type(self.struct)()
+        ctypes.memset(ctypes.byref(opened), 0xA5, ctypes.sizeof(opened))
+        before = bytes(opened)
+        wanted = self.table.id if expected_id is None else expected_id
+        status = self.function("open")(
+            ctypes.byref(opened), _pointer(words), ctypes.c_uint32(len(words)), ctypes.c_uint32(wanted)
+        )
+        assert status == 0 or bytes(opened) == before
+        return int(status), opened
+
+    def init(self, state: Any, samples_per_block: int) -> None:
+        assert (
+            self.function("init")(state, ctypes.byref(self.struct), ctypes.c_uint32(samples_per_block)) == 0
+        )
+
+    def save(self, state: Any) -> Words:
+        words = np.full(SAVE_WORDS + 1, 0x5A5A5A5A, dtype=np.uint32)
+        assert self.function("save")(state, _pointer(words)) == 0
+        assert words[-1] == 0x5A5A5A5A
+        return words[:-1].copy()
+
+    def restore(self, state: Any, words: Words, samples_per_block: int, off_blocks: int = 0) -> int:
+        """Status; a state that is refused must be as it was."""
+        before = bytes(state)
+        status = self.function("restore")(
+            state,
+            ctypes.byref(self.struct),
+            ctypes.c_uint32(samples_per_block),
+            _pointer(words),
+            ctypes.c_uint32(off_blocks),
+        )
+        assert status == 0 or bytes(state) == before
+        return int(status)
+
+    def steps(self, state: Any, channels: Words, missed: np.ndarray) -> tuple[np.ndarray, Words]:
+        """Goes on with the state; as Runtime.steps(), and an angle with every row."""
+        rows = len(channels)
+        status, bits = np.zeros((rows, 3), np.int32), np.zeros(rows, np.uint32)
+        channels, missed = np.ascontiguousarray(channels), np.ascontiguousarray(missed, dtype=np.uint32)
+        getattr(self.runtime.library, f"shim_{self.table.numeric}_steps")(
+            state,
+            _pointer(channels),
+            ctypes.c_long(channels.shape[1]),
+            _pointer(missed),
+            ctypes.c_long(rows),
+            _pointer(status),
+            _pointer(bits),
+        )
+        return status, bits
+
+    def angle(self, state: Any) -> tuple[int, int]:
+        """Status and bits of the angle over 7 ms."""
+        dt = ctypes.c_float(0.007) if self.table.numeric == "f32" else ctypes.c_int32(7000)
+        bits = ctypes.c_uint32(0)
+        return int(self.function("angle")(state, dt, ctypes.byref(bits))), bits.value
+
+
+def _pointer(words: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(words.ctypes.data)
+
+
+def variant(seed: int) -> Model:
+    """In turn: a plain model, one with terms, a bank of networks."""
+    model = random_model(seed, terms=random_terms(seed) if seed % 3 == 1 else ())
+    return bank_of(model) if seed % 3 == 2 else model
+
+
+def history(model: Model, table: Table, seed: int, rows: int, samples: int) -> tuple[Words, np.ndarray]:
+    """Bits of temperatures and auxiliary channels, and the samples missed before each row."""
+    x, missed = random_history(model, seed, rows, samples)
+    return table.encode_inputs(np.column_stack([x, random_channels(model, seed, rows)])), missed

@@ -1,0 +1,133 @@
+"""A state that was saved and restored anywhere goes on as if nothing had happened; a spoiled one is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.model import Model, Term
+from gyrotc.quantise import NUMERICS, quantise
+from gyrotc.table import Words
+from libc_build import Runtime, runtime
+from libc_device import E_ID, E_IMAGE, SAVE_WORDS, Device, history, variant
+from models import random_history
+
+
+@pytest.fixture(scope="module")
+def build() -> Runtime:
+    return runtime("gcc", ("-O2",))
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_a_restored_state_goes_on_bit_for_bit_in_any_history(build: Runtime, numeric: str) -> None:
+    """Random models, faults and cuts: angles, statuses and corrections of the one that was never cut."""
+    seed = int(np.random.default_rng().integers(2**31))
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    for trial in range(30):
+        model = variant(seed + trial)
+        device = Device(build, quantise(model, numeric))
+        samples_per_block = int(rng.choice([1, 2, 3, 7, 10, 50]))
+        channels, missed = history(model, device.table, seed + trial, 600, samples_per_block)
+        whole, cut = device.state(), device.state()
+        device.init(whole, samples_per_block)
+        device.init(cut, samples_per_block)
+        ends = [*np.sort(rng.integers(0, 600, 40)).tolist(), 600]
+        for start, end in zip([0, *ends[:-1]], ends, strict=True):
+            claim = f"seed {seed}, trial {trial}, rows {start} to {end}"
+            words = device.save(cut)
+            cut = device.state()
+            assert device.restore(cut, words, samples_per_block) == 0, claim
+            np.testing.assert_array_equal(device.save(cut), words, err_msg=claim)
+            expected = device.steps(whole, channels[start:end], missed[start:end])
+            for a, b in zip(expected, device.steps(cut, channels[start:end], missed[start:end]), strict=True):
+                np.testing.assert_array_equal(a, b, err_msg=claim)
+            assert device.angle(whole) == device.angle(cut), claim
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_spoiled_states_are_refused(build: Runtime, numeric: str, model_dict: dict[str, Any]) -> None:
+    """Every flipped bit, every single word of a later state, a state of another table."""
+    model = Model.from_dict(model_dict)
+    device = Device(build, quantise(model, numeric))
+    x, missed = random_history(model, 3, 300, 10)
+    channels = device.table.encode_inputs(x[:, None])
+    state = device.state()
+    device.init(state, 10)
+    device.steps(state, channels[:151], missed[:151])
+    words = device.save(state)
+    device.steps(state, channels[151:], missed[151:])
+    device.angle(state)
+    later = device.save(state)
+    target = device.state()
+    for i in range(SAVE_WORDS):
+        spoiled = words.copy()
+        for bit in range(32):
+            spoiled[i] = words[i] ^ np.uint32(1 << bit)
+            assert device.restore(target, spoiled, 10) == E_IMAGE, f"bit {bit} of word {i}"
+        spoiled[i] = later[i]
+        if spoiled[i] != words[i]:
+            assert device.restore(target, spoiled, 10) == E_IMAGE, f"word {i}"
+    foreign = Device(build, quantise(Model.from_dict(model_dict | {"serial": "RLG-0043"}), numeric))
+    assert foreign.restore(target, words, 10) == E_ID
+    assert device.restore(target, words, 10) == 0
+
+
+def _after_a_ramp(device: Device) -> tuple[Any, Words, Words]:
+    """A state that came up from 0 C and stayed at 20 C; the sample it had last; the correction in force."""
+    temperatures = np.concatenate([np.linspace(0.0, 20.0, 400), np.full(300, 20.0)])
+    channels = device.table.encode_inputs(temperatures[:, None])
+    state = device.state()
+    device.init(state, 10)
+    _, bits = device.steps(state, channels, np.zeros(len(channels)))
+    return state, channels[-1:], bits[-1:]
+
+
+def _first(device: Device, state: Any, sample: Words) -> Words:
+    return device.steps(state, sample, np.zeros(1))[1]
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_a_play_outlasts_a_time_without_power(
+    build: Runtime, numeric: str, model_dict: dict[str, Any]
+) -> None:
+    term = Term(id="hysteresis", parameters={"width_c": 2.0, "amplitude_dph_per_c": 0.01})
+    model = Model.from_dict(model_dict).model_copy(update={"terms": (term,)})
+    device = Device(build, quantise(model, numeric))
+    state, sample, in_force = _after_a_ramp(device)
+    restored, fresh = device.state(), device.state()
+    assert device.restore(restored, device.save(state), 10, off_blocks=1000) == 0
+    device.init(fresh, 10)
+    assert _first(device, restored, sample) == in_force
+    assert _first(device, fresh, sample) != in_force
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_a_memory_relaxes_over_a_time_without_power(
+    build: Runtime, numeric: str, model_dict: dict[str, Any]
+) -> None:
+    """And over two such times with a start without a sample between them as over both together."""
+    parameters = {"tau_s": 600.0, "amplitude_dph_per_c": 0.01}
+    term = Term(id="thermal_gradient", parameters=parameters)
+    model = Model.from_dict(model_dict).model_copy(update={"terms": (term,)})
+    device = Device(build, quantise(model, numeric))
+    state, sample, _ = _after_a_ramp(device)
+    words = device.save(state)
+
+    def bias_after(*off_blocks: int) -> float:
+        saved, target = words, device.state()
+        for off in off_blocks:
+            assert device.restore(target, saved, 10, off_blocks=off) == 0
+            saved = device.save(target)
+        return float(device.table.decode_bias(_first(device, target, sample))[0])
+
+    fresh = device.state()
+    device.init(fresh, 10)
+    settled = float(device.table.decode_bias(_first(device, fresh, sample))[0])
+    left = [settled - bias_after(off) for off in (1, 60, 2**32 - 1)]
+    assert left[0] > 0.005
+    assert left[1] == pytest.approx(left[0] * np.exp(-59 * 10.0 / 600.0), rel=0.01)
+    assert left[2] == pytest.approx(0.0, abs=2e-7)  # 2^-16 C
+    assert bias_after(20, 40) == bias_after(60)
+    assert bias_after(2**32 - 2, 40) == bias_after(2**32 - 1)
