@@ -70,7 +70,7 @@ def read_output(text: str) -> list[BoardOutput]:
     Raises:
         CheckFailed: It is not whole: no `begin`, no `end`, a damaged line, another number of results.
     """
-    lines = [_COLOURS.sub("", line).strip().rstrip(".") for line in text.splitlines()]
+    lines = [line.strip().rstrip(".") for line in _COLOURS.sub("", text).splitlines()]
     parts = list(_parts(lines))
     if not parts:
         tail = next((line for line in reversed(lines) if line), "nothing")
@@ -112,12 +112,11 @@ def _parts(lines: list[str]) -> Iterator[BoardOutput]:
 
 def _words(lines: list[str], start: int, stop: int, columns: int) -> Words:
     shape = re.compile(r"[0-9a-f]{8}" + r" [0-9a-f]{8}" * (columns - 1))
-    rows = []
     for number in range(start, stop):
         if shape.fullmatch(lines[number]) is None:
             raise CheckFailed(f"line {number + 1} of the output is damaged: {lines[number][:80]!r}")
-        rows.append([int(word, 16) for word in lines[number].split()])
-    return np.array(rows, dtype=np.uint32).reshape(-1, columns)
+    octets = bytes.fromhex("".join(lines[start:stop]))
+    return np.frombuffer(octets, dtype=">u4").astype(np.uint32).reshape(-1, columns)
 
 
 def _costs(lines: list[str], number: int) -> tuple[dict[str, Cost], int]:
