@@ -91,7 +91,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0xaUL), B(0x07610bfcUL), B(0xfee9aa8aUL), B(0x012389b8UL), B(0xffdf2d50UL), B(0x00440396UL), B(0xffff9b74UL), B(0x0000648aUL),
+    B(0xaUL), B(0x07610bfcUL), B(0xfee9aa8aUL), B(0x012389b8UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
@@ -153,7 +153,7 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .coverage = q31_coverage,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x6dbb3321UL,
+    .crc = 0x0ea95a54UL,
     .term_code = { NULL },
     .serial = "RLG-0042",
 };
