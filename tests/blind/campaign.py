@@ -167,7 +167,9 @@ def draw_recording(
     offset = rng.uniform(-0.01, 0.01)
     for run, rate, extra in zip(campaign.runs, scene.rates(), total, strict=True):
         seen = run.block_c
-        if stress == "sensor_lag":  # the bias knows the temperature before the thermometer does: T = T_s + tau dT_s/dt
+        if (
+            stress == "sensor_lag"
+        ):  # the bias knows the temperature before the thermometer does: T = T_s + tau dT_s/dt
             seen = seen + 60.0 * np.gradient(seen)
             rate = np.gradient(seen) * 60.0
         static = offset + contrast * scene.map(seen, rate)
@@ -202,11 +204,19 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     lines = ["schema = 1", f'serial = "{serial}"', 'earth_rate = "none"']
     if declare:
-        lines += ["", "[noise]"] + [f"{k} = {float(v)!r}" for k, v in (truth.declared or truth.noise).declared().items()]
+        lines += ["", "[noise]"] + [
+            f"{k} = {float(v)!r}" for k, v in (truth.declared or truth.noise).declared().items()
+        ]
     for k, (run, role) in enumerate(zip(campaign.runs, campaign.roles, strict=True)):
         name = f"run-{k + 1:02d}.csv"
         started = (_EPOCH + timedelta(days=campaign.days[k])).isoformat()
-        lines += ["", "[[run]]", f'file = "{name}"', f'role = "{role}"', f"environment = {json.dumps(run.name)}"]
+        lines += [
+            "",
+            "[[run]]",
+            f'file = "{name}"',
+            f'role = "{role}"',
+            f"environment = {json.dumps(run.name)}",
+        ]
         lines += [f"started = {started}", f"power_on_s = {-run.lead_s}"]
         n = campaign.recorded_c[k].size
         table = np.column_stack(

@@ -51,7 +51,9 @@ def orders(total: int, rng: np.random.Generator) -> list[Order]:
         out.append(Order("two", tuple((name, float(rng.uniform(2.5, 5.0))) for name in pair)))
     foreign = (*effects.FOREIGN, *effects.FOREIGN_RANDOM)
     for k in range(round(0.12 * total)):
-        out.append(Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),)))
+        out.append(
+            Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),))
+        )
     rng.shuffle(out)  # type: ignore[arg-type]
     return out
 

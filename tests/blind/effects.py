@@ -212,7 +212,7 @@ def creep(scene: Scene, rng: np.random.Generator) -> Effect:
         rate = np.sign(np.gradient(run.block_c)) * (np.abs(np.gradient(run.block_c)) > 3e-4)
         since, sign, trace = 0.0, 0.0, np.empty_like(run.block_c)
         for k, s in enumerate(rate.tolist()):
-            if s != 0.0 and s != sign:
+            if s not in (0.0, sign):
                 sign, since = s, 0.0
             since += 1.0
             trace[k] = sign * np.log1p(since / grain)
@@ -239,7 +239,8 @@ def node_product(scene: Scene, rng: np.random.Generator) -> Effect:
     tau = log_uniform(rng, 300, 1500)
     period = rng.uniform(25, 45)
     return [
-        np.sin(2 * np.pi * r.block_c / period) * np.abs(follow(r.block_c, tau) - r.block_c) for r in scene.runs
+        np.sin(2 * np.pi * r.block_c / period) * np.abs(follow(r.block_c, tau) - r.block_c)
+        for r in scene.runs
     ], {}
 
 

@@ -16,7 +16,9 @@ Row = dict[str, Any]
 _AVERAGE = 10  # rows of 10 s in 100 s
 
 
-def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool) -> Row:
+def grade(
+    hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool
+) -> Row:
     """Truth and answer of one recording, side by side."""
     physical = [c for c in result["causes"] if c["family"] != "noise"]
     row: Row = {
@@ -62,7 +64,9 @@ def _parameters(hidden: Hidden, physical: list[dict[str, Any]]) -> list[dict[str
                 got = cause["parameters"].get(key)
                 if got is not None:
                     inside = got["low"] <= value <= got["high"]
-                    out.append({"name": f"{name}.{key}", "true": value, "got": got["value"], "inside": inside})
+                    out.append(
+                        {"name": f"{name}.{key}", "true": value, "got": got["value"], "inside": inside}
+                    )
     return out
 
 
@@ -151,23 +155,114 @@ RANDOM = ("thermometer_drift", "telegraph", "pulses", "room_cycle")
 
 CHECKS: list[Check] = [
     ("false alarm, clean", "≤ 2 %", lambda r: r["stratum"] == "clean", alarmed, 0.02, "max"),
-    ("anything but consistent, clean", "-", lambda r: r["stratum"] == "clean", lambda r: r["verdict"] != "consistent", 0.05, "max"),
-    ("physical name under stress noise", "≤ 3 %", lambda r: r["stratum"] == "stress", lambda r: bool(r["named"]), 0.03, "max"),
-    ("sensor lag named", "≤ 5 %", lambda r: r["stratum"] == "sensor lag", lambda r: bool(r["named"]), 0.05, "max"),
+    (
+        "anything but consistent, clean",
+        "-",
+        lambda r: r["stratum"] == "clean",
+        lambda r: r["verdict"] != "consistent",
+        0.05,
+        "max",
+    ),
+    (
+        "physical name under stress noise",
+        "≤ 3 %",
+        lambda r: r["stratum"] == "stress",
+        lambda r: bool(r["named"]),
+        0.03,
+        "max",
+    ),
+    (
+        "sensor lag named",
+        "≤ 5 %",
+        lambda r: r["stratum"] == "sensor lag",
+        lambda r: bool(r["named"]),
+        0.05,
+        "max",
+    ),
     ("detected, k 1.25-1.7", "≥ 90 %", _one(1.25, 1.7), alarmed, 0.90, "min"),
     ("detected, k ≥ 1.7", "≥ 98 %", _one(1.7), alarmed, 0.98, "min"),
     ("detected, turn-on offset, k ≥ 1.7", "≥ 90 %", _one(1.7, offset=True), alarmed, 0.90, "min"),
-    ("family right, k 1.7-2.5", "≥ 95 %", lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r), family_right, 0.95, "min"),
-    ("family right, k ≥ 2.5", "≥ 98 %", lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r), family_right, 0.98, "min"),
-    ("truth in the set, k 1.7-2.5", "≥ 90 %", lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r), in_set, 0.90, "min"),
-    ("truth in the set, k ≥ 2.5", "≥ 95 %", lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r), in_set, 0.95, "min"),
+    (
+        "family right, k 1.7-2.5",
+        "≥ 95 %",
+        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r),
+        family_right,
+        0.95,
+        "min",
+    ),
+    (
+        "family right, k ≥ 2.5",
+        "≥ 98 %",
+        lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r),
+        family_right,
+        0.98,
+        "min",
+    ),
+    (
+        "truth in the set, k 1.7-2.5",
+        "≥ 90 %",
+        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r),
+        in_set,
+        0.90,
+        "min",
+    ),
+    (
+        "truth in the set, k ≥ 2.5",
+        "≥ 95 %",
+        lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r),
+        in_set,
+        0.95,
+        "min",
+    ),
     ("wrong family, any k", "≤ 5 %", lambda r: r["stratum"] == "one", wrong_family, 0.05, "max"),
-    ("wrong name, k < 0.7", "≤ 5 %", lambda r: r["stratum"] == "one" and _k(r) < 0.7, wrong_family, 0.05, "max"),
-    ("foreign given a physical name, k 2.5-5", "≤ 10 %", lambda r: r["stratum"] == "foreign" and 2.5 <= _k(r) < 5, lambda r: bool(r["named"]), 0.10, "max"),
-    ("foreign given a physical name, k ≥ 5", "≤ 2 %", lambda r: r["stratum"] == "foreign" and _k(r) >= 5, lambda r: bool(r["named"]), 0.02, "max"),
-    ("not reproducible, k ≥ 4: noise differs or unexplained", "≥ 80 %", lambda r: r["stratum"] == "foreign" and r["truth"][0] in RANDOM and _k(r) >= 4, lambda r: r["verdict"] in ("noise_differs", "unexplained"), 0.80, "min"),
-    ("two effects, separating: both families", "≥ 80 %", lambda r: r["stratum"] == "two" and r["design"] == "separating", lambda r: {FAMILY[t] for t in r["truth"]} <= {FAMILY[n] for n in r["named"]}, 0.80, "min"),
-    ("two effects: no third", "≥ 95 %", lambda r: r["stratum"] == "two", lambda r: len(r["named"]) <= 2, 0.95, "min"),
+    (
+        "wrong name, k < 0.7",
+        "≤ 5 %",
+        lambda r: r["stratum"] == "one" and _k(r) < 0.7,
+        wrong_family,
+        0.05,
+        "max",
+    ),
+    (
+        "foreign given a physical name, k 2.5-5",
+        "≤ 10 %",
+        lambda r: r["stratum"] == "foreign" and 2.5 <= _k(r) < 5,
+        lambda r: bool(r["named"]),
+        0.10,
+        "max",
+    ),
+    (
+        "foreign given a physical name, k ≥ 5",
+        "≤ 2 %",
+        lambda r: r["stratum"] == "foreign" and _k(r) >= 5,
+        lambda r: bool(r["named"]),
+        0.02,
+        "max",
+    ),
+    (
+        "not reproducible, k ≥ 4: noise differs or unexplained",
+        "≥ 80 %",
+        lambda r: r["stratum"] == "foreign" and r["truth"][0] in RANDOM and _k(r) >= 4,
+        lambda r: r["verdict"] in ("noise_differs", "unexplained"),
+        0.80,
+        "min",
+    ),
+    (
+        "two effects, separating: both families",
+        "≥ 80 %",
+        lambda r: r["stratum"] == "two" and r["design"] == "separating",
+        lambda r: {FAMILY[t] for t in r["truth"]} <= {FAMILY[n] for n in r["named"]},
+        0.80,
+        "min",
+    ),
+    (
+        "two effects: no third",
+        "≥ 95 %",
+        lambda r: r["stratum"] == "two",
+        lambda r: len(r["named"]) <= 2,
+        0.95,
+        "min",
+    ),
 ]
 
 
@@ -182,7 +277,18 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
             share = hits / len(chosen)
             met = share <= bound if kind == "max" else share >= bound
             out.append(
-                {"name": name, "goal": goal, "hits": hits, "of": len(chosen), "share": share, "low": low, "high": high, "met": met, "bound": bound, "kind": kind}
+                {
+                    "name": name,
+                    "goal": goal,
+                    "hits": hits,
+                    "of": len(chosen),
+                    "share": share,
+                    "low": low,
+                    "high": high,
+                    "met": met,
+                    "bound": bound,
+                    "kind": kind,
+                }
             )
     return out + _quantiles(rows)
 
@@ -216,10 +322,22 @@ def _quantiles(rows: Sequence[Row]) -> list[dict[str, Any]]:
     if inside:
         share = float(np.mean(inside))
         add("95 % intervals cover", "90-98 %", share, 0.90 <= share <= 0.985, len(inside))
-    sizes = [1 + max((len(e) for e in r["equivalent"]), default=0) for r in rows if r["stratum"] == "one" and _k(r) >= 1.7 and r["named"]]
+    sizes = [
+        1 + max((len(e) for e in r["equivalent"]), default=0)
+        for r in rows
+        if r["stratum"] == "one" and _k(r) >= 1.7 and r["named"]
+    ]
     if sizes:
-        add("mean size of the set, k ≥ 1.7", "≤ 2", float(np.mean(sizes)), float(np.mean(sizes)) <= 2, len(sizes))
-    told = [r for r in rows if r["stratum"] == "one" and r["design"] == "separating" and r["named"] and _told(r)]
+        add(
+            "mean size of the set, k ≥ 1.7",
+            "≤ 2",
+            float(np.mean(sizes)),
+            float(np.mean(sizes)) <= 2,
+            len(sizes),
+        )
+    told = [
+        r for r in rows if r["stratum"] == "one" and r["design"] == "separating" and r["named"] and _told(r)
+    ]
     if told:
         share = float(np.mean([r["truth"][0] == r["named"][0] for r in told]))
         add("member right where printed d_sep ≤ d (separating)", "≥ 90 %", share, share >= 0.9, len(told))
@@ -227,7 +345,13 @@ def _quantiles(rows: Sequence[Row]) -> list[dict[str, Any]]:
     out += _honesty(rows)
     seconds = [r["seconds"] for r in rows if r["seconds"]]
     if seconds:
-        add("median time of a diagnosis, s (cached bank, machine shared)", "≤ 3", float(np.median(seconds)), float(np.median(seconds)) <= 3.0, len(seconds))
+        add(
+            "median time of a diagnosis, s (cached bank, machine shared)",
+            "≤ 3",
+            float(np.median(seconds)),
+            float(np.median(seconds)) <= 3.0,
+            len(seconds),
+        )
     return out
 
 
@@ -241,7 +365,10 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
     chosen = [
         r["gain"]
         for r in rows
-        if r["stratum"] == "one" and _k(r) >= 1.7 and r["gain"] and family_right(r)
+        if r["stratum"] == "one"
+        and _k(r) >= 1.7
+        and r["gain"]
+        and family_right(r)
         and r["truth"][0] in ("cavity_lag", "thermal_gradient", "hysteresis", "warm_up", "auxiliary")
     ]
     out: list[dict[str, Any]] = []
@@ -249,11 +376,27 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
         got = sum(max(g["before2"], 0) / g["noise2"] - g["after2"] / g["noise2"] for g in chosen)
         best = sum(g["before2"] / g["noise2"] - 1.0 for g in chosen)
         share = got / best
-        out.append({"name": "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)", "goal": "≥ 85 %", "value": share, "met": share >= 0.85, "of": len(chosen)})
+        out.append(
+            {
+                "name": "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)",
+                "goal": "≥ 85 %",
+                "value": share,
+                "met": share >= 0.85,
+                "of": len(chosen),
+            }
+        )
     shipped = [r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]]
     if shipped:
         worse = float(np.mean([g["after2"] > g["before2"] for g in shipped]))
-        out.append({"name": "shipped although worse on the exam", "goal": "0", "value": worse, "met": worse == 0.0, "of": len(shipped)})
+        out.append(
+            {
+                "name": "shipped although worse on the exam",
+                "goal": "0",
+                "value": worse,
+                "met": worse == 0.0,
+                "of": len(shipped),
+            }
+        )
     return out
 
 
@@ -271,17 +414,30 @@ def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if like.max() > best:
             best, at = float(like.max()), (float(c), float(widths[like.argmax()]))
     ratio = float(np.exp(at[0] + at[1] * np.log(19.0)))
-    return [{"name": "95 %-power amplitude over printed limit", "goal": "0.75-1.25", "value": ratio, "met": 0.75 <= ratio <= 1.25, "of": len(data)}]
+    return [
+        {
+            "name": "95 %-power amplitude over printed limit",
+            "goal": "0.75-1.25",
+            "value": ratio,
+            "met": 0.75 <= ratio <= 1.25,
+            "of": len(data),
+        }
+    ]
 
 
 def text(rows: Sequence[Row]) -> str:
     """The table as Markdown."""
-    lines = ["| requirement | figure | measured | 95 % limits | records | met |", "| --- | --- | --- | --- | --- | --- |"]
+    lines = [
+        "| requirement | figure | measured | 95 % limits | records | met |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     for t in table(rows):
         if "hits" in t:
             lines.append(
                 f"| {t['name']} | {t['goal']} | {t['share']:.1%} | {t['low']:.1%}-{t['high']:.1%} | {t['hits']}/{t['of']} | {'yes' if t['met'] else 'no'} |"
             )
         else:
-            lines.append(f"| {t['name']} | {t['goal']} | {t['value']:.3g} | | {t['of']} | {'yes' if t['met'] else 'no'} |")
+            lines.append(
+                f"| {t['name']} | {t['goal']} | {t['value']:.3g} | | {t['of']} | {'yes' if t['met'] else 'no'} |"
+            )
     return "\n".join(lines)

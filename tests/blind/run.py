@@ -87,13 +87,22 @@ def one_campaign(
                 with store.open("a", encoding="utf-8") as stream:
                     stream.write(json.dumps(row) + "\n")
             if verbose:
-                print(f"{at:4d} {row['truth']} {row['k']} {row['stress']} -> {row['verdict']} {row['named']} {row['noise']}", flush=True)
+                print(
+                    f"{at:4d} {row['truth']} {row['k']} {row['stress']} -> {row['verdict']} {row['named']} {row['noise']}",
+                    flush=True,
+                )
     tool.close()
     return rows
 
 
 def run(
-    seed: int, records: int, workers: int, folder: Path, *, per_campaign: int = PER_CAMPAIGN, verbose: bool = True
+    seed: int,
+    records: int,
+    workers: int,
+    folder: Path,
+    *,
+    per_campaign: int = PER_CAMPAIGN,
+    verbose: bool = True,
 ) -> list[Row]:
     """A whole run; rows that `folder` holds already are not made again."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -108,7 +117,9 @@ def run(
     cache.mkdir(exist_ok=True)
     jobs = []
     for number in range(0, len(wanted), per_campaign):
-        todo = [(k, wanted[k]) for k in range(number, min(number + per_campaign, len(wanted))) if k not in done]
+        todo = [
+            (k, wanted[k]) for k in range(number, min(number + per_campaign, len(wanted))) if k not in done
+        ]
         if todo:
             jobs.append((number // per_campaign, todo))
     with ThreadPoolExecutor(workers) as pool:
@@ -133,7 +144,9 @@ def main() -> None:
     report = text(rows)
     print(report)
     if arguments.results is not None:
-        head = f"\n### Blind run, seed {seed}, {len(rows)} recordings, {(time.time() - began) / 60:.0f} min\n\n"
+        head = (
+            f"\n### Blind run, seed {seed}, {len(rows)} recordings, {(time.time() - began) / 60:.0f} min\n\n"
+        )
         with arguments.results.open("a", encoding="utf-8") as stream:
             stream.write(head + report + "\n")
 

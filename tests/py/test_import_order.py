@@ -39,6 +39,7 @@ ORDER = [
     "check",
     "diagnose",
     "plots",
+    "diagnosis_plots",
     "report",
     "paper",
     "triad",

@@ -7,16 +7,15 @@ dictionary (lack of fit).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc
 
-from .catalogue import PENALTY, Candidate
-from .detect import score
+from .catalogue import Candidate
 from .likelihood import Gains, Point
-from .refine import Refined, refine
+from .misfit import misfit
+from .refine import Refined, refine, taken
 from .search import Found, Search
 
 __all__ = ["Attribution", "Rival", "attribute", "choose"]
@@ -28,9 +27,10 @@ _LEVEL = 0.01
 _EQUIVALENT = 8.0  # difference of the criterion within which two explanations count as equal
 _PAIR = 10.0  # what a pair must gain over the best single cause
 _MEMBER = 15.0  # what each of a pair must gain beside the other
-_MOST = 3
+_SMALLEST = 0.03  # ... and of the pair's gain: what is less may be the imperfection of the other
+_WELL = 0.08  # p-value of what is left that a pair must reach
+_LEADING = 0.35  # share of a pair's gain that its best single cause must have
 _MISFIT = 0.01
-_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,22 @@ class Attribution:
         return bool(self.first) and self.first[0].p_value <= _LEVEL
 
 
+@dataclass(frozen=True)
+class _Stage:
+    """A set of causes with everything that follows from it."""
+
+    chosen: tuple[Candidate, ...]
+    refined: tuple[Refined, ...]
+    found: list[Found]
+    gain: float
+    misfit_p: float
+    share: float
+
+    @property
+    def remains(self) -> bool:
+        return self.misfit_p < _MISFIT or self.found[0].p_value <= _LEVEL
+
+
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = search.detect(search.base)
@@ -77,39 +93,44 @@ def attribute(search: Search) -> Attribution:
         return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first)
     gains = Gains(search)
     singles = list(gains.single())
-    chosen: tuple[Candidate, ...] = _best(singles, gains.size).members
-    refined = _refined(search, gains, chosen)
-    current, out = _with(search, refined)
-    found = current.detect(out)
-    misfit_p, share = _misfit(current, out, _total(gains, current, out))
+    stage = _stage(search, gains, _best(singles, gains.size).members)
     pairs: list[Point] = []
-    if found[0].p_value <= _LEVEL or misfit_p <= _MISFIT:
-        pairs = [p for p in gains.pairs() if p.members[0].id != p.members[1].id or _twice(p)]
+    if stage.remains:
+        pairs = [p for p in gains.pairs() if _allowed(p)]
         pair = _pair(singles, pairs, gains.size)
         if pair is not None:
-            chosen = pair.members
-            refined = _refined(search, gains, chosen)
-            current, out = _with(search, refined)
-            found = current.detect(out)
-            third = _third(found, chosen)
-            if third is not None and len(chosen) < _MOST:
-                chosen = (*chosen, third)
-                refined = _refined(search, gains, chosen)
-                current, out = _with(search, refined)
-                found = current.detect(out)
-        misfit_p, share = _misfit(current, out, _total(gains, current, out))
-    order = _by_strength(singles, chosen)
-    refined = tuple(refined[k] for k in order)
+            stage = _deeper(search, gains, stage, pair.members)
+    order = _by_strength(singles, stage.chosen)
+    refined = tuple(stage.refined[k] for k in order)
     return Attribution(
         first=first,
         causes=refined,
-        p_values=tuple(_p_value(first, r.candidate.id) for r in refined),
-        rivals=_rivals(singles, pairs, tuple(chosen[k] for k in order), gains.size),
-        gain=_total(gains, current, out),
-        misfit_p=misfit_p,
-        share=share,
-        last=found,
+        p_values=tuple(_p_value(first, r.candidate) for r in refined),
+        rivals=_rivals(singles, pairs, tuple(stage.chosen[k] for k in order), gains.size),
+        gain=stage.gain,
+        misfit_p=stage.misfit_p,
+        share=stage.share,
+        last=stage.found,
     )
+
+
+def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
+    refined = refine(search, gains, chosen)
+    current, out = _with(search, refined)
+    gain = _total(current, out)
+    misfit_p, share = misfit(current, out, refined, gain)
+    return _Stage(chosen, refined, current.detect(out), gain, misfit_p, share)
+
+
+def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
+    """The pair, or three causes, where these leave nothing; else the single cause with its remainder."""
+    two = _stage(search, gains, pair)
+    third = _third(two.found, pair) if two.remains else None
+    if third is not None:
+        three = _stage(search, gains, (*pair, third))
+        if three.misfit_p >= _WELL > two.misfit_p:
+            return three
+    return two if two.misfit_p >= _WELL else one
 
 
 def choose(search: Search, count: int) -> tuple[Refined, ...]:
@@ -118,16 +139,22 @@ def choose(search: Search, count: int) -> tuple[Refined, ...]:
     points = list(gains.single())
     best = _best(points, gains.size)
     if count > 1:
-        pairs = [p for p in gains.pairs() if p.members[0].id != p.members[1].id or _twice(p)]
+        pairs = [p for p in gains.pairs() if _allowed(p)]
         pair = _best(pairs, gains.size)
         best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
-    chosen = sorted(best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0))
+    chosen = sorted(
+        best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0)
+    )
     return refine(search, gains, tuple(chosen)) if best.criterion(gains.size) > 0.0 else ()
 
 
-def _twice(point: Point) -> bool:
-    """Two gradients, or two periods, that differ by more than the grid can confuse."""
+def _allowed(point: Point) -> bool:
+    """Pairs that make sense: not two of a kind, except gradients or periods far apart, and one static cause."""
     a, b = point.members
+    if {a.id, b.id} == {"path_length_periodicity", "map_too_coarse"}:
+        return False
+    if a.id != b.id:
+        return True
     if a.id not in ("thermal_gradient", "path_length_periodicity") or a.channel != b.channel:
         return a.channel != b.channel
     x, y = (next(iter(m.values.values())) for m in (a, b))
@@ -144,9 +171,11 @@ def _pair(singles: list[Point], pairs: list[Point], size: int) -> Point | None:
     alone = {id: max(p.gain for p in singles if p.members[0].id == id) for id in {m.id for m in best.members}}
     if best.criterion(size) < _best(singles, size).criterion(size) + _PAIR:
         return None
-    if any(best.gain - gain < _MEMBER for gain in alone.values()):
+    least = max(_MEMBER, _SMALLEST * best.gain)
+    if any(best.gain - gain < least for gain in alone.values()):
         return None
-    return best
+    leading = max(p.gain for p in singles)
+    return best if leading >= _LEADING * best.gain else None
 
 
 def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | None:
@@ -159,41 +188,21 @@ def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | Non
     return top.candidate
 
 
-def _refined(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tuple[Refined, ...]:
-    return refine(search, gains, members)
-
-
 def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Index]:
     """The search with the causes' columns and tangents as part of every model."""
-    blocks = [b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None]
-    current = search.extended(np.column_stack(blocks))
+    current = search.extended(taken(causes))
     out = current.base
     if any(c.candidate.role == "input" for c in causes):
         out = out[search.n_map :]  # the replaced map stands among the added columns
     return current, out
 
 
-def _total(gains: Gains, current: Search, out: Index) -> float:
+def _total(current: Search, out: Index) -> float:
     """Energy that the causes explain beyond the map, at the likeliest colour, over the noise."""
-    view = current.views[current.best]
+    view = current.likeliest
     before = current.project(view, np.arange(current.n_map))
     after = current.project(view, out)
     return max((before.rest - after.rest) / view.scale**2, 0.0)
-
-
-def _misfit(current: Search, out: Index, gain: float) -> tuple[float, float]:
-    """Lack of fit: p-value of the energy left in the dictionary (worst colour), and the share explained."""
-    best, excess = 0.0, 0.0
-    worst = np.inf
-    for k in current.allowed:
-        projection = current.project(current.views[k], out)
-        energy = float(((projection.a @ projection.structure) ** 2).sum())
-        size = projection.structure.shape[1]
-        log_p = -np.log(max(float(gammaincc(0.5 * size, 0.5 * energy)), 1e-300))
-        if log_p < worst:
-            worst, best, excess = log_p, energy, energy - size
-    del best
-    return float(np.exp(-worst)), gain / max(gain + max(excess, 0.0), 1e-300)
 
 
 def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:
@@ -201,8 +210,9 @@ def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[in
     return sorted(range(len(chosen)), key=lambda k: -alone[k])
 
 
-def _p_value(found: list[Found], cause: str) -> float:
-    return min((f.p_value for f in found if f.candidate.id == cause), default=1.0)
+def _p_value(found: list[Found], cause: Candidate) -> float:
+    same = (f.p_value for f in found if (f.candidate.id, f.candidate.channel) == (cause.id, cause.channel))
+    return min(same, default=1.0)
 
 
 def _rivals(

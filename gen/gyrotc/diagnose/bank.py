@@ -21,6 +21,7 @@ __all__ = ["Bank", "Group", "build", "replaced_map"]
 Array = NDArray[np.float64]
 
 _DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
+_TEXTURE_C, _DIRECTION_C, _MODULATING_S = 8.0, 3.0, 700.0
 _COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
 _SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
 
@@ -46,7 +47,7 @@ class Bank:
         inputs: Candidates that change the map's input.
         replaced: Map of the changed inputs, shape (len(inputs), N, m).
         known: Blocks where the changed inputs are known, shape (len(inputs), N).
-        common: From signatures to their principal directions, shape (K, p).
+        common: From signatures to their principal directions, weighted by how much they share, shape (K, p).
         grams: Inner products of (map, signatures) under each colour, shape (len(COLOURS), m + K, m + K).
         log_dets: log det of each colour's covariance.
         untestable: Why a cause cannot be tested, by id.
@@ -100,7 +101,7 @@ def build(records: Records, level: int) -> Bank:
         inputs=tuple(inputs),
         replaced=replaced,
         known=known,
-        common=right[keep].T / size[keep],
+        common=right[keep].T,
         grams=grams,
         log_dets=log_dets,
         untestable=untestable,
@@ -108,9 +109,7 @@ def build(records: Records, level: int) -> Bank:
     )
 
 
-def _grams(
-    records: Records, static: Array, signatures: Array, sigma: Array | None
-) -> tuple[Array, Array]:
+def _grams(records: Records, static: Array, signatures: Array, sigma: Array | None) -> tuple[Array, Array]:
     """Inner products and log determinants under every colour."""
     both = np.column_stack([static, signatures])
     grams, log_dets = [], []
@@ -164,12 +163,20 @@ def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]
 
 
 def _dictionary(records: Records) -> Array:
-    """Shapes that no cause has, for the lack-of-fit test: memories times T and rectified."""
+    """Shapes that no cause has, for the lack-of-fit test.
+
+    Memories times T and rectified; texture over T that differs by direction, or that a memory modulates.
+    """
+    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
     out = []
     for tau in _DICTIONARY_LAGS_S:
         late = columns_of(records, "thermal_gradient", {"tau_s": tau})[:, 0]
-        t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
         out += [late * (t - t.mean()), np.abs(late)]
+    nodes = np.arange(t.min(), t.max() + _TEXTURE_C, _TEXTURE_C)
+    texture = np.maximum(0.0, 1.0 - np.abs(t[:, None] - nodes) / _TEXTURE_C)
+    direction = columns_of(records, "hysteresis", {"width_c": _DIRECTION_C})
+    memory = columns_of(records, "thermal_gradient", {"tau_s": _MODULATING_S})
+    out += list((texture * direction).T) + list((texture * memory).T)
     if len(records.runs) < 3:
         out += list(columns_of(records, "turn_on_offset", {}).T)
     return np.column_stack(out)

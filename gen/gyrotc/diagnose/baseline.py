@@ -21,7 +21,7 @@ LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3), (19, 8, 5), (
 """Gaussians over T alone, and over T × dT/dt, from coarse to fine."""
 
 _KEEP = 3e-4  # singular values of the averaged basis below this share of the largest are dropped
-_FINE_C = 4.0  # spacing of the local functions that say whether the map is too coarse
+_FINE_C = 2.5  # spacing of the local functions that say whether the map is too coarse
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,10 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
     slopes = [centred_slope(run.history) for run in records.runs]
     t = records.average([run.history.temperature_c for run in records.runs])
     r = records.average(slopes)
-    middle, half = (0.5 * (t.min() + t.max()), 0.0), (max(0.5 * float(np.ptp(t)), 1.0), max(float(abs(r).max()), 0.05))
+    middle, half = (
+        (0.5 * (t.min() + t.max()), 0.0),
+        (max(0.5 * float(np.ptp(t)), 1.0), max(float(abs(r).max()), 0.05)),
+    )
     grid_t, grid_a, grid_r = np.linspace(-1, 1, n_t), np.linspace(-1, 1, n_a), np.linspace(-1, 1, n_r)
     across = np.array([(a, b) for a in grid_a for b in grid_r])
     raw = MapBasis(
@@ -83,11 +86,13 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
     left, size, right = np.linalg.svd(mean, full_matrices=False)
     keep = size > _KEEP * size[0]
     mix = right[keep].T / size[keep]
-    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[:, keep]
+    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[
+        :, keep
+    ]
 
 
 def fine_columns(records: Records) -> Array:
-    """Local functions of T, spacing 4 C over the recorded range, as block means, shape (N, k)."""
+    """Local functions of T, spacing 2.5 C over the recorded range, as block means, shape (N, k)."""
     low = min(float(r.history.temperature_c.min()) for r in records.runs)
     high = max(float(r.history.temperature_c.max()) for r in records.runs)
     nodes = np.arange(low, high + _FINE_C, _FINE_C)

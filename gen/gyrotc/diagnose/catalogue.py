@@ -84,10 +84,7 @@ def grid(cause: str, span_c: float, longest_s: float) -> list[Values]:
             return []
         waves = np.arange(1.0 / high, 1.0 / low, 1.0 / (3.0 * span_c))
         return [{parameter.name: float(1.0 / w)} for w in waves]
-    if cause == "hysteresis":
-        high = min(high, 0.45 * span_c)
-    else:
-        high = min(high, 0.5 * longest_s)
+    high = min(high, 0.45 * span_c) if cause == "hysteresis" else min(high, 0.5 * longest_s)
     if high <= low:
         return []
     return [{parameter.name: float(v)} for v in np.geomspace(low, high, _POINTS[cause])]

@@ -141,7 +141,9 @@ def _statistics(search: Search) -> dict[str, Callable[[Array], Array]]:
         line = (line - line.mean()) / line.std()
 
         def trend(e: Array) -> Array:
-            return np.asarray(np.mean([x * e[s].mean(axis=0) for x, s in zip(line, spans, strict=True)], axis=0))
+            return np.asarray(
+                np.mean([x * e[s].mean(axis=0) for x, s in zip(line, spans, strict=True)], axis=0)
+            )
 
         out["trend_with_date_dph"] = trend
     return out

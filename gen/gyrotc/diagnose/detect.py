@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.special import gammaincc, log_ndtr
+from scipy.special import log_ndtr
 
 __all__ = ["Columns", "Projection", "Scores", "draw_null", "score"]
 
@@ -21,6 +20,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _DRAWS = 4000
+_WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
 _RANK = 1e-9  # eigenvalues of an inner-product matrix below this share are rounding
 _GONE = 1e-6  # of a column's energy: what survives less has no signature left
 _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units of the noise of its weights
@@ -70,12 +70,16 @@ class Projection:
         return np.asarray(np.diag(self.gram) > _GONE * self.before)
 
     @cached_property
-    def structure(self) -> Array:
-        """Coordinates in which the common directions are independent with variance 1, shape (P, r)."""
+    def structure(self) -> tuple[Array, Array]:
+        """Independent directions of the dictionary and their energies: what a random mixture of signatures has.
+
+        Returns:
+            Coordinates with variance 1 without structure, shape (P, r), and energies, shape (r,), descending.
+        """
         inner = self.common.T @ self.gram @ self.common
         size, vectors = np.linalg.eigh(inner)
-        keep = size > 1e-3 * size[-1]
-        return np.asarray(self.common @ (vectors[:, keep] / np.sqrt(size[keep])))
+        keep = size > _WEAK * size[-1]
+        return np.asarray(self.common @ (vectors[:, keep] / np.sqrt(size[keep])))[:, ::-1], size[keep][::-1]
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,11 @@ def variance_ratio_of(gram: Array, a: Array, before: float) -> tuple[Array, Arra
     if not keep.any():
         none = np.zeros(a.shape[:-1])
         return none, none
-    s, energy = size[keep], (a @ vectors[:, keep]) ** 2 / size[keep]
+    return ratio_of((a @ vectors[:, keep]) ** 2 / size[keep], size[keep])
+
+
+def ratio_of(energy: Array, s: Array) -> tuple[Array, Array]:
+    """The same from energies of independent directions, shape (..., r), and their sizes, shape (r,)."""
     gain = np.outer(_LAMBDA / s.mean(), s)
     ratio = energy @ (gain / (1.0 + gain)).T - np.log1p(gain).sum(axis=1)
     best = np.argmax(ratio, axis=-1)
@@ -148,10 +156,10 @@ def variance_ratio_of(gram: Array, a: Array, before: float) -> tuple[Array, Arra
 
 
 def _structure(projection: Projection, a: Array) -> Array:
-    """−log p of the energy in all common directions."""
-    energy = ((a @ projection.structure) ** 2).sum(axis=-1)
-    tail = gammaincc(0.5 * projection.structure.shape[1], 0.5 * energy)
-    return np.asarray(-np.log(np.maximum(tail, 1e-300)))
+    """−log p of one common variance of all signatures against none."""
+    directions, size = projection.structure
+    ratio = ratio_of((a @ directions) ** 2, size)[0]
+    return np.asarray(-log_ndtr(-np.sqrt(ratio)))
 
 
 def draw_null(projection: Projection, columns: Columns, seed: int, draws: int = _DRAWS) -> Array:

@@ -6,6 +6,7 @@ Where there are exam runs, the training runs choose and the exam runs measure. W
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -154,7 +155,7 @@ def extend(
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = bench.on_exam(stages) if bench.exam else _crossed(bench, len(effects))
     floor = floor_of(chain[-1])
-    steps = [gain_of(a, b, floor, options.average_s) for a, b in zip(chain[:-1], chain[1:], strict=True)]
+    steps = [gain_of(a, b, floor, options.average_s) for a, b in itertools.pairwise(chain)]
     shipped, total = _shipped(bench, effects, steps, chain, floor)
     extended = bench.fit(shipped) if shipped else None
     return Extension(
@@ -250,7 +251,9 @@ def _forward(bench: _Bench, chain: Chain, count: int, floor: float) -> Gain | No
     if later and min(float(d) for d in later if d is not None) > max(known):
         return gain_of(chain[0], chain[-1], floor, bench.average_s)
     cut = float(np.quantile(known, 0.67))
-    held = [np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(bench.train, known, strict=True)]
+    held = [
+        np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(bench.train, known, strict=True)
+    ]
     if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
         return None
     ends = bench.left_out(held, count)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 
 from .detect import draw_null, score
-from .noise import COLOURS, Colour, Declared, Whitener
+from .noise import COLOURS, Declared
 from .search import Search, View
 
 __all__ = ["NoiseFinding", "noise_findings"]
@@ -42,7 +42,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
     view = search.view_of(colour)
     freedom = search.freedom
     found: list[NoiseFinding] = []
-    best = search.views[search.best]
+    best = search.likeliest
     if declared is not None:
         ratio = view.scale
         p = _two_sided(ratio**2 * freedom, freedom)
@@ -52,7 +52,9 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
     gain = 2.0 * (best.log_likelihood - view.log_likelihood)
     if gain > _COLOUR_RATIO:
         p = float(chi2.sf(gain, 2))
-        found.append(NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared"))
+        found.append(
+            NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared")
+        )
     if not found and declared is not None and not causes:
         found += _hidden(search, view)
     return found
@@ -64,17 +66,16 @@ def _two_sided(energy: float, freedom: int) -> float:
 
 def _described(search: Search) -> dict[str, float]:
     """The likeliest colour: share of the variance of block means that is not white, and its correlation time."""
-    colour: Colour = COLOURS[search.best]
-    slow = colour.slow + colour.walk
+    colour = search.likeliest.colour
     return {
-        "slow_dph": float(search.views[search.best].scale * np.sqrt(slow)),
+        "slow_dph": float(search.likeliest.scale * np.sqrt(colour.slow + colour.walk)),
         "tau_s": float(colour.tau_s),
     }
 
 
 def _hidden(search: Search, view: View) -> list[NoiseFinding]:
     """Structure that stands out of the declared noise but not of the noise that the data may have."""
-    projection = search.project(View(view.gram, view.b, view.yy, view.log_det, view.log_likelihood, 1.0), search.base)
+    projection = search.project(replace(view, scale=1.0), search.base)
     own = float(score(projection, search.columns, projection.a).joined().max())
     null = np.sort(draw_null(projection, search.columns, _SEED))
     p = (null.size - np.searchsorted(null, own) + 1.0) / (null.size + 1.0)

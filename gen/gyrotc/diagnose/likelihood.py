@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .catalogue import PENALTY, Candidate
 from .detect import variance_ratio_of
-from .noise import COLOURS, Whitener
+from .noise import Whitener
 from .search import Search
 
 __all__ = ["Gains", "Model", "Point"]
@@ -59,11 +59,9 @@ class Gains:
 
     def __init__(self, search: Search) -> None:
         self.search = search
-        view = search.views[search.best]
+        view = search.likeliest
         self.scale = view.scale
-        self.whiten = Whitener(
-            COLOURS[search.best], search.records.kept, search.records.block_s, search.sigma
-        )
+        self.whiten = Whitener(view.colour, search.records.kept, search.records.block_s, search.sigma)
         bank = search.bank
         own = len(search.extra_candidates) - len(bank.inputs)
         columns = np.column_stack([bank.signatures, search.extra[:, :own]])
@@ -109,9 +107,7 @@ class Gains:
             bank = self.search.bank
             flat = bank.replaced.transpose(1, 0, 2).reshape(self.size, -1)
             white = self.whiten(flat).reshape(self.size, len(bank.inputs), -1)
-            self._bases = [
-                self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)
-            ]
+            self._bases = [self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)]
         return self._bases
 
     def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:

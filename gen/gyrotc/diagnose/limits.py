@@ -55,7 +55,7 @@ class Limit:
 
 def detection_limits(search: Search) -> dict[str, Limit]:
     """Limits at the likeliest colour, by cause (channels: `auxiliary:name`)."""
-    view = search.views[search.best]
+    view = search.likeliest
     projection = search.project(view, search.base)
     size = np.diag(projection.gram) / view.scale**2
     found: dict[str, list[tuple[Candidate, float]]] = {}
@@ -71,7 +71,9 @@ def detection_limits(search: Search) -> dict[str, Limit]:
     for k, candidate in enumerate(search.extra_candidates):
         at_extra = search.n_map + search.n_bank + k
         key = candidate.id if candidate.channel is None else f"{candidate.id}:{candidate.channel}"
-        found.setdefault(key, []).append((candidate, float(size[at_extra]) * min(search.extra_norm[k], 1e150) ** 2))
+        found.setdefault(key, []).append(
+            (candidate, float(size[at_extra]) * min(search.extra_norm[k], 1e150) ** 2)
+        )
     return {key: _limit(key.split(":")[0], points) for key, points in found.items()}
 
 
@@ -89,7 +91,11 @@ def _limit(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
     value = float(np.exp(np.median(np.log(finite)))) if finite else None
     if parameter is None:
         return Limit(value, unit, (), None)
-    at = tuple((c.values[parameter.name], float(v)) for (c, _), v in zip(points, limits, strict=True) if np.isfinite(v))
+    at = tuple(
+        (c.values[parameter.name], float(v))
+        for (c, _), v in zip(points, limits, strict=True)
+        if np.isfinite(v)
+    )
     return Limit(value, unit, at, parameter.name)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +79,10 @@ def _grid() -> tuple[Colour, ...]:
     ):
         out += [Colour(slow=r**2, tau_s=tau) for r in ratios]
     out += [Colour(walk=w**2) for w in (0.1, 0.2, 0.4)]
-    out += [Colour(white=0.4, quantum=0.3), Colour(white=0.05, quantum=0.475)]
+    for white, quantum in ((0.4, 0.3), (0.1, 0.45)):
+        out += [Colour(white=white, quantum=quantum)]
+        out += [Colour(white=white, quantum=quantum, slow=r**2, tau_s=0.0) for r in (0.02, 0.05, 0.12)]
+        out += [Colour(white=white, quantum=quantum, slow=r**2, tau_s=20000.0) for r in (0.05, 0.15)]
     return tuple(out)
 
 
@@ -131,9 +133,7 @@ class Whitener:
             key = (number - number[0]).tobytes() if not colour.walk else number.tobytes()
             if key not in factors:
                 factors[key] = cholesky(colour.matrix(number, block_s), lower=True, check_finite=False)
-        self._factor = [
-            factors[(n - n[0]).tobytes() if not colour.walk else n.tobytes()] for n in blocks
-        ]
+        self._factor = [factors[(n - n[0]).tobytes() if not colour.walk else n.tobytes()] for n in blocks]
         self.log_det = 2.0 * sum(float(np.log(np.diag(f)).sum()) for f in self._factor)
         if sigma is not None:
             self.log_det += 2.0 * float(np.log(sigma).sum())
@@ -166,8 +166,6 @@ class Whitener:
         at = 0
         for factor in self._factor:
             part = slice(at, at + len(factor))
-            out[part] = solve_triangular(
-                factor, data[part], lower=True, trans=transposed, check_finite=False
-            )
+            out[part] = solve_triangular(factor, data[part], lower=True, trans=transposed, check_finite=False)
             at += len(factor)
         return out

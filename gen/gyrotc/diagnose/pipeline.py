@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from .attribute import Attribution, attribute
 from .bank import Bank
 from .cache import bank_of
-from .catalogue import Candidate
+from .catalogue import Candidate, columns_of
 from .compare import Ensemble, compare
 from .levels import NoiseFinding, noise_findings
 from .likelihood import Gains
 from .limits import Limit, detection_limits, overlap
 from .noise import Declared
 from .records import Records
+from .refine import taken
 from .screen import Screened, cleaned, screen
 from .search import Search
 from .words import NOISE_WORDS
@@ -60,7 +61,8 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
     """Everything from rows to named causes."""
     say("screening")
     screened = screen(records)
-    search = search_of(records, screened, say)
+    search = search_of(records, declared, screened, say)
+    search.cautious = bool(noise_findings(search, declared, causes=True))
     say("searching for causes")
     attribution = attribute(search)
     say("comparing with the simulation")
@@ -91,7 +93,11 @@ def _others(cause: str) -> list[str]:
 
 
 def search_of(
-    records: Records, screened: Screened | None = None, say: Progress = lambda _: None, level: int | None = None
+    records: Records,
+    declared: Declared | None = None,
+    screened: Screened | None = None,
+    say: Progress = lambda _: None,
+    level: int | None = None,
 ) -> Search:
     """The search with the coarsest map that the data do not reject."""
     checked = screen(records) if screened is None else screened
@@ -103,7 +109,8 @@ def search_of(
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         extras = _channels(records)
-        search = Search(records, bank, y, extras, nuisance, checked.sigma)
+        colour = declared.colour(records.block_s) if declared else None
+        search = Search(records, bank, y, extras, nuisance, checked.sigma, colour)
         if at == levels[-1] or not needs_finer(search):
             break
     return search
@@ -128,9 +135,14 @@ def needs_finer(search: Search) -> bool:
     gains = Gains(search)
     bank: Bank = search.bank
     finer = gains.whiten(bank.finer)
+    best = max(
+        (p for p in gains.single() if p.members[0].id == "path_length_periodicity"), key=lambda p: p.gain
+    )
+    wave = columns_of(search.records, best.members[0].id, best.members[0].values)
     memory = np.column_stack(
         [gains.plain_columns(s) for c, s in gains.plain if c.id != "path_length_periodicity"]
         + [gains.plain_columns(s) for c, s in gains.random if c.id == "turn_on_offset"]
+        + [gains.whiten(wave)]
     )
     left, size, _ = np.linalg.svd(memory, full_matrices=False)
     held = np.linalg.qr(np.column_stack([gains.map_q, left[:, size > 0.05 * size[0]]]))[0]
@@ -146,6 +158,4 @@ def needs_finer(search: Search) -> bool:
 
 def _after(search: Search, attribution: Attribution) -> Search:
     """The search with the causes found taken out."""
-    blocks = [b for c in attribution.causes for b in (c.columns, c.tangent, c.edges) if b is not None]
-    return search.extended(np.column_stack(blocks)) if blocks else search
-
+    return search.extended(taken(attribution.causes)) if attribution.causes else search

@@ -32,7 +32,7 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
     """
     runs = [run for run in dataset.runs if run.role == role]
     if not runs:
-        raise InputError(str(dataset.folder), f"no run has the role {role}", f"at least one run with it")
+        raise InputError(str(dataset.folder), f"no run has the role {role}", "at least one run with it")
     first = min((run.started for run in runs if run.started is not None), default=None)
     found = []
     for k, run in enumerate(runs):
@@ -65,9 +65,7 @@ def _record(
         rows, usable = _thinned(rows, usable, group)
     temperature = _bridged(rows.time_s, rows.temperature_c)
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
-    history = History(
-        time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day
-    )
+    history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: _bridged(rows.time_s, rows.channels[name]) for name in channels}
     name = run.file if run.from_s is None else f"{run.file}@{run.from_s:g}"
     return Record(name, history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
@@ -86,7 +84,10 @@ def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, N
     time = rows.time_s[:n].reshape(-1, group).mean(axis=1)
     filled = Rows(
         time,
-        np.nanmean(np.where(np.isfinite(rows.temperature_c[:n]), rows.temperature_c[:n], np.nan).reshape(-1, group), axis=1),
+        np.nanmean(
+            np.where(np.isfinite(rows.temperature_c[:n]), rows.temperature_c[:n], np.nan).reshape(-1, group),
+            axis=1,
+        ),
         mean(rows.rate_dph),
         {k: mean(v) for k, v in rows.channels.items()},
     )

@@ -117,11 +117,11 @@ class Records:
 
     def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
         """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
-        tried = Records(tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s)
+        tried = Records(
+            tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s
+        )
         left = [r for r, kept in zip(tried.runs, tried.kept, strict=True) if kept.size > 1]
-        runs = [
-            replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left)
-        ]
+        runs = [replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left)]
         return Records(tuple(runs), self.block_s)
 
     def key(self) -> str:

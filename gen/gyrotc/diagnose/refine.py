@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from .catalogue import Candidate, columns_of, shape_parameter
 from .likelihood import Gains
 from .search import Search
 
-__all__ = ["Interval", "Refined", "refine"]
+__all__ = ["Interval", "Refined", "refine", "taken"]
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,11 @@ class Refined:
     profile: Array | None
 
 
+def taken(causes: Sequence[Refined]) -> Array:
+    """All columns that stand in the model when the causes are named: theirs, their tangents, masked edges."""
+    return np.column_stack([b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None])
+
+
 def _columns(search: Search, candidate: Candidate) -> Array:
     records = search.records
     if candidate.role == "input":
@@ -83,7 +88,9 @@ class _Fit:
         known = np.concatenate([_inside(search, k, shift + 150.0) for k in range(len(search.records.runs))])
         edges = np.eye(search.y.size)[:, ~known] if shift else np.zeros((search.y.size, 0))
         self.edges = edges
-        held = [gains.whiten(edges)] + ([] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)])
+        held = [gains.whiten(edges)] + (
+            [] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)]
+        )
         self.q = np.linalg.qr(np.column_stack(held))[0]
         y = gains.whiten(search.y) / gains.scale
         self.y = y - self.q @ (self.q.T @ y)
@@ -192,9 +199,7 @@ def _interval(profile: Array) -> tuple[float, float]:
     return low, high
 
 
-def _result(
-    search: Search, fit: _Fit, members: list[Candidate], k: int, profile: Array | None
-) -> Refined:
+def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile: Array | None) -> Refined:
     """Amplitudes with intervals that allow for the uncertainty of the nonlinear parameters."""
     swapped = [m for m in members if m.role == "input"]
     blocks = [fit.edges] if swapped else [fit.edges, search.bank.map]

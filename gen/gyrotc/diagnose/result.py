@@ -95,9 +95,7 @@ def diagnose(
 def _options_of(model: Model | None) -> FitOptions:
     if model is None:
         return FitOptions()
-    return FitOptions(
-        method=model.method, seed=model.seed, block_s=model.block_s, average_s=model.average_s
-    )
+    return FitOptions(method=model.method, seed=model.seed, block_s=model.block_s, average_s=model.average_s)
 
 
 def _head(dataset: Dataset, verdict: str, options: FitOptions) -> dict[str, Any]:
@@ -297,7 +295,11 @@ def _sentence(result: dict[str, Any]) -> str:
     if extended is None:
         return str(text)
     share = extended["gain"]["share_of_excess_removed"]
-    part = f" On unseen runs the extension removes {share:.0%} of the removable error" if share is not None else ""
+    part = (
+        f" On unseen runs the extension removes {share:.0%} of the removable error"
+        if share is not None
+        else ""
+    )
     return f"{text}{part}{'.' if part else ''}"
 
 

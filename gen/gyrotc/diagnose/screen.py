@@ -90,9 +90,7 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
     return tuple(masks), found, expected
 
 
-def _variance(
-    records: Records, masks: Sequence[NDArray[np.bool_]]
-) -> tuple[Array | None, float, float]:
+def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Array | None, float, float]:
     """Does the quick part of the noise depend on |dT/dt|, T or the time since power-on?
 
     The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from .bank import Bank
 from .catalogue import Candidate
@@ -17,12 +18,13 @@ from .detect import Columns, Projection, draw_null, score
 from .noise import COLOURS, Colour, Whitener
 from .records import Records
 
-__all__ = ["Detection", "Found", "Search"]
+__all__ = ["Found", "Search", "View"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _SET_95 = 5.99  # chi-square with two degrees of freedom (ratio and correlation time)
+_MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
 _SEED = 20140916
 
 
@@ -30,6 +32,7 @@ _SEED = 20140916
 class View:
     """Inner products under one colour: of the columns, with the data, of the data; log det; REML log-likelihood."""
 
+    colour: Colour
     gram: Array
     b: Array
     yy: float
@@ -57,7 +60,8 @@ class Search:
         extras: Further candidate columns, shape (N, e), and their candidates.
         nuisance: Columns that are in every model beside the map (blocks left out, causes taken), shape (N, d).
         sigma: Factor of the noise of every block, shape (N,); None: even.
-        colours: Numbers of the colours that are looked at; None: all.
+        declared: Covariance of block means that is declared, (deg/h)²; None: nothing is.
+        colours: Numbers of the colours that are looked at; None: all, and the declared one as the last.
     """
 
     def __init__(
@@ -68,9 +72,12 @@ class Search:
         extras: tuple[Array, list[Candidate]] | None = None,
         nuisance: Array | None = None,
         sigma: Array | None = None,
+        declared: Colour | None = None,
         colours: Sequence[int] | None = None,
     ) -> None:
         self.records, self.bank, self.sigma = records, bank, sigma
+        self.declared = declared
+        self.cautious = False  # whether a cause must be significant under every colour, or on their average
         self._given = extras
         self._nuisance = nuisance
         size = records.size
@@ -92,11 +99,15 @@ class Search:
         m, k = bank.map.shape[1], bank.signatures.shape[1]
         self.n_map, self.n_bank = m, k
         self.base = np.arange(m)
-        self.base = np.concatenate([self.base, m + k + added.shape[1] + len(moved) + np.arange(dropped.shape[1])])
+        self.base = np.concatenate(
+            [self.base, m + k + added.shape[1] + len(moved) + np.arange(dropped.shape[1])]
+        )
         self.extra_candidates = [*names, *bank.inputs]
         self._index()
-        numbers = range(len(COLOURS)) if colours is None else colours
-        self.views = {k: self._view(COLOURS[k], bank.grams[k], float(bank.log_dets[k])) for k in numbers}
+        self._held = self._all_effects()
+        known = (*COLOURS, *(() if declared is None else (declared,)))
+        numbers = range(len(known)) if colours is None else colours
+        self.views = {k: self._known_view(k) if k < len(COLOURS) else self.view_of(known[k]) for k in numbers}
         top = max(v.log_likelihood for v in self.views.values())
         self.best = next(k for k, v in self.views.items() if v.log_likelihood == top)
         self.allowed = [k for k, v in self.views.items() if 2.0 * (top - v.log_likelihood) <= _SET_95]
@@ -107,11 +118,53 @@ class Search:
         Only the colours that the data allow are looked at again.
         """
         held = columns if self._nuisance is None else np.column_stack([self._nuisance, columns])
-        return Search(self.records, self.bank, self.y, self._given, held, self.sigma, self.allowed)
+        wider = Search(
+            self.records,
+            self.bank,
+            self.y,
+            self._given,
+            held,
+            self.sigma,
+            self.declared,
+            self.allowed,
+        )
+        wider.cautious = self.cautious
+        return wider
+
+    @property
+    def likeliest(self) -> View:
+        """The view under the likeliest colour."""
+        return self.views[self.best]
+
+    def _known_view(self, number: int) -> View:
+        return self._view(COLOURS[number], self.bank.grams[number], float(self.bank.log_dets[number]))
 
     def baseline_weights(self, y: Array) -> Array:
         """Least-squares weights of the map."""
         return np.asarray(self.bank.map.T @ y)
+
+    def _all_effects(self) -> Array:
+        """Map, common directions, channels, other inputs' main directions and nuisance, in joined columns."""
+        m, k = self.n_map, self.n_bank
+        total = m + k + self.extra.shape[1]
+        own = len(self.extra_candidates) - len(self.bank.inputs)
+        moved = self.extra[:, own : len(self.extra_candidates)]
+        _, size, right = np.linalg.svd(moved, full_matrices=False)
+        keep = size > _MAIN * max(float(size[0]), 1e-300)
+        common = np.zeros((total, self.bank.common.shape[1]))
+        common[m : m + k] = self.bank.common
+        inputs = np.zeros((total, int(keep.sum())))
+        inputs[m + k + own : m + k + len(self.extra_candidates)] = right[keep].T
+        exact = np.eye(total)
+        return np.column_stack(
+            [
+                exact[:, :m],
+                common,
+                exact[:, m + k : m + k + own],
+                inputs,
+                exact[:, m + k + len(self.extra_candidates) :],
+            ]
+        )
 
     def _index(self) -> None:
         """Where single columns, pairs and variance groups stand among the joined columns."""
@@ -150,7 +203,7 @@ class Search:
     @property
     def freedom(self) -> int:
         """Degrees of freedom of the residual likelihood."""
-        return int(self.y.size - self.n_map - self.bank.common.shape[1] - (len(self.base) - self.n_map))
+        return int(self.y.size - self._held.shape[1])
 
     def _view(self, colour: Colour, gram: Array, log_det: float) -> View:
         whiten = Whitener(colour, self.records.kept, self.records.block_s, self.sigma)
@@ -168,25 +221,21 @@ class Search:
         full[p:, :p] = full[:p, p:].T
         full[p:, p:] = inner[:e, :e]
         b = np.concatenate([cross_map[:, e], cross_bank[:, e], inner[:e, e]])
-        return self._reml(full, b, float(inner[e, e]), log_det)
+        return self._reml(colour, full, b, float(inner[e, e]), log_det)
 
-    def _reml(self, gram: Array, b: Array, yy: float, log_det: float) -> View:
-        """Residual likelihood with map, common directions and extras projected out; the scale profiled."""
-        m, k = self.n_map, self.n_bank
-        to = np.zeros((len(gram), m + self.bank.common.shape[1]))
-        to[:m, :m] = np.eye(m)
-        to[m : m + k, m:] = self.bank.common
-        n_dropped = len(self.base) - m
-        extra = np.eye(len(gram))[:, len(gram) - n_dropped :] if n_dropped else np.zeros((len(gram), 0))
-        to = np.column_stack([to, extra])
+    def _reml(self, colour: Colour, gram: Array, b: Array, yy: float, log_det: float) -> View:
+        """Residual likelihood with everything that may be an effect projected out; the scale profiled."""
+        to = self._held
         inner = to.T @ gram @ to
+        length = np.sqrt(np.diag(inner))
+        to, inner = to / length, inner / np.outer(length, length)
         factor = np.linalg.cholesky(inner + 1e-10 * np.eye(len(inner)))
         c = np.linalg.solve(factor, to.T @ b)
         freedom = self.y.size - len(inner)
         left = max(yy - float(c @ c), 1e-300)
-        logs = log_det + 2.0 * float(np.log(np.diag(factor)).sum())
+        logs = log_det + 2.0 * float(np.log(np.diag(factor)).sum() + np.log(length).sum())
         likelihood = -0.5 * (freedom * np.log(left / freedom) + logs)
-        return View(gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
+        return View(colour, gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
 
     def project(self, view: View, out: Index) -> Projection:
         """Everything after the columns `out` are projected out.
@@ -220,20 +269,30 @@ class Search:
         return Projection(a, full - cross.T @ cross, before, common, rest, log_det, int(keep.sum()))
 
     def detect(self, out: Index) -> list[Found]:
-        """Candidates by adjusted p-value under the worst colour allowed for each, best first.
+        """Candidates by adjusted p-value, best first.
 
-        Colours are allowed for a candidate when they lie in the 95 % likelihood set with the candidate taken
-        out of the data, and in the set with everything taken out. The null distribution is that of the
-        likeliest colour: between colours its 1 % point moves by less than 0.2 in ln p.
+        The p-value of a candidate is the mean over the colours that the data allow, each weighted by its
+        likelihood with map and candidate projected out; where the data contradict the declared noise, the
+        largest over the colours within the 95 % set. The null distribution is that of the likeliest colour:
+        between colours its 1 % point moves by less than 0.2 in ln p.
         """
         projections = [self.project(self.views[k], out) for k in self.allowed]
         own = np.array([score(p, self.columns, p.a).joined() for p in projections])
-        fits = [_refitted(p, self.columns, self.views[k], self.y.size) for k, p in zip(self.allowed, projections, strict=True)]
-        likelihood = np.array(fits)
-        inside = 2.0 * (likelihood.max(axis=0) - likelihood) <= _SET_95
-        log_p = np.where(inside, own, np.inf).min(axis=0)
+        fits = [
+            _refitted(p, self.columns, self.views[k], self.y.size)
+            for k, p in zip(self.allowed, projections, strict=True)
+        ]
+        behind = np.max(fits, axis=0) - np.array(fits)
+        weight = np.exp(-behind)
+        weight /= weight.sum(axis=0)
         null = np.sort(draw_null(projections[self.allowed.index(self.best)], self.columns, _SEED))
-        adjusted = (null.size - np.searchsorted(null, log_p) + 1.0) / (null.size + 1.0)
+        tail = (null.size - np.searchsorted(null, own) + 1.0) / (null.size + 1.0)
+        adjusted = (weight * tail).sum(axis=0)
+        log_p = -logsumexp(np.log(weight + 1e-300) - own, axis=0)
+        if self.cautious:
+            inside = 2.0 * behind <= _SET_95
+            adjusted = np.where(inside, tail, 0.0).max(axis=0)
+            log_p = np.where(inside, own, np.inf).min(axis=0)
         order = np.lexsort((-log_p, adjusted))
         return [Found(self.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
 

@@ -7,16 +7,18 @@ from collections.abc import Sequence
 from .attribute import Attribution
 from .levels import NoiseFinding
 
-__all__ = ["MISFIT", "SHARE", "named", "verdict_of"]
+__all__ = ["named", "verdict_of"]
 
-MISFIT = 0.01
-SHARE = 0.8
+_MISFITS = ((0.05, 0.5), (0.01, 0.8), (1e-4, 0.9))
+"""p-value of what is left, and share of the structure below which the causes then explain too little."""
+
 _REMAINDER = 1e-3
 
 
 def named(attribution: Attribution) -> bool:
     """Whether causes are given at all: not when most of the structure is none of them."""
-    return bool(attribution.causes) and not (attribution.misfit_p < MISFIT and attribution.share < SHARE)
+    little = any(attribution.misfit_p < p and attribution.share < share for p, share in _MISFITS)
+    return bool(attribution.causes) and not little
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], missing: Sequence[str]) -> str:

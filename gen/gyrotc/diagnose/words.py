@@ -95,7 +95,9 @@ SEPARATE: dict[frozenset[str], str] = {
         "steps or 5 C/min corners recorded with 10-s rows; a synchronisation pulse in both recordings"
     ),
     frozenset({"hysteresis", "turn_on_offset"}): _BOTH_SIDES + ", all within one power-on",
-    frozenset({"turn_on_offset", "ageing"}): "the same hold on at least five dates, several power cycles on each",
+    frozenset(
+        {"turn_on_offset", "ageing"}
+    ): "the same hold on at least five dates, several power cycles on each",
     frozenset({"warm_up", "thermal_gradient"}): (
         "a cold start at a constant chamber temperature, at two temperatures; a hot restart"
     ),

@@ -1,0 +1,109 @@
+"""Lack of fit: is anything left, and are the causes what they seem?
+
+Three tests under the likeliest colour and under the declared one. What the causes leave is held against the
+whole dictionary, flat and weighted; and every cause must have one amplitude over all runs, temperatures and
+directions: a foreign effect that happens to look like a cause in one run does not in the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincc, ndtr
+
+from .catalogue import columns_of
+from .detect import Projection, ratio_of
+from .noise import Whitener
+from .refine import Refined
+from .search import Search, View
+
+__all__ = ["misfit"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_DIRECTION_C = 3.0
+_OWN = 1e-3  # share of a column that must be left after the model is projected out
+
+
+def misfit(current: Search, out: Index, causes: Sequence[Refined], gain: float) -> tuple[float, float]:
+    """p-value of what is left, and the share of the structure that the causes explain.
+
+    Args:
+        current: The search with the causes taken.
+        out: Columns of the model.
+        causes: They.
+        gain: What they explain, twice the log-likelihood.
+    """
+    views = [current.likeliest]
+    if current.declared is not None:
+        view = current.view_of(current.declared)
+        views.append(replace(view, scale=max(view.scale, 1.0)))
+    changed = _changed(current, causes)
+    p_value, left = 1.0, 0.0
+    for view in views:
+        found = [*_dictionary(current.project(view, out)), _changes(current, view, out, changed)]
+        p_value = min([p_value, *(p for p, _ in found)])
+        left = max([left, *(e for _, e in found)])
+    return min(1.0, 3.0 * len(views) * p_value), gain / max(gain + left, 1e-300)
+
+
+def _dictionary(projection: Projection) -> list[tuple[float, float]]:
+    """p-value and energy left in the dictionary.
+
+    Flat: the energy in all directions. Weighted: one variance common to all signatures, which weighs
+    directions by how many signatures share them.
+    """
+    directions, size = projection.structure
+    energy = (projection.a @ directions) ** 2
+    total = float(energy.sum())
+    ratio, variance = ratio_of(energy, size)
+    held = float(variance) * size / (1.0 + float(variance) * size)
+    return [
+        (float(gammaincc(0.5 * size.size, 0.5 * total)), total - size.size),
+        (float(ndtr(-np.sqrt(float(ratio)))), float(((energy - 1.0) * held).sum())),
+    ]
+
+
+def _changed(current: Search, causes: Sequence[Refined]) -> Array:
+    """Every cause with an amplitude that differs by run, temperature and direction, shape (N, k)."""
+    records = current.records
+    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    direction = columns_of(records, "hysteresis", {"width_c": _DIRECTION_C})[:, 0] / _DIRECTION_C
+    t = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
+    columns = []
+    for cause in causes:
+        if cause.candidate.id in ("turn_on_offset", "ageing", "map_too_coarse"):
+            continue
+        shape = cause.contribution
+        columns += [shape * t, shape * direction]
+        for span in records.spans():
+            part = np.zeros_like(shape)
+            part[span] = shape[span]
+            columns.append(part)
+    return np.column_stack(columns) if columns else np.zeros((records.size, 0))
+
+
+def _changes(current: Search, view: View, out: Index, changed: Array) -> tuple[float, float]:
+    """p-value and energy of what changing amplitudes would explain."""
+    if changed.shape[1] == 0:
+        return 1.0, 0.0
+    whiten = Whitener(view.colour, current.records.kept, current.records.block_s, current.sigma)
+    model = current.extra[:, len(current.extra_candidates) :]
+    if out[0] == 0:
+        model = np.column_stack([current.bank.map, model])
+    q, r = np.linalg.qr(whiten(model))
+    q = q[:, np.abs(np.diag(r)) > 1e-8 * np.abs(np.diag(r)).max()]
+    white = whiten(np.column_stack([changed, current.y]))
+    norm = np.linalg.norm(white[:, :-1], axis=0)
+    rest = white - q @ (q.T @ white)
+    use = np.linalg.norm(rest[:, :-1], axis=0) > _OWN * norm
+    left, size, _ = np.linalg.svd(rest[:, :-1][:, use] / norm[use], full_matrices=False)
+    left = left[:, size > 0.03 * size[:1]]
+    if left.shape[1] == 0:
+        return 1.0, 0.0
+    energy = float(((left.T @ rest[:, -1]) ** 2).sum()) / view.scale**2
+    return float(gammaincc(0.5 * left.shape[1], 0.5 * energy)), energy - left.shape[1]
