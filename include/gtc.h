@@ -173,10 +173,10 @@ GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
 /* The angle to subtract from an angle increment over dt; what rounding leaves is carried on.
- * f32: dt in s, angle in arcsec, a multiple of 2^-16. q31: dt in microseconds, angle in
- * 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t; in f32, where
- * angles reach 128 arcsec, within one last place of the largest. t is the sum of the dt given:
- * 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact.
+ * f32: dt in s, angle in arcsec, a multiple of 2^-16 while it is below 64. q31: dt in microseconds,
+ * angle in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t; in
+ * f32, where angles reach 64 arcsec, within one unit or one last place of the largest. t is the sum
+ * of the dt given: 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact.
  * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or, in
  * q31, an angle beyond 32 bits); then nothing is lost, the remainder is as it was. */
 GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);

@@ -79,9 +79,9 @@ static inline int FN(row_works)(uint_least32_t row)
     quotient = a / b;
     added = product + c;
     taken = c - product;
-    return (FN(is_expected)(sum, row, 3U) && FN(is_expected)(difference, row, 4U)
-            && FN(is_expected)(product, row, 5U) && FN(is_expected)(quotient, row, 6U)
-            && FN(is_expected)(added, row, 7U) && FN(is_expected)(taken, row, 8U)) ? 1 : 0;
+    return FN(is_expected)(sum, row, 3U) & FN(is_expected)(difference, row, 4U)
+           & FN(is_expected)(product, row, 5U) & FN(is_expected)(quotient, row, 6U)
+           & FN(is_expected)(added, row, 7U) & FN(is_expected)(taken, row, 8U);
 }
 
 /* Conversions: to float rounds to nearest even, to integer cuts off. */

@@ -16,9 +16,13 @@ static int FN(primitives_work)(void)
     const int_least32_t d = (int_least32_t)b;
     const FN(sum_t) zero = {0};
 
-    return ((FN(high)(a, b) == 0x1FFFFFFFUL) && (FN(high_of_square)(a) == 0x3FFFFFFFUL)
-            && (FN(high_of_squares)(c, -c) == 0x7FFFFFFEUL)
-            && (FN(units)(FN(accumulate)(zero, -d, d)) == 0x80000003UL)) ? 1 : 0;
+    int works = 1;
+
+    works &= (FN(high)(a, b) == 0x1FFFFFFFUL) ? 1 : 0;
+    works &= (FN(high_of_square)(a) == 0x3FFFFFFFUL) ? 1 : 0;
+    works &= (FN(high_of_squares)(c, -c) == 0x7FFFFFFEUL) ? 1 : 0;
+    works &= (FN(units)(FN(accumulate)(zero, -d, d)) == 0x80000003UL) ? 1 : 0;
+    return works;
 }
 
 #endif /* GTC_SELFTEST_Q31_H_INCLUDED */

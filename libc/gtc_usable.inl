@@ -88,7 +88,11 @@ static int FN(terms_fit)(const TABLE *table)
 /* One network, or several where the code of the hand-over is there. */
 static int FN(networks_fit)(const TABLE *table)
 {
-    return ((table->n_networks == 1U) || ((GTC_WITH_BANK != 0) && (table->n_networks > 1U))) ? 1 : 0;
+#if GTC_WITH_BANK
+    return (table->n_networks >= 1U) ? 1 : 0;
+#else
+    return (table->n_networks == 1U) ? 1 : 0;
+#endif
 }
 
 int FN(is_usable)(const TABLE *table)

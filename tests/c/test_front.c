@@ -97,6 +97,44 @@ TEST(a_window_with_too_many_holes_warms_again)
     CHECK_INT(GTC_HELD, status_of(&state));
 }
 
+TEST(a_long_window_needs_half_of_its_blocks)
+{
+    table_t table = TABLE;
+    state_t state;
+    int k;
+
+    table.slope_blocks = 8U;
+    table.hold_blocks = 9U;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+    (void)feed(&state, C(15.0), 5);
+    (void)feed(&state, C(15.25), 4);
+    /* Five holes: three valid blocks of eight, then two, then one. */
+    CHECK((FN(missed)(&state, (5U * N) - 1U) & GTC_HELD) != 0);
+    (void)feed(&state, C(15.5), 4);
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.5), 1) & ~GTC_HELD);
+    CHECK((FN(missed)(&state, (8U * N) - 1U) & GTC_HELD) != 0);
+    (void)feed(&state, C(15.75), 4);
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.75), 1) & ~GTC_HELD);
+    for (k = 0; k < 3; k++) {
+        (void)feed(&state, C(16.0) + (STEP * (num_t)k), 4);
+    }
+    CHECK_INT(GTC_OK, status_of(&state));
+}
+
+TEST(the_gap_is_counted_no_further_than_65535)
+{
+    table_t table = TABLE;
+    state_t state;
+
+    table.hold_blocks = 100000UL;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, 1U));
+    (void)feed(&state, C(15.0), 1);
+    CHECK((FN(missed)(&state, 70000UL) & GTC_HELD) != 0);
+    CHECK_INT(65535L, state.gap);
+    CHECK((feed(&state, MISSING, 1) & GTC_HELD) != 0);
+    CHECK_INT(65535L, state.gap);
+}
+
 TEST(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart)
 {
     state_t state = started();
@@ -278,6 +316,8 @@ int main(void)
     RUN(impossible_samples_are_held);
     RUN(a_window_with_a_hole_still_gives_the_slope);
     RUN(a_window_with_too_many_holes_warms_again);
+    RUN(a_long_window_needs_half_of_its_blocks);
+    RUN(the_gap_is_counted_no_further_than_65535);
     RUN(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart);
     RUN(a_jump_is_held_until_three_samples_agree);
     RUN(suspects_that_disagree_or_are_interrupted_start_again);

@@ -46,6 +46,36 @@ TEST(without_a_coverage_map_nothing_is_uncovered)
     CHECK_INT(GTC_OK, FN(map)(&table, C(21.0), C(-0.4), &bias));
 }
 
+TEST(an_envelope_without_extent_has_one_cell)
+{
+    table_t table = TABLE;
+    num_t bias;
+
+    table.envelope[1] = table.envelope[0];
+    table.envelope[3] = table.envelope[2];
+    CHECK_INT(GTC_CLAMPED, FN(map)(&table, C(21.0), C(0.4), &bias));
+    CHECK_INT(GTC_OK, FN(map)(&table, C(-20.0), C(-0.5), &bias));
+}
+
+TEST(far_from_a_center_its_gaussian_is_nothing)
+{
+    table_t table = TABLE;
+    gtc_word_t centers[15];
+    num_t a = 0;
+    num_t b = 0;
+
+    /* The first center is 5.4 widths away: its weight does not matter. */
+    memcpy(centers, TABLE.centers, sizeof centers);
+    table.centers = centers;
+    centers[4].bits ^= 0x00100000UL;
+    CHECK_INT(GTC_OK, FN(map)(&TABLE, C(55.0), C(0.4), &a));
+    CHECK_INT(GTC_OK, FN(map)(&table, C(55.0), C(0.4), &b));
+    CHECK(same(a, b));
+    CHECK(FN(map)(&TABLE, C(-10.0), C(0.0), &a) >= 0);
+    CHECK(FN(map)(&table, C(-10.0), C(0.0), &b) >= 0);
+    CHECK(!same(a, b));
+}
+
 TEST(bad_arguments_write_nothing)
 {
     num_t bias = C(7.0);
@@ -63,6 +93,8 @@ int main(void)
     RUN(outside_it_gives_the_value_at_the_edge);
     RUN(cells_without_training_data_are_told);
     RUN(without_a_coverage_map_nothing_is_uncovered);
+    RUN(an_envelope_without_extent_has_one_cell);
+    RUN(far_from_a_center_its_gaussian_is_nothing);
     RUN(bad_arguments_write_nothing);
     return test_end();
 }

@@ -161,6 +161,52 @@ TEST(narrow_gaussians_are_there_where_they_are)
     CHECK_INT(GTC_OK, FN(map)(&NARROW, C(55.0), C(-0.4), &at));
 }
 
+TEST(memories_and_plays_outlast_a_time_without_power)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t a = started_with(&TERMS);
+    state_t fresh = started_with(&TERMS);
+    state_t soon;
+    state_t late;
+    int k;
+
+    for (k = 0; k < 40; k++) {
+        (void)sample(&a, C(15.0) + (STEP * (num_t)(4 * k)), C(12.0));
+    }
+    CHECK_INT(GTC_OK, FN(save)(&a, words));
+    CHECK_INT(GTC_OK, FN(restore)(&soon, &TERMS, N, words, 3U));
+    CHECK_INT(GTC_OK, FN(restore)(&late, &TERMS, N, words, 100000UL));
+    CHECK_INT(GTC_HELD, status_of(&soon));
+    CHECK((sample(&soon, C(12.0), C(12.0)) & GTC_WARMING) != 0);
+    (void)sample(&late, C(12.0), C(12.0));
+    (void)sample(&fresh, C(12.0), C(12.0));
+    /* Three blocks are not enough to forget; a hundred thousand are, but not for the play. */
+    CHECK(soon.term[0][0] > C(12.5));
+    CHECK(late.term[0][0] - C(12.0) < C(0.001));
+    CHECK(C(12.0) - late.term[0][0] < C(0.001));
+    CHECK(same(C(14.0), late.term[1][0]));
+    CHECK(same(C(12.0), fresh.term[1][0]));
+}
+
+TEST(times_without_power_add_up)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t a = started_with(&TERMS);
+
+    CHECK_INT(GTC_OK, FN(save)(&a, words));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 5U));
+    CHECK_INT(GTC_OK, FN(save)(&a, words));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 6U));
+    CHECK_INT(11, a.off_blocks);
+    CHECK_INT(GTC_OK, FN(save)(&a, words));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 0xFFFFFFFAUL));
+    CHECK(a.off_blocks == 0xFFFFFFFFUL);
+    (void)sample(&a, C(12.0), C(12.0));
+    CHECK_INT(GTC_OK, FN(save)(&a, words));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 6U));
+    CHECK_INT(6, a.off_blocks);
+}
+
 #if TEST_Q31
 TEST(what_terms_add_saturates)
 {
@@ -213,6 +259,8 @@ int main(void)
     RUN(holds_and_fallback_step_the_terms_too);
     RUN(a_harmonic_repeats_itself_after_its_period);
     RUN(narrow_gaussians_are_there_where_they_are);
+    RUN(memories_and_plays_outlast_a_time_without_power);
+    RUN(times_without_power_add_up);
 #if TEST_Q31
     RUN(what_terms_add_saturates);
 #endif

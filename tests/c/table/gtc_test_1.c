@@ -1,7 +1,7 @@
 /* gtc_test_1.c - bias table of gyro TEST-1. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 d4ce3603c7d9210bfe801a5d28ff92acfa634eccb25118938ed8638294f88cfd
+ * Model:       sha256 f68b9baa4528dcaebdda8da77596e4744b2d348c40108c9809db48ae82642cbb
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -25,7 +25,7 @@ static const gtc_word_t f32_networks[8] = {
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t f32_centers[15] = {
-    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(-0.75F), V(32.0299301F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
@@ -42,13 +42,13 @@ static const gtc_word_t f32_sigma[2] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
-    V(40.390213F), V(0.0698402897F), V(-0.12677367F), B(0x0UL),
-    V(20.780426F), V(-0.360319406F), V(-0.642388165F), B(0x4UL),
-    V(1.17063987F), V(0.209520876F), V(-0.4025971F), B(0x0UL),
-    V(-18.439146F), V(-0.220638841F), V(0.361409217F), B(0x0UL),
-    V(41.9510651F), V(0.349201441F), V(-0.300033271F), B(0x0UL),
-    V(22.34128F), V(-0.0809582546F), V(-0.784616113F), B(0x0UL),
-    V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
+    V(40.390213F), V(0.0698402897F), V(-0.126810536F), B(0x0UL),
+    V(20.780426F), V(-0.360319406F), V(-0.65034467F), B(0x4UL),
+    V(1.17063987F), V(0.209520876F), V(-0.538978517F), B(0x0UL),
+    V(-18.439146F), V(-0.220638841F), V(0.285060734F), B(0x0UL),
+    V(41.9510651F), V(0.349201441F), V(-0.300048172F), B(0x0UL),
+    V(22.34128F), V(-0.0809582546F), V(-0.795461774F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(0.0809120834F), B(0x2UL),
     V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
 };
 
@@ -79,7 +79,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x5782dcaeUL,
+    .crc = 0x5b16d144UL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
@@ -88,14 +88,14 @@ const gtc_f32_table_t gtc_test_1_f32 = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xfe003739UL), B(0x0fffef80UL), B(0xf7fff36dUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xfe003539UL), B(0x0ffff02fUL), B(0xf7fff535UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[15] = {
-    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x0bfffc7eUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xebffeaadUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x04fff603UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x0000801fUL), B(0xeffc6070UL), B(0x00002670UL), B(0xe994133bUL), B(0x0bfffedeUL), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xebffeaedUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x04fff6daUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -110,14 +110,14 @@ static const gtc_word_t q31_sigma[2] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xfdf8b3e2UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf5b8d257UL), B(0x4UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xf98f2b22UL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x05c85763UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xfb3321e4UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xf3723d95UL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x01d725c5UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x04cea125UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xfdf88d36UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf5983c3bUL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xf7608d0dUL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x048f9df0UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xfb331273UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xf345cfdaUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x014b881cUL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x04cea1a2UL), B(0x2UL),
 };
 
 const gtc_q31_table_t gtc_test_1_q31 = {
@@ -147,7 +147,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x491c375aUL,
+    .crc = 0x798ec2fcUL,
     .term_code = { NULL },
     .serial = "TEST-1",
 };
