@@ -1,7 +1,7 @@
 /* primitives_q31.c - the fixed-point primitives over all of their arguments, against formulas written apart.
  *
  * Prints one line for each: name, arguments visited, arguments that differ; for the Gaussian also its worst error
- * in 2^-31 against 2^-v for every v that truncates to u. Its argument k, if any, visits every k-th argument of
+ * in 2^-29 against 2^-v for every v that truncates to u. Its argument k, if any, visits every k-th argument of
  * the Gaussian alone.
  */
 #include <inttypes.h>
@@ -30,42 +30,57 @@ static void gauss(uint64_t every)
     uint64_t u;
     int i;
     for (i = 0; i < 64; i++) {
-        table[i] = (uint64_t)llrint(2147483603.0 * exp2(-i / 64.0));
-        step[i] = 2147483648.0 * exp2(-i / 64.0);
+        table[i] = (uint64_t)llrint(2052389455.0 * exp2(-i / 64.0));
+        step[i] = 536870912.0 * exp2(-i / 64.0);
     }
-    for (u = 0; u < Q31_CUT; u += every) {
+    for (u = 0; u < 536870912U; u += every) {
         const uint64_t f = u % 262144U; /* 2^-18 of an entry */
-        const uint64_t drop = (f * 16384U * (2977018596U - 979U * (f / 16U))) / 4294967296U;
-        const uint64_t entry = table[(u / 262144U) % 64U];
-        const uint64_t want = (entry - (entry * drop) / 274877906944U) >> (u / 16777216U);
-        const uint32_t got = gtc_q31_exp2((uint_least32_t)u);
-        /* 2^-f/64 of both ends by the exponential's series: f ln2/64 <= 0.011 */
+        const uint64_t v = 1557473452U - 64U * f;
+        const uint64_t square = (v * v) / 4294967296U + 558709134U;
+        const uint64_t want = ((table[(u / 262144U) % 64U] * square) / 4294967296U) >> (u / 16777216U);
+        const int32_t got = (int32_t)gtc_q31_exp2((uint_least32_t)u, 558709134U);
+        /* 2^(-f/64) at both ends by the exponential's series: f ln2/64 <= 0.011 */
         const double x0 = (double)f * (0.6931471805599453094 / 64.0 / 262144.0);
         const double x1 = (double)(f + 1U) * (0.6931471805599453094 / 64.0 / 262144.0);
         const double scale = ldexp(step[(u / 262144U) % 64U], -(int)(u / 16777216U));
         const double e0 = got - scale * (1 - x0 * (1 - x0 / 2 * (1 - x0 / 3 * (1 - x0 / 4 * (1 - x0 / 5)))));
         const double e1 = got - scale * (1 - x1 * (1 - x1 / 2 * (1 - x1 / 3 * (1 - x1 / 4 * (1 - x1 / 5)))));
-        wrong += (got != want);
+        wrong += (got < 0) || ((uint64_t)got != want);
         worst = fmax(worst, fmax(fabs(e0), fabs(e1)));
     }
-    printf("gauss %" PRIu64 " %" PRIu64 " %.6f\n", (Q31_CUT + every - 1U) / every, wrong, worst);
+    printf("gauss %" PRIu64 " %" PRIu64 " %.6f\n", (536870911U + every) / every, wrong, worst);
 }
 
+/* Products of operands below 2^31, sums of products of numbers below 2^30 in magnitude. */
 static void products(void)
 {
-    static const uint32_t corners[] = { 0, 1, 2, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x10001, 0x7FFFFFFF, 0x80000000,
-                                        0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF };
+    static const uint32_t corners[] = { 0, 1, 2, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x10001, 0x3FFFFFFF, 0x40000000,
+                                        0x7FFF0000, 0x7FFFFFFE, 0x7FFFFFFF };
     const uint64_t n = sizeof corners / sizeof corners[0];
     uint64_t wrong = 0, k;
+    gtc_q31_sum_t sum = { 0 };
+    int64_t exact = 0;
     for (k = 0; k < n * n + 100000000U; k++) {
         const uint64_t pair = draw();
-        const uint32_t a = (k < n * n) ? corners[k / n] : (uint32_t)pair;
-        const uint32_t b = (k < n * n) ? corners[k % n] : (uint32_t)(pair >> 32);
-        const int32_t p = (a == 0x80000000U) ? 0 : (int32_t)a;
-        const int32_t q = (b == 0x80000000U) ? 0 : (int32_t)b;
+        const uint32_t a = (k < n * n) ? corners[k / n] : (uint32_t)pair & 0x7FFFFFFFU;
+        const uint32_t b = (k < n * n) ? corners[k % n] : (uint32_t)(pair >> 33);
+        const int32_t p = (pair & 0x80000000U) ? (int32_t)a : -(int32_t)a;
+        const int32_t q = (pair & 0x100000000U) ? (int32_t)b : -(int32_t)b;
+        const int32_t w = p / 2;
+        const int32_t e = (int32_t)(b / 2U);
         wrong += (gtc_q31_high(a, b) != (uint32_t)(((uint64_t)a * b) >> 32));
+        wrong += (gtc_q31_high_of_square(a) != (uint32_t)(((uint64_t)a * a) >> 32));
         wrong += (gtc_q31_high_of_squares(p, q)
                   != (uint32_t)(((uint64_t)((int64_t)p * p) + (uint64_t)((int64_t)q * q)) >> 32));
+        if (llabs(exact) > 0x0E00000000000000LL) {
+            const gtc_q31_sum_t zero = { 0 };
+            sum = zero;
+            exact = 0;
+        }
+        sum = gtc_q31_accumulate(sum, w, e);
+        exact += (int64_t)w * e;
+        wrong += (gtc_q31_units(sum)
+                  != (uint32_t)(exact / 536870912 - ((exact % 536870912) < 0)));
     }
     printf("products %" PRIu64 " %" PRIu64 "\n", n * n + 100000000U, wrong);
 }
@@ -74,13 +89,13 @@ static void products(void)
 static void one_range(int32_t low, uint32_t span, uint64_t *visited, uint64_t *wrong)
 {
     const int_least32_t range[2] = { low, (int32_t)(low + (int64_t)span) };
-    const uint64_t most = (65536ULL * 67108864ULL - 1U) / (span > 0U ? span : 1U);
-    const uint32_t gain = (uint32_t)(most > 0xFFFFFFFFULL ? 0xFFFFFFFFULL : most);
+    const uint64_t most = (65536ULL * 134217728ULL - 1U) / (span > 0U ? span : 1U);
+    const uint32_t gain = (uint32_t)(most > 0x7FFFFFFFULL ? 0x7FFFFFFFULL : most);
     uint64_t offset;
     uint_least32_t x = 0;
     for (offset = 0; offset <= span; offset++) {
         const int status = gtc_q31_position((int32_t)(low + (int64_t)offset), range, (int_least32_t)gain, &x);
-        const uint64_t want = (offset * gain) / 67108864U;
+        const uint64_t want = (offset * gain) / 134217728U;
         *wrong += (status != GTC_OK) || (x != want) || (want > 65535U);
     }
     *visited += offset;
@@ -89,7 +104,7 @@ static void one_range(int32_t low, uint32_t span, uint64_t *visited, uint64_t *w
         *wrong += gtc_q31_position(-2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
     }
     *wrong += gtc_q31_position(2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED
-              || x != ((uint64_t)span * gain) / 67108864U;
+              || x != ((uint64_t)span * gain) / 134217728U;
     *wrong += gtc_q31_position(GTC_TEMP_MISSING, range, (int_least32_t)gain, &x) != GTC_E_ARG;
     *visited += 4;
 }
@@ -140,12 +155,10 @@ static void shifts(void)
                                                       { .integer = values[(a + b) % n] } };
             POINT in;
             for (in.x_temp = 0; in.x_temp < 65536U; in.x_temp++) {
-                int64_t twice, want;
+                int64_t linear, want;
                 in.x_slope = (in.x_temp * 40503U) & 0xFFFFU;
-                /* twice the exact result, in 2^-16: rounded to nearest, halves up */
-                twice = 2 * ((int64_t)values[a] * 65536 + (int64_t)values[b] * in.x_temp
-                             + (int64_t)values[(a + b) % n] * in.x_slope) + 65536;
-                want = twice / 131072 - ((twice % 131072) < 0);
+                linear = (int64_t)values[b] * in.x_temp + (int64_t)values[(a + b) % n] * in.x_slope;
+                want = values[a] + linear / 65536 - ((linear % 65536) < 0);
                 if ((want >= -2147483647) && (want <= 2147483647)) {
                     wrong += gtc_q31_network(&table, network, network, &in) != want;
                     visited++;

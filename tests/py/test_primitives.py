@@ -13,7 +13,7 @@ from gyrotc.reference.q31 import GAUSS_ERROR
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Largest departure of the float32 Gaussian from the exact one that docs/numerics.md allows.
-F32_GAUSS_ERROR = 1.0e-7
+F32_GAUSS_ERROR = 1.9e-7
 
 
 def _run(
@@ -36,7 +36,7 @@ def test_fixed_point_primitives_over_all_arguments(half: int, tmp_path: Path) ->
         ("gauss", "shifts", "products", "positions", "quotients"), "0"
     )
     assert int(found["gauss"][0]) == 2**29
-    assert 0.98 * GAUSS_ERROR < float(found["gauss"][2]) * 2.0**-31 <= GAUSS_ERROR
+    assert 0.98 * GAUSS_ERROR < float(found["gauss"][2]) * 2.0**-29 <= GAUSS_ERROR
 
 
 def test_float32_gaussian_over_every_seventh_argument(tmp_path: Path) -> None:
@@ -49,10 +49,10 @@ def test_float32_gaussian_over_every_seventh_argument(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("program", "file", "pattern", "replacement"),
     [
-        ("primitives_q31", "gtc_num_q31.h", "0x40B268E3UL", "0x40B268E4UL"),
-        ("primitives_q31", "gtc_num_q31.h", r"#define Q31_C 979U", "#define Q31_C 978U"),
-        ("primitives_f32", "gtc_num_f32.h", "0x3F0164D2UL", "0x3F0164D3UL"),
-        ("primitives_f32", "gtc_num_f32.h", r"F32_P1 0x1\.62e36cp", "F32_P1 0x1.62e36ep"),
+        ("primitives_q31", "gtc_num_q31.h", "0x3DD4FFA7UL", "0x3DD4FFA6UL"),
+        ("primitives_q31", "gtc_num_q31.h", r"#define Q31_H 1557473452U", "#define Q31_H 1557473460U"),
+        ("primitives_f32", "gtc_num_f32.h", "0x3876ABCFUL", "0x3876ABCEUL"),
+        ("primitives_f32", "gtc_num_f32.h", r"0x1\.71549ep\+6", "0x1.7154a0p+6"),
     ],
 )
 def test_one_wrong_bit_is_seen(
@@ -68,4 +68,4 @@ def test_the_formulas_share_no_text_with_the_runtime() -> None:
     """Only the name of the function under test and the limits of its argument come from libc/."""
     for name in ("primitives_q31", "primitives_f32"):
         text = (ROOT / "tests" / "prove" / f"{name}.c").read_text()
-        assert not re.search(r"exp2_table|F32_P[12]|Q31_[BC]\b", text)
+        assert not re.search(r"exp2_table|F32_[HG]\b|Q31_[HG]\b", text)

@@ -25,7 +25,7 @@
 #define SHOWN 5
 
 typedef struct {
-    int64_t low, high, gain; /* 2^-16 C, 2^-26 */
+    int64_t low, high, gain; /* 2^-16 C, 2^-27 */
     double least, most;      /* the model's envelope, C */
     double zero, half;       /* its normalisation */
     int32_t input[POSITIONS]; /* an input for each position */
@@ -77,13 +77,13 @@ static void *room(size_t n, size_t size)
 
 /* ---- inputs ---- */
 
-/* The smallest input of each position, by the rule position = (offset * gain) >> 26. */
+/* The smallest input of each position, by the rule position = (offset * gain) >> 27. */
 static void find_inputs(axis_t *axis)
 {
     int64_t x;
     for (x = 0; x < POSITIONS; x++) {
-        const int64_t offset = ((x << 26) + axis->gain - 1) / axis->gain;
-        axis->reached[x] = (axis->low + offset <= axis->high) && (((offset * axis->gain) >> 26) == x);
+        const int64_t offset = ((x << 27) + axis->gain - 1) / axis->gain;
+        axis->reached[x] = (axis->low + offset <= axis->high) && (((offset * axis->gain) >> 27) == x);
         axis->input[x] = (int32_t)(axis->low + offset);
     }
 }
@@ -91,7 +91,7 @@ static void find_inputs(axis_t *axis)
 /* Normalised input of the model at a position (edges at whole numbers, middles at halves). */
 static double normalised(const axis_t *axis, double position)
 {
-    const double inputs = fmin((double)axis->low + ldexp(position, 26) / (double)axis->gain, (double)axis->high);
+    const double inputs = fmin((double)axis->low + ldexp(position, 27) / (double)axis->gain, (double)axis->high);
     return (fmin(fmax(inputs / 65536.0, axis->least), axis->most) - axis->zero) / axis->half;
 }
 
@@ -119,7 +119,7 @@ static double *factors(int a, int first, int count)
 static void reference_row(int64_t x_t, const uint64_t *restrict squares, const int64_t *restrict start, int count,
                           int64_t *restrict sum)
 {
-    const int64_t row = w0 * 2147483648LL + 1073741824LL + linear[0] * x_t * 32768;
+    const int64_t row = linear[0] * x_t * 8192;
     int c, j;
     for (j = 0; j < count; j++) {
         sum[j] = row + start[j];
@@ -131,10 +131,9 @@ static void reference_row(int64_t x_t, const uint64_t *restrict squares, const i
         const int64_t w = centers[c].w;
         for (j = 0; j < count; j++) {
             const uint64_t u = (square + other[j]) >> (32 - narrow);
-            const uint64_t slope = 2977018596U - 979U * ((u >> 4) & 0x3FFFU);
-            const uint64_t drop = (((u & 0x3FFFFU) << 14) * slope) >> 32;
-            const uint64_t entry = (uint64_t)entries[(u >> 18) & 63U];
-            const uint64_t e = (entry - ((entry * drop) >> 38)) >> ((u >> 24) & 63U);
+            const uint64_t v = 1557473452U - ((u & 0x3FFFFU) << 6);
+            const uint64_t square = ((v * v) >> 32) + 558709134U;
+            const uint64_t e = (((uint64_t)entries[(u >> 18) & 63U] * square) >> 32) >> ((u >> 24) & 63U);
             sum[j] += (u < CUT) ? w * (int64_t)e : 0;
         }
     }
@@ -154,7 +153,7 @@ static int reference_status(int64_t x_t, int64_t x_r)
 
 static void compare(int64_t x_t, int64_t x_r, int64_t sum, int32_t *bias)
 {
-    const int32_t want = (int32_t)(sum >> 31);
+    const int32_t want = (int32_t)(w0 + (sum >> 29));
     const int want_status = reference_status(x_t, x_r);
     int_least32_t got = 0;
     const int status = gtc_q31_map(&TABLE, axes[0].input[x_t], axes[1].input[x_r], &got);
@@ -214,7 +213,7 @@ static void slice(int first, const double *along_t)
     int c, j, x_t;
     squares = (squares == NULL) ? room((size_t)n_integer * SLICE, sizeof *squares) : squares;
     for (j = 0; j < SLICE; j++) {
-        start[j] = linear[1] * (first + j) * 32768;
+        start[j] = linear[1] * (first + j) * 8192;
         for (c = 0; c < n_integer; c++) {
             const int64_t argument = centers[c].s[1] * (first + j) + centers[c].k[1];
             squares[(size_t)c * SLICE + (size_t)j] = (uint64_t)(argument * argument);

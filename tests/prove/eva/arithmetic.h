@@ -1,0 +1,58 @@
+/* arithmetic.h - names of one arithmetic (-DF32 or not), arbitrary numbers, and what states may hold. */
+#ifndef ARITHMETIC_H_INCLUDED
+#define ARITHMETIC_H_INCLUDED
+
+#include "__fc_builtin.h"
+#include "gtc_rlg_0042.h"
+
+#if defined(F32)
+#define NAME(x) gtc_f32_##x
+#define THE_TABLE gtc_rlg_0042_f32
+typedef float num_t;
+typedef float wide_t;
+#define LOWEST (-90.0F)
+#define HIGHEST 200.0F
+#define STEEPEST 100000.0F /* C per block: far more than any slope of plausible means */
+#define FINITE(x) \is_finite(x)
+#define ANY_PLAUSIBLE() Frama_C_float_interval(LOWEST, HIGHEST)
+#else
+#define NAME(x) gtc_q31_##x
+#define THE_TABLE gtc_rlg_0042_q31
+typedef int_least32_t num_t;
+typedef int_least64_t wide_t;
+#define LOWEST (-90L * 65536L)
+#define HIGHEST (200L * 65536L)
+#define STEEPEST 2147483647L
+#define FINITE(x) \true
+#define ANY_PLAUSIBLE() (int_least32_t)Frama_C_long_interval(LOWEST, HIGHEST)
+#endif
+
+#define MAX_BLOCK 1048576UL /* samples_per_block at most; `init` refuses more */
+
+/* Any number at all, in KINDS parts that are analysed apart: those that are one, and those that mark a missing
+ * sample (in float32 every infinity and NaN of either sign, by their bits). */
+#if defined(F32)
+#define KINDS 3
+static inline float any_number(unsigned kind)
+{
+    union {
+        uint_least32_t bits;
+        float number;
+    } word;
+    if (kind == 0U) {
+        return Frama_C_float_interval(-0x1.fffffep127F, 0x1.fffffep127F);
+    }
+    word.bits = (kind == 1U) ? Frama_C_unsigned_long_interval(0x7F800000U, 0x7FFFFFFFU)
+                             : Frama_C_unsigned_long_interval(0xFF800000U, 0xFFFFFFFFUL);
+    return word.number;
+}
+#else
+#define KINDS 2
+static inline int_least32_t any_number(unsigned kind)
+{
+    return (kind == 0U) ? (int_least32_t)Frama_C_long_interval(-2147483647L, 2147483647L)
+                        : (-2147483647L - 1L);
+}
+#endif
+
+#endif
