@@ -33,6 +33,7 @@ __all__ = ["Replayed", "evaluate", "trace_name"]
 
 Progress = Callable[[str], None]
 _HOST = "host-gcc-O2"
+_TRACE_ROWS = 2**16  # written at once
 _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
 
 
@@ -166,19 +167,16 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
 
 def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    columns = (
-        rows.time_s[span],
-        rows.temperature_c[span],
-        rows.rate_dph[span],
-        replayed.bias_dph[span],
-        (rows.rate_dph - replayed.bias_dph)[span],
-        replayed.status[span],
-    )
-    table = pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True)))
+    time, temperature = rows.time_s[span], rows.temperature_c[span]
+    rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]
+    options = pacsv.WriteOptions(include_header=False, quoting_style="none")
     part = path.with_name(f".{path.name}.part")
     with part.open("wb") as stream:
         stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
-        pacsv.write_csv(table, stream, pacsv.WriteOptions(include_header=False, quoting_style="none"))
+        for start in range(0, time.size, _TRACE_ROWS):
+            k = slice(start, start + _TRACE_ROWS)
+            columns = (time[k], temperature[k], rate[k], bias[k], rate[k] - bias[k], status[k])
+            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True))), stream, options)
     part.replace(path)
 
 

@@ -99,9 +99,10 @@ def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | No
         return None
     names = ["time_s", "temperature_c", "rate_dph", "compensated_dph"]
     types = pacsv.ConvertOptions(include_columns=names, column_types=dict.fromkeys(names, pa.float64()))
-    table = pacsv.read_csv(path, pacsv.ReadOptions(use_threads=False), convert_options=types)
-    scored = np.ones(table.num_rows, dtype=bool)
-    return average(*(table[name].to_numpy() for name in names), scored=scored, average_s=average_s)
+    columns = pacsv.read_csv(path, pacsv.ReadOptions(use_threads=False), convert_options=types).columns
+    scored = np.ones(len(columns[0]), dtype=bool)
+    # Popped, so that a full-rate trace is not in memory twice.
+    return average(*(columns.pop(0).to_numpy() for _ in names), scored=scored, average_s=average_s)
 
 
 def _sci(value: float | None, digits: int = 2) -> str:

@@ -171,20 +171,29 @@ def run_program(target: Target, program: Path, data: bytes = b"") -> Run:
     Raises:
         CheckFailed: It did not end.
     """
-    if target.bare:
-        (program.parent / _STDIN).write_bytes(data)
-    try:
-        done = subprocess.run(
-            [*target.run, str(program)],
-            input=b"" if target.bare else data,
-            capture_output=True,
-            check=False,
-            timeout=_RUN_LIMIT_S,
-            cwd=program.parent,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise CheckFailed(f"{target.name}: the program did not end within {_RUN_LIMIT_S} s") from error
-    return Run(done.returncode, done.stdout, done.stderr.decode("utf-8", "replace"))
+    command = [*target.run, str(program)]
+    # Files, not pipes: a recording goes in and comes out, and is in memory once.
+    with tempfile.TemporaryFile() as stdin, tempfile.TemporaryFile() as stdout:
+        if target.bare:
+            (program.parent / _STDIN).write_bytes(data)
+        else:
+            stdin.write(data)
+            stdin.seek(0)
+        del data
+        try:
+            done = subprocess.run(
+                command,
+                stdin=stdin,
+                stdout=stdout,
+                stderr=subprocess.PIPE,
+                check=False,
+                timeout=_RUN_LIMIT_S,
+                cwd=program.parent,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise CheckFailed(f"{target.name}: the program did not end within {_RUN_LIMIT_S} s") from error
+        stdout.seek(0)
+        return Run(done.returncode, stdout.read(), done.stderr.decode("utf-8", "replace"))
 
 
 def symbols(target: Target, *files: Path) -> list[Symbol]:

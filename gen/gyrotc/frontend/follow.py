@@ -70,8 +70,10 @@ class Steps:
     def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
         """Index of the correction in force at each of the ascending `samples`; -1 before the first."""
         first = np.searchsorted(samples, self.at, side="left")
-        made = np.bincount(first, minlength=samples.size + 1)[: samples.size]
-        return np.asarray(np.cumsum(made) - 1)
+        count = np.bincount(first, minlength=samples.size + 1)[: samples.size]
+        np.cumsum(count, out=count)
+        count -= 1
+        return count
 
 
 def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:

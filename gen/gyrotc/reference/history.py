@@ -65,7 +65,9 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     steps = follow(arithmetic_of(table), stream.samples, settings)
     status, bits = corrections(table, steps, stream, samples_per_block)
     position = stream.position
-    in_force = steps.in_force(position) + 1
+    valid = steps.valid[position // samples_per_block]
+    in_force = steps.in_force(position)
+    in_force += 1
     gaps = np.flatnonzero(stream.missed)
     missed_status = np.zeros(position.size, dtype=np.int32)
     missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | _HELD
@@ -76,7 +78,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         status=at_rows,
         bits=bits[in_force],
         missed_status=missed_status,
-        block_valid=steps.valid[position // samples_per_block],
+        block_valid=valid,
     )
 
 
