@@ -21,6 +21,11 @@ from .metrics import Averages
 from .model import Model
 
 __all__ = [
+    "ACCENT",
+    "AFTER",
+    "BEFORE",
+    "COVERED",
+    "STYLE",
     "allan_deviation",
     "bias_over_time",
     "curve_by_size",
@@ -30,7 +35,7 @@ __all__ = [
 ]
 
 BEFORE, AFTER, COVERED, ACCENT = "#b4552d", "#1f6f8b", "#7a7a7a", "#222222"
-_STYLE: Any = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "gyrotc",
     "font.family": "sans-serif",
@@ -47,7 +52,7 @@ _STYLE: Any = {
 
 def svg(figure: Figure) -> str:
     """The figure as an SVG element without prologue, date or fixed size."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
@@ -66,7 +71,7 @@ def _figure(width: float, height: float) -> Figure:
 
 def bias_over_time(runs: Sequence[tuple[str, str, Averages]]) -> str:
     """Measured and compensated bias of every run (label, role, averages), one panel a run, common scales."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         columns = min(3, len(runs))
         rows = -(-len(runs) // columns)
         figure = _figure(10.0, 0.5 + 1.75 * rows)
@@ -94,7 +99,7 @@ def map_with_centers(model: Model) -> str:
     t, r = np.linspace(t0, t1, 160), np.linspace(r0, r1, 80)
     tt, rr = np.meshgrid(t, r)
     bias = model.map_dph(tt, rr)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = _figure(10.0, 3.6)
         left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
         image = left.pcolormesh(t, r, bias, cmap="cividis", shading="nearest", rasterized=True)
@@ -146,7 +151,7 @@ def curve_by_size(training: dict[str, Any]) -> str | None:
         return None
     n = [s["centers"] for s in sizes]
     keys = [(k, label) for k, label in _CURVES if all(s.get(k) is not None for s in sizes)]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = _figure(10.0, 2.8)
         ax = figure.subplots()
         for (key, label), color in zip(keys, (AFTER, BEFORE, COVERED, ACCENT), strict=False):
@@ -183,7 +188,7 @@ def allan_deviation(noise: dict[str, Any]) -> str | None:
     tau = np.array([p["tau_s"] for p in points])
     value = np.array([p["deviation_dph"] for p in points])
     spread = value / np.sqrt(2.0 * np.array([p["freedom"] for p in points]))
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = _figure(10.0, 2.8)
         ax = figure.subplots()
         low = np.minimum(spread, 0.9 * value)
@@ -209,7 +214,7 @@ def methods_side_by_side(result: dict[str, Any]) -> str:
     """RMS after compensation of every method in every environment, over the noise floor where it is known."""
     methods = result["methods"]
     environments = [g["environment"] for g in methods[0]["groups"]]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = _figure(10.0, 3.4)
         ax = figure.subplots()
         width = 0.8 / len(methods)
