@@ -119,7 +119,7 @@ def map_with_centers(model: Model) -> str:
                 style,
                 color=AFTER,
                 linewidth=1.2,
-                label=f"{rate:+.2f} C/min",
+                label=f"{round(rate, 2) + 0.0:+.2f} C/min",  # + 0.0: not "-0.00"
             )
         right.set(xlabel="temperature T, C", ylabel="bias, deg/h")
         right.set_title("cuts through the map", fontsize=8.5, loc="left")
