@@ -5,7 +5,8 @@
 
 Reads the tables from the C source and from the image, computes the equation of docs/FORMAT.md with the words
 of the table and with the numbers of the model, and compares the two within the bound that the emitted header
-prints. The emitted known answers are judged by the model, too.
+prints; banks of networks with their hand-over. The emitted known answers are judged by the model, too. The bound
+leaves out extension terms: their records are compared word by word with what the model's parameters give.
 Exit status: 0 all agrees, 1 something differs (each is printed), 2 a file cannot be read.
 """
 
@@ -31,7 +32,10 @@ HEAD = [
     "coverage_cells:2", "sigma_cells:2", "n_probes",
 ]  # fmt: skip
 NUMBERS = {"max_step", "max_slope", "fallback", "scale", "envelope"}
+TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 CLAMPED, UNCOVERED = 2, 4
+
+Pair = tuple[float, float]
 
 
 class Unreadable(Exception):
@@ -57,9 +61,6 @@ class Model:
         self.raw = json.loads(path.read_text(encoding="utf-8"))
         canonical = json.dumps(self.raw, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         self.hash = hashlib.sha256(canonical.encode("ascii")).hexdigest()
-        if len(self.raw["networks"]) != 1 or self.raw["terms"]:
-            raise Unreadable("model banks and extension terms are not covered by this check")
-        self.network = self.raw["networks"][0]
         self.per_block = self.raw["block_s"] / 60.0
         self.t_range = self.raw["envelope"]["temperature_c"]
         self.r_range = self.raw["envelope"]["slope_c_per_min"]
@@ -75,16 +76,59 @@ class Model:
     def bias(self, temperature: float, slope_per_block: float) -> float:
         t = min(max(temperature, self.t_range[0]), self.t_range[1])
         r = min(max(slope_per_block / self.per_block, self.r_range[0]), self.r_range[1])
+        parts = [(self.share(n, t, r), n) for n in self.raw["networks"]]
+        total = math.fsum(share for share, _ in parts)
+        sums = (share * self.of_network(n, t, r) for share, n in parts if share > 0.0)
+        return math.fsum(sums) / total - self.shift
+
+    def share(self, n: dict[str, Any], t: float, r: float) -> float:
+        """What a network of a bank counts for, before it is divided by the sum of all."""
+        if n["region"] is None or len(self.raw["networks"]) == 1:
+            return 1.0
+        edges = (
+            (t, n["region"]["temperature_c"], self.t_range),
+            (r, n["region"]["slope_c_per_min"], self.r_range),
+        )
+        return min(share_in(*edge) for edge in edges)
+
+    def of_network(self, n: dict[str, Any], t: float, r: float) -> float:
         center, half = self.raw["scale"]["temperature_c"]
         half_r = self.raw["scale"]["slope_c_per_min"]
         z = ((t - center) / half, r / half_r)
-        n = self.network
-        total = [n["w0"] - self.shift, n["linear"][0] * z[0], n["linear"][1] * z[1]]
+        total = [n["w0"], n["linear"][0] * z[0], n["linear"][1] * z[1]]
         for (c_t, c_r), widths, weight in zip(n["centers"], n["widths"], n["weights"], strict=True):
             c = ((c_t - center) / half, c_r / half_r)
             u = sum(((z[k] - c[k]) / widths[k]) ** 2 for k in (0, 1) if widths[k] is not None)
             total.append(weight * math.exp(-u))
         return math.fsum(total)
+
+    def channels(self) -> list[str]:
+        return sorted({term["channel"] for term in self.raw["terms"] if term.get("channel")})
+
+    def term(self, term: dict[str, Any]) -> tuple[int, int, list[float]]:
+        """Kind, channel and parameters of a term's record, in the units of docs/FORMAT.md."""
+        p, block = term["parameters"], self.raw["block_s"]
+        channel = 1 + self.channels().index(term["channel"]) if term.get("channel") else 0
+        gain = -math.expm1(-block / p["tau_s"]) if "tau_s" in p else 0.0
+        if term["id"] == "cavity_lag":
+            return 1, channel, [gain, 0.0, block / p["tau_s"]]
+        if term["id"] == "thermal_gradient":
+            return 1, channel, [gain, p["amplitude_dph_per_c"], 0.0]
+        if term["id"] == "hysteresis":
+            return 2, channel, [p["width_c"], p["amplitude_dph_per_c"]]
+        if term["id"] == "warm_up":
+            return 3, channel, [block / p["tau_s"] * math.log2(math.e), p["amplitude_dph"]]
+        if term["id"] == "path_length_periodicity":
+            return 4, channel, [1.0 / p["period_c"], p["phase_rad"] / math.tau, p["amplitude_dph"]]
+        return 5, channel, [p["slope_dph_per_unit"], p["reference"]]
+
+
+def share_in(x: float, region: Pair, envelope: Pair) -> float:
+    """Share of the way from the nearest edge of a region that is no edge of the envelope; 0 outside."""
+    low, high = region
+    from_low = (x - low) / (high - low) if low > envelope[0] else 1.0
+    from_high = (high - x) / (high - low) if high < envelope[1] else 1.0
+    return max(min(1.0, from_low, from_high), 0.0)
 
 
 class Image:
@@ -127,27 +171,48 @@ class Image:
 
     def bias(self, temperature: float, slope: float) -> float:
         """The equation of docs/numerics.md with the table's words, without the target's rounding."""
-        e = self.member["envelope"]
-        network = [self.number(w) for w in self.array["networks"]]
-        records = [self.number(w) for w in self.array["centers"]]
-        centers = [records[k : k + 5] for k in range(0, len(records), 5)]
+        e, s = self.member["envelope"], self.member["scale"]
         if self.numeric == "f32":
-            t, r = min(max(temperature, e[0]), e[1]), min(max(slope, e[2]), e[3])
-            s = self.member["scale"]
-            z = ((t - s[0]) * s[1], r * s[2])
-            total = [network[1], network[2] * z[0], network[3] * z[1]]
+            point = (min(max(temperature, e[0]), e[1]), min(max(slope, e[2]), e[3]))
+            limits = ((e[0], e[1]), (e[2], e[3]))
+        else:
+            t, r = (min(max(round(v * 65536.0), e[k]), e[k + 1]) for v, k in ((temperature, 0), (slope, 2)))
+            point = (((t - e[0]) * s[0]) >> 27, ((r - e[2]) * s[1]) >> 27)
+            limits = ((0, 65535), (0, 65535))
+        shares, parts = [], []
+        for head, centers in self.networks():
+            regions = ((head[4], head[5]), (head[6], head[7]))
+            share = min(share_in(*edge) for edge in zip(point, regions, limits, strict=True))
+            if share > 0.0:
+                shares.append(share)
+                parts.append(share * self.of_network(head, centers, point))
+        return self.to_dph(math.fsum(parts) / math.fsum(shares))
+
+    def networks(self) -> Iterator[tuple[list[float], list[list[float]]]]:
+        """Record and centers of every network."""
+        words, first = self.array["networks"], 0
+        records = [self.number(w) for w in self.array["centers"]]
+        for k in range(0, len(words), 8):
+            n = words[k]
+            rows = [records[5 * i : 5 * i + 5] for i in range(first, first + n)]
+            yield [n, *(self.number(w) for w in words[k + 1 : k + 8])], rows
+            first += n
+
+    def of_network(self, head: list[float], centers: list[list[float]], point: tuple[Any, Any]) -> float:
+        """One network at a point of the envelope: T and slope in float32, positions in fixed point."""
+        s = self.member["scale"]
+        if self.numeric == "f32":
+            z = ((point[0] - s[0]) * s[1], point[1] * s[2])
+            total = [head[1], head[2] * z[0], head[3] * z[1]]
             for c_t, g_t, c_r, g_r, weight in centers:
                 u = ((z[0] - c_t) * g_t) ** 2 + ((z[1] - c_r) * g_r) ** 2
                 total.append(weight * 2.0 ** (-u / 64.0) if u < 64 * 1000 else 0.0)
             return math.fsum(total)
-        gain_t, gain_r, narrow = self.member["scale"]
-        t, r = (min(max(round(v * 65536.0), e[k]), e[k + 1]) for v, k in ((temperature, 0), (slope, 2)))
-        x = (((t - e[0]) * gain_t) >> 27, ((r - e[2]) * gain_r) >> 27)
-        total = [network[1], network[2] * x[0] / 65536.0, network[3] * x[1] / 65536.0]
+        total = [head[1], head[2] * point[0] / 65536.0, head[3] * point[1] / 65536.0]
         for s_t, k_t, s_r, k_r, weight in centers:
-            u = ((s_t * x[0] + k_t) ** 2 + (s_r * x[1] + k_r) ** 2) / 2.0 ** (56 - narrow)
+            u = ((s_t * point[0] + k_t) ** 2 + (s_r * point[1] + k_r) ** 2) / 2.0 ** (56 - s[2])
             total.append(weight * 2.0**-u if u < 1000 else 0.0)
-        return self.to_dph(math.fsum(total))
+        return math.fsum(total)
 
 
 # ---- the files ----
@@ -215,7 +280,13 @@ def source_words(text: str, numeric: str) -> list[int]:
 def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
     if image.crc() != image.words[-1]:
         yield "the CRC-32 is not that of the words"
-    source = source_words((folder / f"gtc_{name}.c").read_text(encoding="ascii"), image.numeric)
+    text = (folder / f"gtc_{name}.c").read_text(encoding="ascii")
+    codes = re.search(rf"gtc_{image.numeric}_table_t \w+ = .*?\.term_code = \{{ (.*?) \}}", text, re.S)
+    kinds = [TERM_CODES.get(kind) for kind in image.array["terms"][::8]]
+    wanted = ", ".join(f"&gtc_{image.numeric}_term_{kind}" for kind in kinds) or "NULL"
+    if codes is None or codes[1] != wanted:
+        yield f"the code of the terms is {codes and codes[1]}, their kinds are {kinds}"
+    source = source_words(text, image.numeric)
     if source != image.words:
         wrong = [k for k, pair in enumerate(zip(source, image.words, strict=False)) if pair[0] != pair[1]]
         yield f"the C source is not the image (words {wrong[:5]}, {len(source)} of {len(image.words)})"
@@ -230,9 +301,11 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
     raw, unit = model.raw, 1.0 if image.numeric == "f32" else 65536.0
     result_unit = 1.0 if image.numeric == "f32" else 2.0 ** image.one("bias_frac_bits")
     expected = {
-        "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))], "slope_blocks": [raw["slope_blocks"]],
-        "hold_blocks": [raw["hold_blocks"]], "stuck_samples": [raw["stuck_samples"]], "n_networks": [1],
-        "n_channels": [1], "n_terms": [0], "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
+        "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))],
+        "slope_blocks": [raw["slope_blocks"]], "hold_blocks": [raw["hold_blocks"]],
+        "stuck_samples": [raw["stuck_samples"]], "n_networks": [len(raw["networks"])],
+        "n_channels": [1 + len(model.channels())], "n_terms": [len(raw["terms"])],
+        "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
         "sigma_cells": (raw["uncertainty_dph"] or {"cells": [0, 0]})["cells"],
     }  # fmt: skip
     for key, value in expected.items():
@@ -264,6 +337,47 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
             yield f"an uncertainty is {image.to_dph(image.number(got))}, the model says {want}"
 
 
+def check_regions(model: Model, image: Image) -> Iterator[str]:
+    """Where the networks of a bank hold."""
+    e, s = image.member["envelope"], image.member["scale"]
+    whole = {"temperature_c": model.t_range, "slope_c_per_min": model.r_range}
+    for network, (head, _) in zip(model.raw["networks"], image.networks(), strict=True):
+        region = network["region"] or whole
+        edges = [*region["temperature_c"], *(r * model.per_block for r in region["slope_c_per_min"])]
+        for k, (got, edge) in enumerate(zip(head[4:], edges, strict=True)):
+            want, room = edge, abs(edge) * 2.0**-24 * 1.000001
+            if image.numeric == "q31":
+                position = (edge * 65536.0 - e[k // 2 * 2]) * s[k // 2] / 2.0**27 - 0.5
+                want, room = min(max(position, 0.0), 65535.0), 0.5000001
+            if abs(got - want) > room:
+                yield f"an edge of a region is {got}, the model says {want}"
+
+
+def check_terms(model: Model, image: Image) -> Iterator[str]:
+    """The records of the extension terms against the model's parameters."""
+    unit = 2.0 ** image.one("bias_frac_bits")
+    scales = {1: (2.0**31, unit, 2.0**24), 2: (2.0**16, unit), 3: (2.0**28, unit),
+              4: (2.0**32, 2.0**32, unit), 5: (unit, 2.0**16)}  # fmt: skip
+    for k, term in enumerate(model.raw["terms"]):
+        words = image.array["terms"][8 * k : 8 * k + 8]
+        kind, channel, values = model.term(term)
+        if words[:2] != [kind, channel]:
+            yield f"term {term['id']}: kind and channel are {words[:2]}, the model says {[kind, channel]}"
+            continue
+        if image.numeric == "f32":
+            values = [64.0 * v if (kind, i) == (3, 0) else v for i, v in enumerate(values)]
+        else:
+            values = [v * scale for v, scale in zip(values, scales[kind], strict=True)]
+        for i, word in enumerate(words[2:]):
+            want = values[i] if i < len(values) else 0.0
+            error = image.number(word) - min(want, 2.0**31 - 1.0 if image.numeric == "q31" else want)
+            if (kind, i) == (4, 1):  # a phase in turns
+                turn = 1.0 if image.numeric == "f32" else 2.0**32
+                error -= turn * round(error / turn)
+            if abs(error) > (abs(want) * 2.0**-24 * 1.000001 if image.numeric == "f32" else 0.5000001):
+                yield f"term {term['id']}: parameter {i} is {image.number(word)}, the model says {want}"
+
+
 def places(model: Model) -> Iterator[tuple[float, float]]:
     """A grid over the envelope and beyond its edges, every center, and random places (always the same ones)."""
     t0, t1 = model.t_range
@@ -271,8 +385,9 @@ def places(model: Model) -> Iterator[tuple[float, float]]:
     for i in range(-1, 42):
         for j in range(-1, 22):
             yield t0 + (t1 - t0) * i / 40, r0 + (r1 - r0) * j / 20
-    for c_t, c_r in model.network["centers"]:
-        yield c_t, c_r * model.per_block
+    for network in model.raw["networks"]:
+        for c_t, c_r in network["centers"]:
+            yield c_t, c_r * model.per_block
     draw = random.Random(20140801)
     for _ in range(4000):
         yield draw.uniform(t0, t1), draw.uniform(r0, r1)
@@ -359,6 +474,8 @@ def check(folder: Path) -> list[str]:
         found = [
             *check_files(c, name, image),
             *check_members(model, image, name),
+            *check_regions(model, image),
+            *check_terms(model, image),
             *check_map(model, image, bound),
         ]
         for words in known_answers(c, name, image):

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from emitted import GOLDEN, emitted, flip
+from gyrotc import vectors
 from gyrotc.emit import Emission, emit, emit_texts, quantise_all, replace_folder
 from gyrotc.model import Model, load_model
 from gyrotc.table import Table
-from models import random_model
+from models import bank_of, random_model, random_terms
 
 SCRIPT = ROOT / "tools" / "check_table.py"
 
@@ -43,6 +44,24 @@ def test_emitted_tables_are_the_model(seed: int | None, tmp_path: Path) -> None:
     emitted(tmp_path, None if seed is None else random_model(seed))
     done = _check(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture
+def few_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Known answers follow the fault, so few of them show it no worse than all."""
+    monkeypatch.setattr(vectors, "N_RANDOM", 200)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_tables_with_terms_and_banks_are_the_model(seed: int, tmp_path: Path, few_vectors: None) -> None:
+    emitted(tmp_path, _extended(seed))
+    done = _check(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def _extended(seed: int) -> Model:
+    """A bank of three networks with terms; seeds 2 and 3 have every kind among them."""
+    return bank_of(random_model(seed, terms=random_terms(seed)))
 
 
 def test_a_table_shifted_by_zero_at_is_the_model(tmp_path: Path) -> None:
@@ -127,6 +146,38 @@ FAULTS: dict[str, Callable[[Table], Table]] = {
 }
 
 
+def _array(name: str, column: int, change: Callable[[int], int]) -> Callable[[Table], Table]:
+    """Changes one word of an array."""
+
+    def fault(table: Table) -> Table:
+        words = _words(table, name)
+        words[column] = change(int(words[column])) & 0xFFFFFFFF
+        return replace(table, **{name: words})
+
+    return fault
+
+
+def _second_half_shifted(table: Table) -> Table:
+    """The fault of a loop that gives a center to the wrong network of a bank."""
+    words = _words(table, "networks")
+    words[0] -= 1
+    words[8] += 1
+    return replace(table, networks=words)
+
+
+EXTENDED_FAULTS: dict[str, Callable[[Table], Table]] = {
+    "an edge between networks": _array("networks", 5, lambda w: w - (1 << 12)),
+    "a center in the wrong network": _second_half_shifted,
+    "w0 of the second network": _array("networks", 9, lambda w: w ^ 0x80000000),
+    "kind of a term": _array("terms", 0, lambda w: w % 5 + 1),
+    "channel of a term": _array("terms", 1, lambda w: w + 1),
+    "first parameter of a term": _array("terms", 2, lambda w: w + 2),
+    "second parameter of a term": _array("terms", 3, lambda w: w + 2),
+    "a parameter that the term has not": _array("terms", 7, lambda w: w + 1),
+    "channels": lambda t: replace(t, n_channels=t.n_channels + 1),
+}
+
+
 @pytest.fixture(scope="module")
 def model() -> Model:
     return load_model(GOLDEN)
@@ -134,10 +185,25 @@ def model() -> Model:
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("name", FAULTS)
-def test_seeded_fault_of_quantisation_is_seen(name: str, numeric: str, model: Model, tmp_path: Path) -> None:
+def test_seeded_fault_of_quantisation_is_seen(
+    name: str, numeric: str, model: Model, tmp_path: Path, few_vectors: None
+) -> None:
     table = quantise_all(model, [numeric]).tables[numeric]
     emission = Emission({numeric: FAULTS[name](table)}, {})
     replace_folder(tmp_path / "c", emit_texts(model, emission, asked=True))
+    model.save(tmp_path / "model.json")
+    done = _check(tmp_path)
+    assert done.returncode == 1, (name, done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+@pytest.mark.parametrize("name", EXTENDED_FAULTS)
+def test_seeded_fault_in_terms_or_bank_is_seen(
+    name: str, numeric: str, tmp_path: Path, few_vectors: None
+) -> None:
+    model = _extended(3)
+    table = EXTENDED_FAULTS[name](quantise_all(model, [numeric]).tables[numeric])
+    replace_folder(tmp_path / "c", emit_texts(model, Emission({numeric: table}, {}), asked=True))
     model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1, (name, done.stdout, done.stderr)
