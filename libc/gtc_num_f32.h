@@ -139,7 +139,7 @@ static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT 
 }
 
 /* 2^(-u/64), u >= 0; 0 from 2048 on, and where u is not a number. */
-static inline float FN(exp2)(float u)
+GTC_IN_LOOP float FN(exp2)(float u)
 {
     gtc_word_t whole;
     gtc_word_t e;
@@ -160,7 +160,7 @@ static inline float FN(exp2)(float u)
 }
 
 /* acc + weight * 2^(-u/64), u of the center's record. */
-static inline float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
+GTC_IN_LOOP float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
 {
     float u;
     float f;

@@ -91,7 +91,7 @@ static inline int_least32_t FN(upper)(int_least32_t x)
 #endif
 
 /* Upper word of a * b; a, b < 2^31. */
-static inline uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
+GTC_IN_LOOP uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t a0 = a & 0xFFFFU;
@@ -106,7 +106,7 @@ static inline uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
 }
 
 /* Upper word of a^2; a < 2^31. */
-static inline uint_least32_t FN(high_of_square)(uint_least32_t a)
+GTC_IN_LOOP uint_least32_t FN(high_of_square)(uint_least32_t a)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t a0 = a & 0xFFFFU;
@@ -119,7 +119,7 @@ static inline uint_least32_t FN(high_of_square)(uint_least32_t a)
 }
 
 /* Upper word of a^2 + b^2; |a|, |b| < 2^31. */
-static inline uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
+GTC_IN_LOOP uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t p = (uint_least32_t)((a < 0) ? -a : a);
@@ -150,7 +150,7 @@ typedef struct {
     uint_least32_t high;
 } FN(sum_t);
 
-static inline FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
+GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
     const int_least32_t w0 = (int_least32_t)(FN(bits)(w) & 0xFFFFU);
     const int_least32_t w1 = FN(upper)(w);
@@ -173,7 +173,7 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 #else
 typedef int_least64_t FN(sum_t);
 
-static inline FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
+GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
     return sum + ((int_least64_t)w * e);
 }
@@ -189,7 +189,7 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 /* ---- the map ---------------------------------------------------------------------------- */
 
 /* 2^-u in 2^-29, u in 2^-24, up to Q31_LAST; g is Q31_G. */
-static inline int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
+GTC_IN_LOOP int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
 {
     const uint_least32_t v = Q31_H - ((u << 14) >> 8);
     const uint_least32_t s = FN(high_of_square)(v) + g;
@@ -249,7 +249,7 @@ static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_lea
 }
 
 /* The argument s x + k of one input; the product may wrap, their sum does not. */
-static inline int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t x)
+GTC_IN_LOOP int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t x)
 {
     gtc_word_t argument;
 
@@ -261,7 +261,7 @@ static inline int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_
 }
 
 /* Takes one Gaussian into the sum. */
-static inline FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
+GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
                                           const POINT *in, uint_least32_t g)
 {
     uint_least32_t u;
