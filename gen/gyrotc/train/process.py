@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 MEAN_S = 50.0
 _TRIM_SIGMA = 4.5
 _TRIMS = 3
+_GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ def fit_process(data: TrainingData, scaling: Scaling) -> Process:
     center = float(np.average(means.bias_dph, weights=weight))
     spread = float(np.sqrt(np.average((means.bias_dph - center) ** 2, weights=weight)))
     spread = spread if spread > 0.0 else 1.0
-    y = (means.bias_dph - center) / spread
+    y = np.round((means.bias_dph - center) / spread * _GRID) / _GRID
     kept = np.ones(len(y), dtype=bool)
     start = None
     for round_ in range(_TRIMS + 1):
