@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .accuracy import accuracy
+from .invariance import invariance
 from .page import filled
 from .speed import speed
 
@@ -42,6 +43,7 @@ def main(docs: Path) -> None:
         "versions": {name: version(name) for name in _PACKAGES},
         "speed": speed(_say),
         "accuracy": accuracy(_say),
+        "invariance": invariance(_say),
     }
     (docs / "results").mkdir(exist_ok=True)
     (docs / "results" / "bench.json").write_text(

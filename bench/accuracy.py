@@ -28,7 +28,7 @@ def accuracy(say: Say) -> dict[str, Any]:
     """All tables of the section on accuracy."""
     return {
         "default": [_default(scenario, say) for scenario in SCENARIOS],
-        "more_centers": [_more_centers(scenario, say) for scenario in (SCENARIOS[0], SCENARIOS[2])],
+        "more_centers": [_more_centers(scenario, say) for scenario in SCENARIOS],
         "left_out": [_left_out(scenario, say) for scenario in SCENARIOS[:2]],
         "noise": [_other_noise(factor, say) for factor in _NOISE],
         "methods": [_method(name, say) for name in learning.CONTESTANTS],

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
+
+from .aims import AIMS
 
 __all__ = ["filled", "section"]
 
@@ -22,8 +24,11 @@ was really added.
 """
 _SELECTION = """CPU seconds of one process and its peak memory, interpreter and libraries included. Selection by
 orthogonal least squares among equal Gaussians: 30 centers, least BIC over sizes and widths, weights. Peers get the
-same candidates as a matrix, which they have to build. RMS: what is left (noise: 0.5); a peer more than 5 % worse is
-no reference.
+same candidates as a matrix, which they have to build. RMS: what is left (noise: 0.5). A time in brackets is no
+reference: more than 5 % worse than the best in accuracy.
+"""
+_SAME = """The same samples in rad/s, shuffled, and every one twice: numbers of centers of {gyros} gyros, and how many
+of the gyros kept their centers.
 """
 _RAW = """Six recordings of 2.88 million rows (100 Hz, Parquet) to a C file proven on the host: {seconds:.1f} CPU s
 ({steps}), {elapsed_s:.1f} s by the clock, at most {peak_gib:.2f} GiB.
@@ -41,6 +46,9 @@ _DEFAULT_HEAD = (
     "largest Σ\\|w\\|, deg/h",
 )
 
+_ACCURACY = ("rms", "ratio", "rms_distance")
+_REFERENCE = 1.05
+
 Column = tuple[str, str, str]  # title, key, format
 
 
@@ -56,7 +64,10 @@ def section(result: dict[str, Any]) -> str:
     parts = [
         "## Training beside its peers (`make bench`)\n",
         f"{result['machine']}, one thread. {versions}.\n",
+        _table(["aim", "at most", "measured"], [_aim_row(result, *aim) for aim in AIMS]),
         *_accuracy(result["accuracy"]),
+        _SAME.format(**result["invariance"]),
+        _invariance(result["invariance"]["rows"]),
         *_speed(result["speed"]),
     ]
     return "\n".join(parts) + "\n"
@@ -65,6 +76,13 @@ def section(result: dict[str, Any]) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def _aim_row(
+    result: dict[str, Any], what: str, limit: float, form: str, figure: Callable[[dict[str, Any]], float]
+) -> list[str]:
+    value = figure(result)
+    return [what, f"{limit:g}", format(value, form) if value <= limit else f"**{value:{form}}** (missed)"]
 
 
 def _ratio(spread: dict[str, float]) -> list[str]:
@@ -129,6 +147,23 @@ def _left_out_row(x: dict[str, Any]) -> list[str]:
     return [x["scenario"], *cells, f"{x['median']:.4f}"]
 
 
+def _invariance(rows: Sequence[dict[str, Any]]) -> str:
+    changes = list(rows[0]["changes"])
+    body = [
+        [row["name"], _range(row["centers"]), *(_kept(row["changes"][change]) for change in changes)]
+        for row in rows
+    ]
+    return _table(["method", "centers", *changes], body)
+
+
+def _kept(change: dict[str, Any]) -> str:
+    return f"{_range(change['centers'])}, {change['same']} the same"
+
+
+def _range(limits: Sequence[int]) -> str:
+    return "-".join(str(n) for n in dict.fromkeys(limits))
+
+
 def _speed(s: dict[str, Any]) -> list[str]:
     time: Column = ("CPU s", "seconds", ".3f")
     memory: Column = ("peak GiB", "peak_gib", ".2f")
@@ -155,11 +190,19 @@ def _speed(s: dict[str, Any]) -> list[str]:
 
 
 def _rows(rows: Sequence[dict[str, Any]], columns: Sequence[Column]) -> str:
-    body = [[row["name"], *(_figure(row, key, form) for _, key, form in columns)] for row in rows]
+    measure = next(key for _, key, _ in columns if key in _ACCURACY)
+    limit = _REFERENCE * min(float(row[measure]) for row in rows if measure in row)
+    body = [
+        [row["name"], *(_figure(row, key, form, row.get(measure, 0.0) <= limit) for _, key, form in columns)]
+        for row in rows
+    ]
     return _table(["", *(title for title, _, _ in columns)], body)
 
 
-def _figure(row: dict[str, Any], key: str, form: str) -> str:
+def _figure(row: dict[str, Any], key: str, form: str, is_reference: bool) -> str:
     if "over_s" in row:
         return f"> {row['over_s']:.0f}" if key == "seconds" else "-"
-    return "failed" if "failed" in row else format(row[key], form)
+    if "failed" in row:
+        return "failed"
+    figure = format(row[key], form)
+    return figure if is_reference or key != "seconds" else f"({figure})"

@@ -64,12 +64,14 @@ def _minisom(n: int, m: int) -> Callable[[], float]:
 
 
 def _six(seed: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """500 bins of a smooth map, and a start of six Gaussians (columns c, d, log s, log q)."""
+    """500 noisy bins of six Gaussians, and a start near them (columns c, d, log s, log q): one optimum for all."""
     rng = np.random.default_rng(seed)
     t, r = rng.uniform(-1, 1, 500), rng.uniform(-1, 1, 500)
-    y = np.sin(4.0 * t) / (1.2 + r) + 0.3 * np.tanh(3.0 * r)
-    start = np.array([[-0.8, -0.5, -0.2, 0.2, 0.5, 0.8], [0.0, 0.5, -0.5, 0.5, -0.5, 0.0], *[[-0.7] * 6] * 2])
-    return t, r, y, start
+    true = np.array([[-0.8, -0.5, -0.2, 0.2, 0.5, 0.8], [0.0, 0.5, -0.5, 0.5, -0.5, 0.0], *[[-0.7] * 6] * 2])
+    c, d, s, q = true[:, :, None]
+    g = np.exp(-(((t - c) / np.exp(s)) ** 2) - ((r - d) / np.exp(q)) ** 2)
+    y = np.array([1.0, -0.8, 0.9, -1.0, 0.7, -0.6]) @ g + rng.normal(0.0, 0.01, 500)
+    return t, r, y, true + rng.normal(0.0, 0.1, true.shape)
 
 
 def _gyrotc_varpro() -> Callable[[], float]:

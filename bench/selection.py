@@ -13,7 +13,7 @@ import numpy as np
 from gyrotc import _core
 from numpy.typing import NDArray
 
-__all__ = ["CONTESTANTS", "Task", "grid_of"]
+__all__ = ["CONTESTANTS", "Task", "dictionary", "grid_of"]
 
 Floats = NDArray[np.float64]
 Task = tuple[Floats, Floats, Floats, tuple[int, int], Sequence[float], int]  # t, r, y, grid, widths, centers
@@ -25,7 +25,7 @@ def grid_of(shape: tuple[int, int]) -> Floats:
     return np.stack([t.ravel(), r.ravel()], axis=1)
 
 
-def _dictionary(t: Floats, r: Floats, centers: Floats, width: float) -> Floats:
+def dictionary(t: Floats, r: Floats, centers: Floats, width: float) -> Floats:
     """Constant and Gaussians as columns; the exponentials of both axes are made once each."""
     a = np.exp(-(((t[:, None] - np.unique(centers[:, 0])) / width) ** 2))
     b = np.exp(-(((r[:, None] - np.unique(centers[:, 1])) / width) ** 2))
@@ -93,7 +93,7 @@ def _omp(task: Task) -> float:
     t, r, y, shape, widths, centers = task
     rest = []
     for width in widths:
-        columns = _dictionary(t, r, grid_of(shape), width)
+        columns = dictionary(t, r, grid_of(shape), width)
         norms = np.sqrt(np.einsum("ij,ij->j", columns, columns))
         norms[norms == 0.0] = 1.0
         columns /= norms
@@ -112,7 +112,7 @@ def _fastcan(task: Task) -> float:
     t, r, y, shape, widths, centers = task
     rest = []
     for width in widths:
-        columns = _dictionary(t, r, grid_of(shape), width)
+        columns = dictionary(t, r, grid_of(shape), width)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = FastCan(centers, tol=1e-5, verbose=0).fit(columns[:, 1:], y)
@@ -127,7 +127,7 @@ def _frols(task: Task) -> float:
     t, r, y, shape, widths, centers = task
     rest = []
     for width in widths:
-        columns = _dictionary(t, r, grid_of(shape), width)
+        columns = dictionary(t, r, grid_of(shape), width)
         model = FROLS(n_terms=centers + 1, order_selection=False)
         model.max_lag = 0
         _, pivots, _ = model.error_reduction_ratio(columns, y[:, None], centers + 1)
