@@ -34,6 +34,7 @@ HEAD = [
 NUMBERS = {"max_step", "max_slope", "fallback", "scale", "envelope"}
 TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 CLAMPED, UNCOVERED = 2, 4
+TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
 
 Pair = tuple[float, float]
 
@@ -69,7 +70,8 @@ class Model:
     def id(self) -> str:
         serial, axis = self.raw["serial"], self.raw["axis"] or ""
         plain = re.sub(r"[^a-z0-9]", "_", serial.lower()) + (f"_{axis}" if axis else "")
-        if re.fullmatch(r"[A-Za-z0-9_-]+", serial) and len(plain) <= 31 - len("gtc_") - len("_f32"):
+        short = len(plain) <= 31 - len("gtc_") - len("_f32")
+        if re.fullmatch(r"[A-Za-z0-9_-]+", serial) and short and not TAKEN_ID.fullmatch(plain):
             return plain
         return f"{plain[:18]}_{hashlib.sha256((serial + axis).encode('ascii')).hexdigest()[:8]}"
 

@@ -23,7 +23,7 @@ from .errors import CheckFailed, InputError
 from .model import Model
 from .quantise import NUMERICS, Table, quantise
 from .reference import answers
-from .vectors import make_vectors
+from .vectors import MISSING, make_vectors
 
 __all__ = [
     "Emission",
@@ -197,6 +197,7 @@ def emit_texts(
         "v": vectors,
         "n": numerics[0],
         "n_channels": vectors.n_channels,
+        "missing": {n: f"0x{word:08x}UL" for n, word in MISSING.items()},
         "id_code": first.id,
         "tables": [_table_text(t, _row_comments(model)) for t in emission.tables.values()],
         "facts": list(_facts(model)),

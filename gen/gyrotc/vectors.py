@@ -12,7 +12,7 @@ import itertools
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ _SPECIAL_Q31 = (0, 1, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 0x80000001, 0x00010000
 class Segment:
     """A piece of the history: `count` samples `start + j step` (2^-12 C) with noise, or a fault."""
 
-    kind: str  # RAMP, BITS (the same bits again and again), MISSED
+    kind: str  # RAMP, BITS (the same bits again and again), MISSED, ALONE (the other channels are missing)
     count: int
     start: int
     step: int
@@ -94,6 +94,8 @@ class Vectors:
             for j in range(segment.count):
                 noise = draw.between(-segment.noise, 2 * segment.noise + 1)
                 others = [to_bits(draw.between(-4096, 8192), 12) for _ in range(1, self.n_channels)]
+                if segment.kind == "ALONE":
+                    others = [MISSING[numeric]] * len(others)
                 t = segment.start + j * segment.step + noise
                 held = segment.kind == "BITS"
                 yield Event((segment.bits[numeric] if held else to_bits(t, 12), *others))
@@ -226,6 +228,11 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:
         yield ramp(window // 2, t, noise=40)
     yield Segment("MISSED", n * (model.hold_blocks + 3), 0, 0, 0, zero)
     yield ramp(window, t, noise=40)
+    if any(t.channel for t in model.terms):
+        # Fewer than half of a block's samples, half of them, and blocks without any.
+        for alone in (n // 2 + 1, n // 2, 2 * n + 3):
+            yield replace(ramp(alone, t, noise=40), kind="ALONE")
+            yield ramp(3 * n - alone % n, t, noise=40)
     if model.stuck_samples:
         yield ramp(min(model.stuck_samples + 3 * n, 4000), t)
         yield ramp(window, t, noise=40)
