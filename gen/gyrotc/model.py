@@ -49,6 +49,8 @@ _MAX_FILE_BYTES = 4 * 2**20
 _MAX_CENTERS = 512
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
+# Names of the runtime: its files with their include guards, and GTC_E_ID.
+_TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
 
 Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
 CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -317,13 +319,14 @@ class Model(_Frozen):
 def table_id(serial: str, axis: str | None) -> str:
     """Id of a table: the serial in lower case with every non-alphanumeric as `_`, plus the axis.
 
-    Where that loses information beyond case and `-`, or is too long for a C name of 31 characters,
-    the first 18 characters, `_` and 8 hex digits of SHA-256(serial + axis).
+    Where that loses information beyond case and `-`, is too long for a C name of 31 characters, or would
+    take a name of the runtime, the first 18 characters, `_` and 8 hex digits of SHA-256(serial + axis).
     """
     suffix = f"_{axis}" if axis else ""
     plain = re.sub(r"[^a-z0-9]", "_", serial.lower())
     lossless = not re.search(r"[^A-Za-z0-9_-]", serial)
-    if lossless and len(plain) + len(suffix) <= _LONGEST_SYMBOL:
+    short = len(plain) + len(suffix) <= _LONGEST_SYMBOL
+    if lossless and short and not _TAKEN_ID.fullmatch(plain + suffix):
         return plain + suffix
     digest = hashlib.sha256((serial + (axis or "")).encode("ascii")).hexdigest()
     return f"{(plain + suffix)[:18]}_{digest[:8]}"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from gyrotc.errors import InputError
 from gyrotc.model import Model, load_model, table_id
 
@@ -148,8 +150,16 @@ def test_ids_follow_the_serial_and_never_collide_where_information_is_lost() -> 
     assert table_id("s" * 64, "z") != table_id("s" * 63, "z")
 
 
-def test_symbols_keep_c_names_within_31_characters(model_dict: dict[str, Any]) -> None:
-    for serial in ("A", "RLG-0042", "s" * 23, "s" * 24, "s" * 64, "a.b.c"):
-        for axis in (None, "x"):
-            model = Model.from_dict(model_dict | {"serial": serial, "axis": axis})
-            assert len(f"gtc_{model.symbol}_f32") <= 31
+def test_no_serial_takes_a_name_of_the_runtime() -> None:
+    """Files and macros that a table brings differ from those of the runtime, whatever the serial."""
+    sources = [p for folder in ("include", "libc") for p in (ROOT / folder).glob("gtc*.[ch]")]
+    files = {p.stem for p in sources}
+    macros = set(re.findall(r"# *define (GTC_\w+)", "".join(p.read_text() for p in sources)))
+    assert {"gtc_crc", "gtc_f32_map"} <= files
+    assert {"GTC_E_ID", "GTC_TABLE_H_INCLUDED"} <= macros
+    words = {name.removeprefix("gtc_") for name in files} | {m.split("_")[1].lower() for m in macros}
+    for serial in {*"abcdefghijklmnopqrstuvwxyz0123456789", *words}:
+        name = table_id(serial, None)
+        assert re.fullmatch("[a-z0-9_]{1,23}|[a-z0-9_]{1,18}_[0-9a-f]{8}", name)
+        assert f"gtc_{name}" not in files, serial
+        assert not {f"GTC_{name.upper()}_{end}" for end in ("ID", "H_INCLUDED")} & macros, serial
