@@ -430,6 +430,7 @@ def diagnose(
     from .applied import applied_of
     from .dataset import load
     from .diagnose import diagnose as run
+    from .diagnosis import diagnose_into
     from .fitting import FitOptions
     from .model import load_model
 
@@ -437,9 +438,11 @@ def diagnose(
     options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
     with _progress() as say:
-        result = run(recordings, model=known, out=out, options=options, progress=say).result
-    if out is not None:
-        write_atomically(out / "diagnose.json", json_text(result))
+        if out is None:
+            result = run(recordings, model=known, options=options, progress=say).result
+        else:
+            found = diagnose_into(out, recordings, model=known, options=options, progress=say)
+            result = found.result
     _write_json(json_file, result)
     for line in diagnosis_lines(result):
         _OUT.print(line, highlight=False, soft_wrap=True, markup=False)
@@ -447,15 +450,16 @@ def diagnose(
 
 @app.command()
 def report(folder: DirArg) -> None:
-    """Write DIR/report.html from DIR/*.json and DIR/trace/*.csv.
+    """Write DIR/report.html from what build or diagnose left in DIR.
 
     Example: gyrotc report result
     """
+    from .diagnosis_page import is_diagnosis, write_page
     from .report import write_report
 
     with _progress() as say:
         say("drawing")
-        path = write_report(folder)
+        path = write_page(folder) if is_diagnosis(folder) else write_report(folder)
     _OUT.print(f"report: {path}", highlight=False, soft_wrap=True)
 
 

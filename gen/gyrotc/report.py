@@ -16,7 +16,7 @@ from .metrics import Averages, average
 from .model import Model, load_model, write_atomically
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 
-__all__ = ["write_report"]
+__all__ = ["page_environment", "read_json", "write_report"]
 
 
 def write_report(folder: Path) -> Path:
@@ -26,29 +26,43 @@ def write_report(folder: Path) -> Path:
         InputError: `model.json` or `evaluate.json` is missing or broken.
     """
     model = load_model(folder / "model.json")
-    evaluation = _read(folder / "evaluate.json")
-    training = _read(folder / "training.json", optional=True)
-    verification = _read(folder / "verify.json", optional=True)
-    manifest = _read(folder / "manifest.json", optional=True)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
-    )
-    environment.filters.update(sci=_sci, number=_number)
-    text = environment.get_template("report.html.j2").render(
-        model=model,
-        evaluation=evaluation,
-        training=training,
-        verification=verification,
-        manifest=manifest,
-        judged=_judged(evaluation),
-        pictures=_pictures(folder, model, evaluation, training),
+    evaluation = read_json(folder / "evaluate.json")
+    training = read_json(folder / "training.json", optional=True)
+    verification = read_json(folder / "verify.json", optional=True)
+    manifest = read_json(folder / "manifest.json", optional=True)
+    text = (
+        page_environment()
+        .get_template("report.html.j2")
+        .render(
+            model=model,
+            evaluation=evaluation,
+            training=training,
+            verification=verification,
+            manifest=manifest,
+            judged=_judged(evaluation),
+            pictures=_pictures(folder, model, evaluation, training),
+        )
     )
     path = folder / "report.html"
     write_atomically(path, text)
     return path
 
 
-def _read(path: Path, *, optional: bool = False) -> dict[str, Any]:
+def page_environment() -> jinja2.Environment:
+    """Where pages come from; filters `sci` and `number` print figures."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
+    )
+    environment.filters.update(sci=_sci, number=_number)
+    return environment
+
+
+def read_json(path: Path, *, optional: bool = False) -> dict[str, Any]:
+    """A JSON object that a stage wrote; {} for an optional one that is absent.
+
+    Raises:
+        InputError: It is missing or broken.
+    """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

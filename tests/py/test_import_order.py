@@ -41,6 +41,8 @@ ORDER = [
     "plots",
     "diagnosis_plots",
     "report",
+    "diagnosis_page",
+    "diagnosis",
     "paper",
     "triad",
     "build",

@@ -53,10 +53,27 @@ class Ensemble:
     discrepancies: tuple[Discrepancy, ...]
 
 
-def compare(search: Search, declared: Declared | None, seed: int = 1) -> Ensemble:
-    """Draws the ensemble and compares."""
-    records, bank = search.records, search.bank
-    if declared is not None:
+def compare(
+    search: Search,
+    declared: Declared | None,
+    *,
+    beside: Array | None = None,
+    estimated: bool = False,
+    seed: int = 1,
+) -> Ensemble:
+    """Draws the ensemble and compares.
+
+    Args:
+        search: The data.
+        declared: Noise of the plain simulation; None: white, of the estimated level.
+        beside: Columns that the extended simulation has beside the map, shape (N, k).
+        estimated: Whether the simulated noise is that which the search estimates (the declared one is refuted).
+        seed: Of the ensemble.
+    """
+    records = search.records
+    if estimated:
+        colour, scale = search.likeliest.colour, search.likeliest.scale
+    elif declared is not None:
         colour, scale = declared.colour(records.block_s), 1.0
     else:
         colour, scale = COLOURS[0], search.view_of(COLOURS[0]).scale
@@ -64,7 +81,8 @@ def compare(search: Search, declared: Declared | None, seed: int = 1) -> Ensembl
     normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)
     both = np.column_stack([search.y, noise])
-    both -= bank.map @ (bank.map.T @ both)
+    model = _orthonormal(search.bank.map, beside)
+    both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
     found = []
     for name, statistic in _statistics(search).items():
@@ -73,6 +91,16 @@ def compare(search: Search, declared: Declared | None, seed: int = 1) -> Ensembl
             found.append(_discrepancy(name, float(values[0]), values[1:]))
     found.sort(key=lambda d: d.p_value)
     return Ensemble(measured, simulated[:, :100], tuple(found))
+
+
+def _orthonormal(static: Array, beside: Array | None) -> Array:
+    """Orthonormal columns of the map and of what stands beside it."""
+    if beside is None or beside.shape[1] == 0:
+        return static
+    rest = beside - static @ (static.T @ beside)
+    length = np.linalg.norm(beside, axis=0)
+    left, size, _ = np.linalg.svd(rest / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    return np.column_stack([static, left[:, size > 1e-6 * max(float(size[0]), 1e-300)]])
 
 
 def _discrepancy(name: str, measured: float, simulated: Array) -> Discrepancy:
@@ -95,7 +123,7 @@ def _statistics(search: Search) -> dict[str, Callable[[Array], Array]]:
     cells = _cells(temperature)
 
     def rms(e: Array) -> Array:
-        return np.sqrt((e**2).mean(axis=0))
+        return np.asarray(np.sqrt((e**2).mean(axis=0)))
 
     def autocorrelation(e: Array) -> Array:
         top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)

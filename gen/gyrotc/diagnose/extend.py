@@ -119,6 +119,10 @@ class _Bench:
         whole = [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
 
+    def on_training(self, effects: Sequence[Effect]) -> list[Averages]:
+        """Residuals of the training runs themselves: more first differences for the noise floor."""
+        return self._residuals(self.everything(), self.train, self.everything(), effects)
+
     def left_out(self, held: list[Mask], count: int) -> Chain:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
         kept = [~m for m in held]
@@ -154,7 +158,7 @@ def extend(
     effects = [Effect.of(c) for c in causes]
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = bench.on_exam(stages) if bench.exam else _crossed(bench, len(effects))
-    floor = floor_of(chain[-1])
+    floor = floor_of([*chain[-1], *bench.on_training(effects)])
     steps = [gain_of(a, b, floor, options.average_s) for a, b in itertools.pairwise(chain)]
     shipped, total = _shipped(bench, effects, steps, chain, floor)
     extended = bench.fit(shipped) if shipped else None

@@ -45,6 +45,9 @@ class Analysis:
         limits: Detection limits by cause.
         separations: For every cause found, d from which it can be told from each rival.
         ensemble: Measured against simulated residuals.
+        after: The search with the causes found taken out.
+        extended: Measured against simulated residuals when the simulation has causes and noise as found; None
+            if nothing was.
     """
 
     records: Records
@@ -55,6 +58,8 @@ class Analysis:
     limits: dict[str, Limit]
     separations: tuple[dict[str, float], ...]
     ensemble: Ensemble
+    after: Search
+    extended: Ensemble | None
 
 
 def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
@@ -84,7 +89,20 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
         detection_limits(search),
         separations,
         compare(search, declared),
+        after,
+        _extended(after, attribution, noise, declared),
     )
+
+
+def _extended(
+    after: Search, attribution: Attribution, noise: Sequence[NoiseFinding], declared: Declared | None
+) -> Ensemble | None:
+    """Measured against simulated residuals when the simulation has what was found."""
+    refuted = any(n.id in ("noise_level", "noise_colour") for n in noise)
+    if not attribution.causes and not refuted:
+        return None
+    beside = taken(attribution.causes) if attribution.causes else None
+    return compare(after, declared, beside=beside, estimated=refuted)
 
 
 def _others(cause: str) -> list[str]:

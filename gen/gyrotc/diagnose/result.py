@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from .. import __version__, terms
 from ..dataset import Dataset
 from ..fitting import FitOptions, front_end, model_of
 from ..model import Model
+from .advice import VERDICTS, next_steps
 from .extend import Extension, extend
 from .gain import Gain
 from .levels import NoiseFinding
@@ -52,7 +52,6 @@ def diagnose(
     dataset: Dataset,
     *,
     model: Model | None = None,
-    out: Path | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -61,7 +60,6 @@ def diagnose(
     Args:
         dataset: Recordings. `truth.json` beside them is never opened.
         model: A model made before: its method, block and number of centers are those of the refit.
-        out: Folder for pictures and `model-extended.json`; None: nothing is written.
         options: As for `fit`; default: those of `model`, else of `fit`.
         progress: Called with what is being done.
 
@@ -80,15 +78,6 @@ def diagnose(
     extension = extend(dataset, records, causes, chosen, say)
     extended = _extended_model(dataset, extension, chosen)
     result = _result(dataset, analysis, extension, causes, chosen)
-    if out is not None:
-        from .pictures import draw
-
-        say("drawing")
-        out.mkdir(parents=True, exist_ok=True)
-        if extended is not None:
-            extended.save(out / "model-extended.json")
-            result["extended"]["model"] = "model-extended.json"
-        result["pictures"] = draw(out, analysis, extension, causes)
     return Diagnosis(result, analysis, extension, extended)
 
 
@@ -117,6 +106,7 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
         "noise_floor_dph": None,
         "discrepancies": [],
         "causes": [],
+        "estimated_noise": None,
         "baseline": None,
         "extended": None,
         "considered": [
@@ -126,6 +116,8 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
         ],
         "missing": [text],
         "text": text,
+        "meaning": VERDICTS["not_testable"],
+        "next": next_steps("not_testable", [], []),
     }
 
 
@@ -143,17 +135,27 @@ def _result(
     missing = [f"{WORDS[i].name}: {why}" for i, why in analysis.search.bank.untestable.items()]
     result = _head(dataset, verdict, options) | {
         "noise_floor_dph": extension.floor,
-        "discrepancies": [vars(d) for d in analysis.ensemble.discrepancies],
+        "discrepancies": _discrepancies(analysis),
         "causes": listed,
         "baseline": {"exam_rms_dph": extension.baseline_rms, "centers": extension.baseline_centers},
         "extended": _extended(extension),
         "considered": _considered(analysis),
         "missing": missing,
+        "estimated_noise": _estimated_noise(analysis),
         "measured_on": extension.measured_on,
         "unexplained": _unexplained(analysis) if verdict in ("unexplained", "partial") else None,
     }
     result["text"] = _sentence(result)
+    result["meaning"] = VERDICTS[verdict]
+    result["next"] = next_steps(verdict, result["causes"], list(analysis.search.bank.untestable))
     return result
+
+
+def _discrepancies(analysis: Analysis) -> list[dict[str, Any]]:
+    """Statistics against the plain simulation and against the extended one."""
+    after = analysis.extended
+    extended = {d.statistic: vars(d) for d in after.discrepancies} if after is not None else {}
+    return [vars(d) | {"extended": extended.get(d.statistic)} for d in analysis.ensemble.discrepancies]
 
 
 def _cause(analysis: Analysis, extension: Extension, k: int) -> dict[str, Any]:
@@ -215,6 +217,20 @@ def _extended(extension: Extension) -> dict[str, Any] | None:
         "rate_left_out": None if left is None else {"environment": left[0], **_gain(left[1])},
         "forward_in_time": None if extension.forward is None else _gain(extension.forward),
     }
+
+
+def _estimated_noise(analysis: Analysis) -> dict[str, float]:
+    """Noise at the likeliest colour in the terms of a scenario; a Markov part has no such term."""
+    view, block_s = analysis.after.likeliest, analysis.records.block_s
+    colour = view.colour
+    flicker = colour.slow if colour.tau_s == 0.0 else 0.0
+    levels = {
+        "arw_deg_per_sqrt_h": np.sqrt(colour.white * block_s / 3600.0),
+        "bias_instability_dph": np.sqrt(flicker * np.pi / np.log(4.0)),
+        "rate_random_walk_dph_per_sqrt_h": np.sqrt(colour.walk),
+        "quantum_arcsec": block_s * np.sqrt(12.0 * colour.quantum),
+    }
+    return {name: float(view.scale * value) for name, value in levels.items() if value > 0.0}
 
 
 def _considered(analysis: Analysis) -> list[dict[str, Any]]:
@@ -295,12 +311,10 @@ def _sentence(result: dict[str, Any]) -> str:
     if extended is None:
         return str(text)
     share = extended["gain"]["share_of_excess_removed"]
-    part = (
-        f" On unseen runs the extension removes {share:.0%} of the removable error"
-        if share is not None
-        else ""
-    )
-    return f"{text}{part}{'.' if part else ''}"
+    if share is None:
+        return str(text)
+    amount = "all" if share >= 0.995 else f"{share:.0%}"
+    return f"{text} On unseen runs the extension removes {amount} of the removable error."
 
 
 def _extended_model(dataset: Dataset, extension: Extension, options: FitOptions) -> Model | None:

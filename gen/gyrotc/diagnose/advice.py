@@ -1,0 +1,56 @@
+"""What the verdict means, and what to do next: the experiment that would tell more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+__all__ = ["VERDICTS", "next_steps"]
+
+VERDICTS: dict[str, str] = {
+    "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
+    "explained": "The causes listed account for what the simulation gets wrong.",
+    "ambiguous": "Two or more causes explain these recordings equally well.",
+    "partial": "A cause is named, and structure remains that it does not explain.",
+    "noise_differs": "Only the noise is not what the simulation declares.",
+    "unexplained": "There is structure that no cause of the catalogue explains: none is named.",
+    "not_testable": "These recordings cannot decide.",
+}
+
+_STEPS = {
+    "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
+    " profile.",
+    "explained": "Build with the extension (gyrotc build --extend), or mend the cause and record again.",
+    "partial": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded input."
+    " Record supply, discharge current, pressure and magnetic field beside the rate.",
+    "noise_differs": "Declare the noise that was measured ([noise] of dataset.toml), or find out why it differs;"
+    " then diagnose again: detection limits follow the noise.",
+    "unexplained": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded"
+    " input. Record supply, discharge current, pressure and magnetic field beside the rate.",
+    "not_testable": "Record ramps over the product's range of temperature, up and down, at two rates at least.",
+}
+
+_RECORDING = {
+    "warm_up": "note the time of power-on of every run (power_on_s)",
+    "turn_on_offset": "record three runs or more, each with its own power-on",
+    "ageing": "record on three dates or more and note them (started)",
+}
+
+
+def next_steps(verdict: str, causes: Sequence[Mapping[str, Any]], untestable: Sequence[str]) -> list[str]:
+    """Sentences, the most telling first.
+
+    Args:
+        verdict: Of the interface.
+        causes: As in the result.
+        untestable: Ids of the causes that these recordings cannot test.
+    """
+    steps = [f"To tell them apart: {c['separate_by']}." for c in causes if c["separate_by"]]
+    if verdict != "ambiguous":
+        steps.append(_STEPS[verdict])
+    if any(c["id"] == "time_misalignment" for c in causes):
+        steps.append("Mend the clocks or filters of the recording; no term on the target stands for them.")
+    missing = [_RECORDING[i] for i in untestable if i in _RECORDING]
+    if missing and verdict != "not_testable":
+        steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
+    return steps

@@ -1,0 +1,103 @@
+"""`gyrotc diagnose --out`: the diagnosis with its pictures, its page, the extended model and the extended scenario.
+
+Data flows one way: `diagnose` finds, `diagnosis_plots` draws, `diagnosis_page` writes the page from what
+stands in the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from .dataset import Dataset
+from .diagnose import Diagnosis, diagnose
+from .diagnosis_page import PICTURES, write_page
+from .diagnosis_plots import draw
+from .errors import InputError
+from .fitting import FitOptions
+from .model import Model, write_atomically
+
+__all__ = ["diagnose_into", "extended_scenario", "save"]
+
+Progress = Callable[[str], None]
+
+_MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
+_NO_PARAMETERS = ("map_too_coarse",)
+
+
+def diagnose_into(
+    out: Path,
+    dataset: Dataset,
+    *,
+    model: Model | None = None,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnoses a data set and fills `out`: `diagnose.json`, `report.html`, pictures, the extended model.
+
+    Raises:
+        InputError: As `diagnose`; or `out` holds the result of a build.
+    """
+    if (out / "evaluate.json").exists():
+        raise InputError(str(out), "holds the result of gyrotc build", "a folder of its own")
+    found = diagnose(dataset, model=model, options=options, progress=progress)
+    return save(out, found, progress)
+
+
+def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
+    """Writes a diagnosis into a folder; its result then names the files."""
+    if progress:
+        progress("drawing")
+    result = dict(found.result)
+    if result["extended"] is not None and found.model is not None:
+        found.model.save(out / _MODEL)
+        result["extended"] = result["extended"] | {"model": _MODEL}
+    scenario = extended_scenario(result)
+    if scenario is not None:
+        write_atomically(out / _SCENARIO, scenario)
+        result["scenario"] = _SCENARIO
+    result["pictures"] = []
+    for name, svg in draw(found).items():
+        write_atomically(out / PICTURES / f"{name}.svg", svg)
+        result["pictures"].append(f"{PICTURES}/{name}.svg")
+    write_atomically(out / "diagnose.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_page(out)
+    return Diagnosis(result, found.analysis, found.extension, found.model)
+
+
+def extended_scenario(result: dict[str, Any]) -> str | None:
+    """A scenario file whose gyro has the causes that were found; None where none was.
+
+    Profiles are the packaged ones: who knows the chamber's programme puts it in their place.
+    """
+    causes = [c for c in result["causes"] if c["family"] != "noise" and c["id"] not in _NO_PARAMETERS]
+    if not causes:
+        return None
+    lines = [
+        f"# Causes that gyrotc diagnose found in {result['serial']}, with their fitted parameters.",
+        "# The profiles are those of the scenario named here; put your chamber's in their place.",
+        'extends = "separating"',
+        f"title = {json.dumps('the separating profiles with what was found in ' + result['serial'])}",
+    ]
+    noise = result["estimated_noise"]
+    if noise:
+        lines += ["", "[noise]", *(f"{name} = {value!r}" for name, value in noise.items())]
+    for cause in causes:
+        lines += _cause(cause)
+    return "\n".join(lines) + "\n"
+
+
+def _cause(cause: dict[str, Any]) -> Iterator[str]:
+    values = {name: p["value"] for name, p in cause["parameters"].items()}
+    if "channel" in cause:
+        yield from ("", "[[channel]]", f"name = {json.dumps(cause['channel'])}")
+        yield f"level = {values.get('reference', 0.0)!r}"
+    yield from ("", "[[cause]]", f"id = {json.dumps(cause['id'])}")
+    if "channel" in cause:
+        yield f"channel = {json.dumps(cause['channel'])}"
+    for name, value in values.items():
+        if math.isfinite(value):
+            yield f"{name} = {value!r}"

@@ -1,0 +1,72 @@
+"""`report.html` of a diagnosis: one page from `diagnose.json` and the pictures beside it. Computes nothing new."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+from .model import write_atomically
+from .report import page_environment, read_json
+
+__all__ = ["PICTURES", "is_diagnosis", "write_page"]
+
+PICTURES = "pictures"
+
+
+def is_diagnosis(folder: Path) -> bool:
+    """Whether a folder holds a diagnosis (and not a build)."""
+    return (folder / "diagnose.json").is_file() and not (folder / "evaluate.json").exists()
+
+
+def write_page(folder: Path) -> Path:
+    """Writes `folder/report.html` from what stands in the folder; returns its path.
+
+    Raises:
+        InputError: `diagnose.json` is missing, broken or of another kind.
+    """
+    result = read_json(folder / "diagnose.json")
+    if result.get("schema") != "gyrotc.diagnose/1":
+        found = repr(result.get("schema"))
+        raise InputError(f"{folder / 'diagnose.json'}, field schema", found, "gyrotc.diagnose/1")
+    try:
+        text = (
+            page_environment()
+            .get_template("diagnosis.html.j2")
+            .render(
+                d=result,
+                physical=[c for c in result["causes"] if c["family"] != "noise"],
+                noise=[c for c in result["causes"] if c["family"] == "noise"],
+                gains=list(_gains(result)),
+                limits=[c for c in result["considered"] if c["detection_limit"]],
+                pictures=_pictures(folder, result),
+            )
+        )
+    except (KeyError, TypeError) as error:
+        raise InputError(str(folder / "diagnose.json"), f"lacks {error}", "a result of diagnose") from error
+    path = folder / "report.html"
+    write_atomically(path, text)
+    return path
+
+
+def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, str]:
+    """SVG text by name; a picture that is missing is left out."""
+    paths = [folder / name for name in result.get("pictures", [])]
+    return {p.stem: p.read_text(encoding="utf-8") for p in paths if p.is_file()}
+
+
+def _gains(result: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Gain of the whole extension where it is shipped, else of every cause, by where it was measured."""
+    seen = (
+        "exam runs" if result.get("measured_on") == "exam" else "parts left out in turn, causes chosen anew"
+    )
+    extended = result["extended"]
+    if extended is None:
+        causes = [c for c in result["causes"] if c["gain"]]
+        return [(f"{seen}: {c['name'][0].lower()}{c['name'][1:]}", c["gain"]) for c in causes]
+    rows = [(seen, extended["gain"])]
+    if extended["rate_left_out"]:
+        rows.append((f"“{extended['rate_left_out']['environment']}” left out", extended["rate_left_out"]))
+    if extended["forward_in_time"]:
+        rows.append(("forward in time", extended["forward_in_time"]))
+    return rows
