@@ -158,7 +158,7 @@ def map_too_coarse(scene: Scene, rng: np.random.Generator) -> Effect:
 
 
 def auxiliary(scene: Scene, rng: np.random.Generator) -> Effect:
-    return [np.asarray(c - np.mean(c)) for c in scene.channels["supply_v"]], {}
+    return [np.asarray(c - 5.0) for c in scene.channels["supply_v"]], {}
 
 
 CATALOGUE: dict[str, Mechanism] = {

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .catalogue import Candidate
+from .contest import Contest, contest
 from .likelihood import Gains, Point
 from .misfit import misfit
 from .refine import Refined, refine, taken
@@ -54,6 +55,7 @@ class Attribution:
         misfit_p: p-value of what is left against the dictionary.
         share: Share of the detectable structure that the causes explain.
         last: The search after the last cause.
+        other: The best shape that no cause has, and its lead over the causes.
     """
 
     first: list[Found]
@@ -64,6 +66,7 @@ class Attribution:
     misfit_p: float
     share: float
     last: list[Found]
+    other: Contest
 
     @property
     def detected(self) -> bool:
@@ -90,7 +93,7 @@ def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = search.detect(search.base)
     if first[0].p_value > _LEVEL:
-        return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first)
+        return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first, Contest("", -np.inf))
     gains = Gains(search)
     singles = list(gains.single())
     stage = _stage(search, gains, _best(singles, gains.size).members)
@@ -111,6 +114,7 @@ def attribute(search: Search) -> Attribution:
         misfit_p=stage.misfit_p,
         share=stage.share,
         last=stage.found,
+        other=contest(gains, refined),
     )
 
 
@@ -158,7 +162,7 @@ def _allowed(point: Point) -> bool:
     if a.id not in ("thermal_gradient", "path_length_periodicity") or a.channel != b.channel:
         return a.channel != b.channel
     x, y = (next(iter(m.values.values())) for m in (a, b))
-    return abs(np.log(x / y)) > 0.7
+    return bool(abs(np.log(x / y)) > 0.7)
 
 
 def _best(points: list[Point], size: int) -> Point:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from .. import terms
 from .baseline import LEVELS, MapBasis, fine_columns, make_basis
-from .catalogue import Candidate, columns_of, grid, testable
+from .catalogue import Candidate, Role, columns_of, grid, testable
 from .noise import COLOURS, Whitener
+from .others import shapes_of
 from .records import Records, centred_slope
 
-__all__ = ["Bank", "Group", "build", "replaced_map"]
+__all__ = ["Bank", "Group", "Other", "build", "replaced_map"]
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,16 @@ class Group:
     """A candidate and where its columns lie in `Bank.signatures`."""
 
     candidate: Candidate
+    columns: slice
+
+
+@dataclass(frozen=True)
+class Other:
+    """A shape that no cause has (`others.Shape`) and where its columns lie in `Bank.others`."""
+
+    name: str
+    parameters: int
+    common: bool
     columns: slice
 
 
@@ -52,6 +63,7 @@ class Bank:
         log_dets: log det of each colour's covariance.
         untestable: Why a cause cannot be tested, by id.
         finer: Functions of the next finer map that this one lacks, shape (N, q).
+        others, other_groups: Shapes that no cause has, shape (N, Q), columns of norm 1 or groups of equal scale.
     """
 
     basis: MapBasis
@@ -68,6 +80,8 @@ class Bank:
     log_dets: Array
     untestable: dict[str, str]
     finer: Array
+    others: Array
+    other_groups: tuple[Other, ...]
 
     def weighted(self, records: Records, sigma: Array) -> Bank:
         """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
@@ -91,6 +105,7 @@ def build(records: Records, level: int) -> Bank:
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
     keep = size > _COMMON * size[0]
     grams, log_dets = _grams(records, static, signatures, None)
+    others, other_groups = _others(records)
     return Bank(
         basis=basis,
         map=static,
@@ -106,7 +121,24 @@ def build(records: Records, level: int) -> Bank:
         log_dets=log_dets,
         untestable=untestable,
         finer=_finer(records, static, level),
+        others=others,
+        other_groups=other_groups,
     )
+
+
+def _others(records: Records) -> tuple[Array, tuple[Other, ...]]:
+    """Shapes that no cause has, side by side."""
+    columns, groups = [], []
+    at = 0
+    for shape in shapes_of(records):
+        size = np.linalg.norm(shape.columns, axis=0)
+        if size.max() <= 0.0:
+            continue
+        columns.append(shape.columns / (size.max() if shape.common else np.maximum(size, 1e-300)))
+        end = at + columns[-1].shape[1]
+        groups.append(Other(shape.name, shape.parameters, shape.common, slice(at, end)))
+        at = end
+    return np.column_stack(columns), tuple(groups)
 
 
 def _grams(records: Records, static: Array, signatures: Array, sigma: Array | None) -> tuple[Array, Array]:
@@ -156,7 +188,7 @@ def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]
             if cause == "map_too_coarse":
                 add(Candidate(cause, {}, "variance"), fine_columns(records))
             else:
-                role = "variance" if term.kind == "random" else "columns"
+                role: Role = "variance" if term.kind == "random" else "columns"
                 add(Candidate(cause, dict(values), role), columns_of(records, cause, values))
     add(Candidate("structure", {}, "structure"), _dictionary(records))
     return groups, columns, untestable

@@ -12,7 +12,7 @@ from .. import terms
 from ..terms.base import History, Parameter, Values
 from .records import Records
 
-__all__ = ["PENALTY", "Candidate", "columns_of", "grid", "shape_parameter", "testable"]
+__all__ = ["PENALTY", "Candidate", "Role", "columns_of", "grid", "shape_parameter", "testable"]
 
 Array = NDArray[np.float64]
 Role = Literal["columns", "input", "variance", "structure"]

@@ -127,7 +127,7 @@ def _pair_energy(projection: Projection, pairs: Index, a: Array) -> Array:
 def _variance(projection: Projection, index: Index, a: Array) -> Array:
     """−log p of the likelihood ratio of one common variance against none (half a chi-square)."""
     ratio = variance_ratio(projection, index, a)[0]
-    return -log_ndtr(-np.sqrt(np.maximum(ratio, 0.0)))
+    return np.asarray(-log_ndtr(-np.sqrt(np.maximum(ratio, 0.0))))
 
 
 def variance_ratio(projection: Projection, index: Index, a: Array) -> tuple[Array, Array]:

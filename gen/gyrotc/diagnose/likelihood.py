@@ -55,7 +55,13 @@ class _Base:
 
 
 class Gains:
-    """Gains of all candidates and pairs for one search."""
+    """Gains of all candidates and pairs for one search.
+
+    Attributes:
+        target: Whitened data over the noise scale, shape (N,).
+        map, dropped: Whitened map functions and nuisance columns.
+        size: Number of blocks.
+    """
 
     def __init__(self, search: Search) -> None:
         self.search = search
@@ -68,22 +74,22 @@ class Gains:
         taken = np.column_stack([bank.on_map, search.extra_on_map[:, :own]])
         self._columns = self.whiten(columns)
         self._whole = self._columns + self.whiten(bank.map) @ taken
-        self._y = self.whiten(search.y) / self.scale
-        self._dropped = self.whiten(search.extra[:, len(search.extra_candidates) :])
-        self._map = self.whiten(bank.map)
+        self.target = self.whiten(search.y) / self.scale
+        self.dropped = self.whiten(search.extra[:, len(search.extra_candidates) :])
+        self.map = self.whiten(bank.map)
         self.size = search.y.size
         names: list[tuple[Candidate, slice]] = [(g.candidate, g.columns) for g in bank.groups]
         k = bank.signatures.shape[1]
         names += [(search.extra_candidates[i], slice(k + i, k + i + 1)) for i in range(own)]
         self.plain = [(c, s) for c, s in names if c.role == "columns"]
         self.random = [(c, s) for c, s in names if c.role == "variance"]
-        self.base = self._project(None, self._map, None)
+        self.base = self._project(None, self.map, None)
         self._bases: list[_Base] | None = None
 
     @cached_property
     def map_q(self) -> Array:
         """Orthonormal columns of the whitened map."""
-        return np.asarray(np.linalg.qr(self._map)[0])
+        return np.asarray(np.linalg.qr(self.map)[0])
 
     def plain_columns(self, at: slice) -> Array:
         """Whitened bank columns with the map projected out."""
@@ -111,21 +117,21 @@ class Gains:
         return self._bases
 
     def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
-        blocks = [self._dropped]
+        blocks = [self.dropped]
         if known is not None and not known.all():
             blocks.append(self.whiten(np.eye(self.size)[:, ~known]))
         q, r = np.linalg.qr(np.column_stack([*blocks, design]))
         size = np.abs(np.diag(r))
         q = q[:, size > 1e-9 * size.max()]
         columns = self._columns if candidate is None else self._whole
-        cross, c = q.T @ columns, q.T @ self._y
+        cross, c = q.T @ columns, q.T @ self.target
         energy = float(c @ c)
         gain = 0.0
         if candidate is not None:
-            p, _ = np.linalg.qr(np.column_stack([*blocks, self._map]))
-            gain = energy - float(((p.T @ self._y) ** 2).sum())
+            p, _ = np.linalg.qr(np.column_stack([*blocks, self.map]))
+            gain = energy - float(((p.T @ self.target) ** 2).sum())
         gram = (self._gram if candidate is None else self._whole_gram) - cross.T @ cross
-        return _Base(candidate, gain, gram, columns.T @ self._y - cross.T @ c)
+        return _Base(candidate, gain, gram, columns.T @ self.target - cross.T @ c)
 
     @cached_property
     def _gram(self) -> Array:

@@ -60,7 +60,7 @@ def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> Array:
     x = block_s / tau_s
     own = 2.0 * (x + np.expm1(-x)) / x**2
     other = (np.expm1(-x) / x) ** 2 * np.exp(-np.maximum(lags - 1, 0) * x)
-    return np.where(lags == 0, own, other)
+    return np.asarray(np.where(lags == 0, own, other))
 
 
 def flicker_row(lags: NDArray[np.int64], block_s: float) -> Array:

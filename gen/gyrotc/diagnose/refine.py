@@ -273,7 +273,7 @@ def _amplitudes(
             moved = weights.copy()
             moved[i] += step
             gradient[i] = (rule(moved)[name] - value) / step
-        half = _NORMAL_95 * float(np.sqrt(max(gradient @ spread @ gradient, 0.0)))
+        half = _NORMAL_95 * float(np.sqrt(max(float(gradient @ spread @ gradient), 0.0)))
         out[name] = Interval(value, value - half, value + half)
     if candidate.channel is not None:
         out["reference"] = Interval(float(np.mean(columns)), float(np.mean(columns)), float(np.mean(columns)))
@@ -287,7 +287,7 @@ def _random(weights: Array, spread: Array) -> Interval:
     n = weights.size
     centred = weights - weights.mean()
     middle = np.eye(n) - 1.0 / n
-    noise = float(np.trace(middle @ spread @ middle)) / max(n - 1, 1)
+    noise = float(np.trace(np.asarray(middle @ spread @ middle))) / max(n - 1, 1)
     raw = float(centred @ centred)
     value = float(np.sqrt(max(raw / max(n - 1, 1) - noise, 0.0)))
     low = float(np.sqrt(max(raw / chi2.ppf(0.975, max(n - 1, 1)) - noise, 0.0)))

@@ -13,12 +13,13 @@ _MISFITS = ((0.05, 0.5), (0.01, 0.8), (1e-4, 0.9))
 """p-value of what is left, and share of the structure below which the causes then explain too little."""
 
 _REMAINDER = 1e-3
+_LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not hold their own
 
 
 def named(attribution: Attribution) -> bool:
-    """Whether causes are given at all: not when most of the structure is none of them."""
+    """Whether causes are given at all: not when most of the structure is none of them, or has another shape."""
     little = any(attribution.misfit_p < p and attribution.share < share for p, share in _MISFITS)
-    return bool(attribution.causes) and not little
+    return bool(attribution.causes) and not little and attribution.other.lead < _LEAD
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], missing: Sequence[str]) -> str:

@@ -1,0 +1,115 @@
+"""Do the chosen causes hold their own against shapes that no cause has (`others`)?"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bank import Other
+from .catalogue import PENALTY
+from .detect import ratio_of
+from .likelihood import Gains
+from .refine import Refined
+
+__all__ = ["Contest", "contest"]
+
+Array = NDArray[np.float64]
+
+_OWN = 1e-3  # share of a column's energy that must be its own beside the model
+
+
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """The best other shape and its lead over the causes, as a difference of the information criterion."""
+
+    name: str
+    lead: float
+
+
+def contest(gains: Gains, causes: Sequence[Refined]) -> Contest:
+    """Each other shape alone and in the place of each of the causes, against all of them together.
+
+    The criterion is that of the search: twice the log-likelihood less log N for every parameter. The causes
+    have their parameters at the optimum, the others on their grid.
+    """
+    edges = [gains.whiten(c.edges) for c in causes if c.edges is not None]
+    white = [gains.whiten(c.columns) for c in causes]
+    others = gains.whiten(gains.search.bank.others)
+    groups = gains.search.bank.other_groups
+    price = float(np.log(gains.size))
+    own = _criterion(gains, edges, causes, white, price)
+    local = any(c.candidate.id == "map_too_coarse" for c in causes)
+    instead = [g for g in groups if not (local and g.common)]
+    found = []
+    for count in range(len(causes)):
+        for kept in itertools.combinations(range(len(causes)), count):
+            some = [causes[k] for k in kept]
+            held = _held(gains, edges, some, [white[k] for k in kept])
+            base = _energy(held, gains.target) - price * sum(PENALTY[c.candidate.id] for c in some)
+            best = _strongest(held, gains, others, price, instead)
+            found.append(Contest(best.name, base + best.lead - own))
+    if local:  # a map that a switch changes imitates a finer map of part of the range, so it has to add to it
+        held = _held(gains, edges, causes, white)
+        found.append(_strongest(held, gains, others, price, [g for g in groups if g.common]))
+    return max(found, key=lambda c: c.lead)
+
+
+def _held(gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array]) -> Array:
+    """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
+    swapped = any(c.candidate.role == "input" for c in causes)
+    q, r = np.linalg.qr(np.column_stack([gains.dropped, *edges, *([] if swapped else [gains.map]), *white]))
+    size = np.abs(np.diag(r))
+    return np.asarray(q[:, size > 1e-9 * size.max()])
+
+
+def _energy(held: Array, y: Array) -> float:
+    return float(((held.T @ y) ** 2).sum())
+
+
+def _criterion(
+    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: list[Array], price: float
+) -> float:
+    """Of the causes; one with a common variance of many weights is weighed as such."""
+    random = [k for k, c in enumerate(causes) if c.candidate.role == "variance"][-1:]
+    fixed = [k for k in range(len(causes)) if k not in random]
+    held = _held(gains, edges, [causes[k] for k in fixed], [white[k] for k in fixed])
+    total = _energy(held, gains.target) - price * sum(PENALTY[c.candidate.id] for c in causes)
+    return total + sum(_common(held, white[k], gains.target) for k in random)
+
+
+def _common(held: Array, columns: Array, y: Array) -> float:
+    """Likelihood ratio of one variance common to the weights of some columns beside a model."""
+    rest = columns - held @ (held.T @ columns)
+    left, size, _ = np.linalg.svd(rest, full_matrices=False)
+    keep = size > _OWN * max(float(np.linalg.norm(columns, axis=0).max()), 1e-300)
+    if not keep.any():
+        return 0.0
+    return float(ratio_of((left[:, keep].T @ y) ** 2, size[keep] ** 2)[0])
+
+
+def _strongest(held: Array, gains: Gains, others: Array, price: float, groups: Sequence[Other]) -> Contest:
+    """The other shape that adds most to a model."""
+    before = np.einsum("ij,ij->j", others, others)
+    rest = others - held @ (held.T @ others)
+    y = gains.target - held @ (held.T @ gains.target)
+    a = rest.T @ y
+    best = Contest("", -np.inf)
+    for other in groups:
+        value = _gain(other, rest[:, other.columns], a[other.columns], before[other.columns])
+        free = other.parameters + (1 if other.common else other.columns.stop - other.columns.start)
+        best = max(best, Contest(other.name, value - free * price), key=lambda c: c.lead)
+    return best
+
+
+def _gain(other: Other, columns: Array, a: Array, before: Array) -> float:
+    """Twice the log-likelihood that one shape adds."""
+    size, vectors = np.linalg.eigh(columns.T @ columns)
+    keep = size > _OWN * float(before.max())
+    if not keep.any() or (not other.common and not keep.all()):
+        return 0.0
+    energy = (a @ vectors[:, keep]) ** 2 / size[keep]
+    return float(ratio_of(energy, size[keep])[0]) if other.common else float(energy.sum())
