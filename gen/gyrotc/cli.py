@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +18,6 @@ from rich.table import Table as RichTable
 from . import __version__
 from .errors import CheckFailed, GyrotcError
 from .model import write_atomically
-from .paper.published import AFTER_DPH
 
 if TYPE_CHECKING:
     from .build import Built
@@ -331,6 +329,9 @@ def build(
     average_s: AverageOption = 100.0,
     numeric: NumericOption = None,
     applied: AppliedOption = None,
+    extend: Annotated[
+        bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -343,7 +344,14 @@ def build(
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     with _progress() as say:
         results = run(
-            dataset, out, options, axis=axis, numerics=_numerics(numeric), applied=applied, progress=say
+            dataset,
+            out,
+            options,
+            axis=axis,
+            numerics=_numerics(numeric),
+            applied=applied,
+            extend=extend,
+            progress=say,
         )
     if len(results) == 1:
         _write_json(json_file, results[0].evaluation)
@@ -364,6 +372,8 @@ def _print_built(result: Built) -> None:
         _OUT.print(line, highlight=False, soft_wrap=True)
     for name, reason in result.refused.items():
         _OUT.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    for line in extension_lines(result.diagnosis) if result.diagnosis else ():
+        _OUT.print(line, highlight=False, soft_wrap=True, markup=False)
     for finding in result.evaluation["findings"]:
         _OUT.print(f"finding {finding['id']}: {finding['text']}", highlight=False, soft_wrap=True)
     _OUT.print(summary(result.evaluation), highlight=False, soft_wrap=True)
@@ -389,19 +399,17 @@ def compare(
     from .applied import applied_of
     from .compare import CompareOptions
     from .compare import compare as run
+    from .comparison import comparison_picture, comparison_tables, with_published
     from .dataset import load
 
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+    options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
     with _progress() as say:
-        result = run(
-            recordings, CompareOptions(seed=seed, block_s=block_s, average_s=average_s), progress=say
-        )
+        result = with_published(run(recordings, options, progress=say))
     _write_json(json_file, result)
     if out is not None:
-        from .plots import methods_side_by_side
-
         write_atomically(out / "compare.json", json_text(result))
-        write_atomically(out / "compare.svg", methods_side_by_side(result))
+        write_atomically(out / "compare.svg", comparison_picture(result))
     for table in comparison_tables(result):
         _OUT.print(table)
 
@@ -490,46 +498,10 @@ def evaluation_table(result: dict[str, Any]) -> RichTable:
     return table
 
 
-def comparison_tables(result: dict[str, Any]) -> Iterator[RichTable]:
-    """The paper's Table 1 on this data, the paper's own figures beside it for its environments; then the costs."""
-    environments = [g["environment"] for g in result["methods"][0]["groups"]]
-    after = [g["after_rms_dph"] for m in result["methods"] for g in m["groups"]]
-    exponent = math.floor(math.log10(min(after)))
-    title = f"{result['serial']}: judged on {result['judged_on']}, rates in 1e{exponent} deg/h"
-    table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("", "method", *environments):
-        table.add_column(name, justify="right" if name in environments else "left", no_wrap=True)
-
-    def scaled(values: Iterable[float | None]) -> list[str]:
-        return ["" if v is None else f"{v / 10.0**exponent:.2f}" for v in values]
-
-    groups = result["methods"][0]["groups"]
-    table.add_row("RMS before", "", *scaled(g["before_rms_dph"] for g in groups))
-    table.add_row("std before", "", *scaled(g["before_std_dph"] for g in groups), end_section=True)
-    for label, key in (("RMS after", "after_rms_dph"), ("std after", "after_std_dph")):
-        for m in result["methods"]:
-            table.add_row(label, m["id"], *scaled(g[key] for g in m["groups"]))
-            paper = [AFTER_DPH.get(m["id"], {}).get(e) for e in environments]
-            if key == "after_rms_dph" and any(paper):
-                table.add_row("", "  in the paper", *scaled(paper), style="dim")
-        table.add_section()
-    for m in result["methods"]:
-        table.add_row("improvement", m["id"], *(f"{g['improvement']:.2f}" for g in m["groups"]))
-    yield table
-    cost = RichTable(title="All environments", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("method", "RMS", "std", "improvement", "centers", "bytes", "training, s"):
-        cost.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
-    for m in result["methods"]:
-        cost.add_row(
-            m["id"], *scaled((m["exam_rms_dph"], m["exam_std_dph"])), f"{m['improvement']:.2f}",
-            str(m["centers"]), str(m["table_bytes"]), f"{m['train_s']:.3f}",
-        )  # fmt: skip
-    yield cost
-
-
 def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
-    """The verdict in words: causes with their size and gain, rivals, and what could still hide."""
-    yield f"{result['serial']}: {result['verdict'].replace('_', ' ')}"
+    """The verdict in words: causes with their size and gain, rivals, what could still hide, what to do next."""
+    yield f"{result['serial']}: {result['verdict'].replace('_', ' ')}. {result['text']}"
+    yield result["meaning"]
     yield from result.get("missing", ())
     for d in result["discrepancies"]:
         if d["p_value"] is not None and d["p_value"] < 0.01:
@@ -542,10 +514,22 @@ def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
     if result["causes"] and result["extended"] is None:
         yield "no extension is shipped: none has a gain on runs it was not fitted to"
     limits = [c for c in result["considered"] if c.get("detection_limit")]
-    if limits and not result["causes"]:
+    if limits:
         yield "what could still hide below its detection limit:"
-        for c in limits:
-            yield f"  {c['id']}: {c['detection_limit']['value']:.3g} {c['detection_limit']['unit']}"
+        yield from (f"  {_limit_text(c)}" for c in limits)
+    yield from (f"next: {step}" for step in result["next"])
+
+
+def extension_lines(diagnosis: dict[str, Any]) -> Iterator[str]:
+    """What the diagnosis added to the model, and what it gained."""
+    yield f"diagnosis: {diagnosis['verdict'].replace('_', ' ')}: {diagnosis['text']}"
+    extended = diagnosis["extended"]
+    if extended is None:
+        yield "nothing added: no cause was named that gains on runs it was not fitted to"
+        return
+    added = ", ".join(extended["terms"]) or "a finer map"
+    yield f"added: {added}; {extended['centers']} centers (without: {diagnosis['baseline']['centers']})"
+    yield from _gain_lines(extended["gain"])
 
 
 def span_lines(training: dict[str, Any]) -> Iterator[str]:
@@ -557,6 +541,14 @@ def span_lines(training: dict[str, Any]) -> Iterator[str]:
             yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
 
 
+def _limit_text(considered: dict[str, Any]) -> str:
+    name = considered["id"] + (f" ({considered['channel']})" if "channel" in considered else "")
+    limit = considered["detection_limit"]
+    if limit["value"] is None:
+        return f"{name}: not visible at any {limit['parameter']} in this gyro"
+    return f"{name}: {limit['value']:.3g} {limit['unit']}"
+
+
 def _cause_lines(cause: dict[str, Any]) -> Iterator[str]:
     yield f"cause: {cause['name']} ({cause['id']}, family {cause['family']})"
     for name, p in cause["parameters"].items():
@@ -566,13 +558,27 @@ def _cause_lines(cause: dict[str, Any]) -> Iterator[str]:
         yield f"  as likely on these runs: {', '.join(cause['equivalent'])}"
     if cause.get("separate_by"):
         yield f"  to tell them apart: {cause['separate_by']}"
-    gain = cause.get("gain")
-    if gain and gain.get("exam_rms_after_dph") is not None:
-        share = gain.get("share_of_excess_removed")
-        removed = "" if share is None else f", {share:.0%} of the removable excess"
+    if cause.get("gain"):
+        yield from _gain_lines(cause["gain"])
+
+
+def _gain_lines(gain: dict[str, Any]) -> Iterator[str]:
+    """RMS and angle without and with, on runs not fitted to."""
+    share, removed = gain["share_of_excess_removed"], gain["rms_removed_dph"]
+    part = (
+        ""
+        if share is None
+        else f"; {share:.0%} of the removable error ({gain['low']:.0%} ... {gain['high']:.0%})"
+    )
+    yield (
+        f"  RMS on runs not fitted to: {gain['exam_rms_before_dph']:.4g} -> {gain['exam_rms_after_dph']:.4g} deg/h, "
+        f"95 % {removed['low']:.2g} ... {removed['high']:.2g} less{part}"
+    )
+    angle = gain["angle_1h_removed_arcsec"]
+    if angle is not None:
         yield (
-            f"  RMS on runs not fitted to: {gain['exam_rms_before_dph']:.4g} -> "
-            f"{gain['exam_rms_after_dph']:.4g} deg/h{removed}"
+            f"  angle after one hour: {gain['angle_1h_before_arcsec']:.4g} -> {gain['angle_1h_after_arcsec']:.4g} "
+            f"arcsec, 95 % {angle['low']:.2g} ... {angle['high']:.2g} less"
         )
 
 

@@ -30,7 +30,6 @@ __all__ = [
     "bias_over_time",
     "curve_by_size",
     "map_with_centers",
-    "methods_side_by_side",
     "svg",
 ]
 
@@ -95,7 +94,7 @@ def bias_over_time(runs: Sequence[tuple[str, str, Averages]]) -> str:
 
 def map_with_centers(model: Model) -> str:
     """The map over its envelope, hatched where there was no training data, with its centers."""
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    (t0, t1), (r0, r1) = _shown(model.envelope.temperature_c), _shown(model.envelope.slope_c_per_min)
     t, r = np.linspace(t0, t1, 160), np.linspace(r0, r1, 80)
     tt, rr = np.meshgrid(t, r)
     bias = model.map_dph(tt, rr)
@@ -127,10 +126,16 @@ def map_with_centers(model: Model) -> str:
         return svg(figure)
 
 
+def _shown(limits: tuple[float, float]) -> tuple[float, float]:
+    """Limits of an axis: those of the envelope, a little apart where they are one value."""
+    low, high = limits
+    return limits if high > low else (low - 0.5, high + 0.5)
+
+
 def _hatch_uncovered(ax: Axes, model: Model) -> None:
     if model.coverage is None:
         return
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    (t0, t1), (r0, r1) = _shown(model.envelope.temperature_c), _shown(model.envelope.slope_c_per_min)
     seen = np.array([[c == "1" for c in row] for row in model.coverage.rows])
     t = np.linspace(t0, t1, seen.shape[1] + 1)
     r = np.linspace(r0, r1, seen.shape[0] + 1)
@@ -207,29 +212,4 @@ def allan_deviation(noise: dict[str, Any]) -> str | None:
             )
             ax.legend(fontsize=8)
         ax.set(xscale="log", yscale="log", xlabel="averaging time, s", ylabel="deg/h")
-        return svg(figure)
-
-
-def methods_side_by_side(result: dict[str, Any]) -> str:
-    """RMS after compensation of every method in every environment, over the noise floor where it is known."""
-    methods = result["methods"]
-    environments = [g["environment"] for g in methods[0]["groups"]]
-    with mpl.rc_context(STYLE):
-        figure = _figure(10.0, 3.4)
-        ax = figure.subplots()
-        width = 0.8 / len(methods)
-        colors = mpl.colormaps["cividis"](np.linspace(0.05, 0.95, len(methods)))
-        for k, (method, color) in enumerate(zip(methods, colors, strict=True)):
-            place = np.arange(len(environments)) + (k - (len(methods) - 1) / 2) * width
-            values = [g["after_rms_dph"] for g in method["groups"]]
-            label = f"{method['id']} ({method['table_bytes']} bytes)"
-            ax.bar(place, values, width=0.92 * width, color=color, label=label)
-        if result.get("noise_floor_dph"):
-            ax.axhline(
-                result["noise_floor_dph"], color=ACCENT, linewidth=0.8, linestyle="--", label="noise floor"
-            )
-        ax.set_xticks(np.arange(len(environments)), environments)
-        ax.set(ylabel="RMS after, deg/h")
-        ax.grid(visible=False, axis="x")
-        figure.legend(fontsize=8, loc="outside right upper")
         return svg(figure)

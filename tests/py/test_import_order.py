@@ -44,6 +44,7 @@ ORDER = [
     "diagnosis_page",
     "diagnosis",
     "paper",
+    "comparison",
     "triad",
     "build",
     "cli",
