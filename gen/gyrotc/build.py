@@ -20,7 +20,7 @@ from .dataset import Dataset, axes_of, load
 from .emit import emit
 from .errors import InputError
 from .evaluate import evaluate
-from .fitting import FitOptions, fit_dataset
+from .fitting import FitOptions, Fitted, fit_dataset
 from .model import Model, write_atomically
 from .report import write_report
 from .triad import join_axes
@@ -35,7 +35,7 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 @dataclass(frozen=True, slots=True)
 class Built:
     """What `build` made: the JSON objects of its stages, the arithmetics that were refused (with the reason), and the
-    checks that failed (none: exit 0).
+    checks that failed (none: exit 0); with `extend` what was diagnosed.
     """
 
     training: dict[str, Any]
@@ -43,6 +43,7 @@ class Built:
     verification: dict[str, Any]
     refused: dict[str, str]
     failures: tuple[str, ...]
+    diagnosis: dict[str, Any] | None = None
 
 
 def build(
@@ -53,6 +54,7 @@ def build(
     axis: str | None = None,
     numerics: Sequence[str] | None = None,
     applied: Path | None = None,
+    extend: bool = False,
     progress: Progress | None = None,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
@@ -63,6 +65,7 @@ def build(
         axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
             `out/c` the runtime once with all tables.
         applied: Model that was subtracted while recording.
+        extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
 
     Raises:
         InputError: Bad recordings or arguments; `out` is untouched.
@@ -77,19 +80,25 @@ def build(
     with folder_in_place(out) as work:
         if not axes:
             dataset = load(source, axis=axis, applied=known)
-            return [_build_axis(dataset, work, options, numerics, say)]
+            return [_build_axis(dataset, work, options, numerics, extend, say)]
         built = []
         for name in axes:
             dataset = load(source, axis=name, applied=known)
-            built.append(_build_axis(dataset, work / name, options, numerics, _of_axis(name, say)))
+            built.append(_build_axis(dataset, work / name, options, numerics, extend, _of_axis(name, say)))
         join_axes(work, axes)
         return built
 
 
 def _build_axis(
-    dataset: Dataset, work: Path, options: FitOptions, numerics: Sequence[str] | None, say: Progress
+    dataset: Dataset,
+    work: Path,
+    options: FitOptions,
+    numerics: Sequence[str] | None,
+    extend: bool,
+    say: Progress,
 ) -> Built:
-    fitted = fit_dataset(dataset, options, progress=say)
+    fitted, diagnosis = _extended(dataset, work, options, say) if extend else (None, None)
+    fitted = fitted or fit_dataset(dataset, options, progress=say)
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training)
     say("emitting C")
@@ -114,7 +123,20 @@ def _build_axis(
         verification,
         emission.refused,
         tuple(_failures(evaluation, verification)),
+        diagnosis,
     )
+
+
+def _extended(
+    dataset: Dataset, work: Path, options: FitOptions, say: Progress
+) -> tuple[Fitted | None, dict[str, Any]]:
+    """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
+    from .diagnosis import diagnose_into
+
+    found = diagnose_into(work / "diagnosis", dataset, options=options, progress=say)
+    if found.model is None or found.training is None:
+        return None, found.result
+    return Fitted(found.model, found.training), found.result
 
 
 def _of_axis(axis: str, say: Progress) -> Progress:

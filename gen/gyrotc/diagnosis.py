@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,7 @@ def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagn
         result["pictures"].append(f"{PICTURES}/{name}.svg")
     write_atomically(out / "diagnose.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
     write_page(out)
-    return Diagnosis(result, found.analysis, found.extension, found.model)
+    return replace(found, result=result)
 
 
 def extended_scenario(result: dict[str, Any]) -> str | None:

@@ -23,7 +23,7 @@ from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 from .train import Fit, TrainingData, coverage, fit, predict, uncertainty
 
-__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of"]
+__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of", "training_of"]
 
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0
@@ -140,7 +140,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     spans = training_spans(runs, data)
     left_out = _left_out(data, spans, options, say) if spans else None
     model = model_of(dataset, runs, data, fitted, front, options)
-    return Fitted(model, _training(dataset, data, fitted, front, options, spans, left_out))
+    return Fitted(model, training_of(dataset, data, fitted, front, options, spans, left_out))
 
 
 def _fit(data: TrainingData, options: FitOptions) -> Fit:
@@ -267,7 +267,7 @@ def _data_file(run: Run) -> dict[str, Any]:
     return {"file": run.file, "sha256": run.sha256, "span": span, "role": run.role}
 
 
-def _training(
+def training_of(
     dataset: Dataset,
     data: TrainingData,
     fitted: Fit,
@@ -276,6 +276,7 @@ def _training(
     spans: Sequence[Span],
     left_out: list[Averages] | None,
 ) -> dict[str, Any]:
+    """The JSON object of `training.json`."""
     return {
         "schema": "gyrotc.fit/1",
         "gyrotc_version": __version__,

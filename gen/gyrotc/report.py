@@ -39,6 +39,7 @@ def write_report(folder: Path) -> Path:
             training=training,
             verification=verification,
             manifest=manifest,
+        diagnosis=read_json(folder / "diagnosis" / "diagnose.json", optional=True),
             judged=_judged(evaluation),
             pictures=_pictures(folder, model, evaluation, training),
         )

@@ -10,8 +10,9 @@ import numpy as np
 
 from .. import __version__, terms
 from ..dataset import Dataset
-from ..fitting import FitOptions, front_end, model_of
+from ..fitting import FitOptions, front_end, model_of, training_of
 from ..model import Model
+from ..spans import training_spans
 from .advice import VERDICTS, next_steps
 from .extend import Extension, extend
 from .gain import Gain
@@ -40,12 +41,14 @@ class Diagnosis:
         analysis: Search and statistics; None where the recordings cannot decide anything.
         extension: Gain; None without an analysis.
         model: The extended model, None if none is shipped.
+        training: What `training.json` says of it.
     """
 
     result: dict[str, Any]
     analysis: Analysis | None
     extension: Extension | None
     model: Model | None
+    training: dict[str, Any] | None = None
 
 
 def diagnose(
@@ -76,9 +79,9 @@ def diagnose(
     analysis = analyse(records, declared_noise(dataset), say)
     causes = analysis.attribution.causes if named(analysis.attribution) else ()
     extension = extend(dataset, records, causes, chosen, say)
-    extended = _extended_model(dataset, extension, chosen)
+    extended, training = _extended_model(dataset, extension, chosen)
     result = _result(dataset, analysis, extension, causes, chosen)
-    return Diagnosis(result, analysis, extension, extended)
+    return Diagnosis(result, analysis, extension, extended, training)
 
 
 def _options_of(model: Model | None) -> FitOptions:
@@ -317,10 +320,12 @@ def _sentence(result: dict[str, Any]) -> str:
     return f"{text} On unseen runs the extension removes {amount} of the removable error."
 
 
-def _extended_model(dataset: Dataset, extension: Extension, options: FitOptions) -> Model | None:
-    """The model file of the extension."""
+def _extended_model(
+    dataset: Dataset, extension: Extension, options: FitOptions
+) -> tuple[Model, dict[str, Any]] | tuple[None, None]:
+    """The model file of the extension, and what training says of it."""
     if extension.extended is None:
-        return None
+        return None, None
     runs = [r for r in dataset.runs if r.role == "train"]
     front = front_end(runs, options.block_s)
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options)
@@ -336,4 +341,7 @@ def _extended_model(dataset: Dataset, extension: Extension, options: FitOptions)
                 "channel": effect.channel,
             }
         )
-    return Model.from_dict({**plain.to_dict(), "terms": entries})
+    left_out = extension.after if extension.measured_on == "left out" else None
+    spans = training_spans(runs, extension.samples)
+    training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
+    return Model.from_dict({**plain.to_dict(), "terms": entries}), training
