@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dataset import Applied, Rows
-from .errors import InputError
+from .errors import CheckFailed, InputError
 from .frontend import missed_before, samples_per_block
 from .model import Model, load_model
-from .quantise import quantise
+from .quantise import NUMERICS, quantise
 from .reference import replay
 from .table import Table
 
@@ -23,10 +23,10 @@ def applied_of(path: Path) -> Applied:
 
     Raises:
         InputError: The file is no model.
-        CheckFailed: It has no float32 table.
+        CheckFailed: It has no table.
     """
     model = load_model(path)
-    table = quantise(model, "f32")
+    table = _table(model)
 
     def correction_dph(rows: Rows, row_period_s: float) -> NDArray[np.float64]:
         replayed = replay(
@@ -38,6 +38,17 @@ def applied_of(path: Path) -> Applied:
         return table.decode_bias(replayed.bits)
 
     return Applied(model.hash, correction_dph)
+
+
+def _table(model: Model) -> Table:
+    """A table in the first arithmetic that is not refused: two differ by less than 1 % of the noise."""
+    refused = []
+    for numeric in NUMERICS:
+        try:
+            return quantise(model, numeric)
+        except CheckFailed as error:
+            refused.append(str(error))
+    raise CheckFailed("; ".join(refused))
 
 
 def channels_of(rows: Rows, model: Model, table: Table) -> NDArray[np.uint32]:

@@ -6,6 +6,7 @@ noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from . import __version__
 from .dataset import Dataset, Rows, Run, RunFacts, facts_of
 from .emit import emitted_tables
-from .errors import CheckFailed, GyrotcError
+from .errors import CheckFailed, GyrotcError, InputError
 from .findings import findings_of
 from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
@@ -76,7 +77,8 @@ def evaluate(
         numeric: Arithmetic to run; default the first emitted one.
         average_s: Averaging of all RMS figures; default the model's.
         trace: Folder for one CSV per run.
-        training: The object of `training.json`; without an exam run its figures of spans left out count.
+        training: The object of `training.json`; default that of `folder`, where it was made from these
+            recordings. Without an exam run its figures of spans left out count.
 
     Raises:
         InputError: No emitted code of the model, or the data lack a channel it needs.
@@ -98,10 +100,24 @@ def evaluate(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
     result = _result(model, dataset, table, parts, average_s=window)
+    training = training or _training_of(folder, dataset, model)
     if result["exam"] is None and training:
         result["left_out"] = training.get("left_out")
     result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
     return result
+
+
+def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, Any] | None:
+    """What `fit` wrote into the folder, where these are the recordings that it was made from."""
+    known = {(d.file, d.sha256) for d in model.data}
+    path = folder / "training.json"
+    if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
+        return None
+    try:
+        training = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), f"cannot be read ({error})", "what gyrotc fit wrote") from error
+    return training if isinstance(training, dict) else None
 
 
 @contextmanager

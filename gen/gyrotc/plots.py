@@ -187,7 +187,7 @@ _CURVES = (
 
 def allan_deviation(noise: dict[str, Any]) -> str | None:
     """Allan deviation over averaging time, with its uncertainty and the line of the angle random walk."""
-    points = noise["allan"]
+    points = [p for p in noise["allan"] if p["deviation_dph"] > 0.0]
     if len(points) < 2:
         return None
     tau = np.array([p["tau_s"] for p in points])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import Command
-from recordings import ACCEPTED, REFUSED, columns, described, write_csv
+from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv
 
 
 @pytest.mark.parametrize("case", REFUSED)
@@ -69,6 +70,34 @@ def test_fit_takes_what_check_accepts(case: str, tmp_path: Path, gyrotc: Command
     assert done.returncode == 0, done.stderr
     model = json.loads((tmp_path / "out" / "model.json").read_text())
     assert model["data"]
+
+
+def quiet_build(folder: Path, out: Path, gyrotc: Command) -> dict[str, Any]:
+    """Evaluation of a build that says nothing on stderr."""
+    done = gyrotc("build", folder, "--out", out, "--numeric", "f32")
+    assert (done.returncode, done.stderr) == (0, "")
+    result: dict[str, Any] = json.loads((out / "evaluate.json").read_text())
+    return result
+
+
+def test_one_temperature_and_one_rate_build_all_the_same(tmp_path: Path, gyrotc: Command) -> None:
+    """Nothing varies, not even the noise: a constant model, said in words, and no complaint of a library."""
+    same = {"temperature_c": np.full(ROWS, 25.0), "rate_dph": np.full(ROWS, 3.25)}
+    write_csv(tmp_path / "RLG-1" / "a.csv", columns() | same)
+    result = quiet_build(tmp_path / "RLG-1", tmp_path / "out", gyrotc)
+    assert "no_temperature_information" in [f["id"] for f in result["findings"]]
+    network = json.loads((tmp_path / "out" / "model.json").read_text())["networks"][0]
+    assert (network["w0"], network["linear"], network["centers"]) == (3.25, [0.0, 0.0], [])
+    assert result["train"]["after"]["max_abs_dph"] < 1e-6
+
+
+def test_a_build_can_be_evaluated_again_with_the_same_figures(tmp_path: Path, gyrotc: Command) -> None:
+    described(tmp_path / "RLG-1")
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", columns(360) | {"rate_dph": columns(360)["rate_dph"] - 20.0})
+    first = quiet_build(tmp_path / "RLG-1", tmp_path / "out", gyrotc)
+    assert first["left_out"]["after"]["rms_dph"] > 0.0
+    assert gyrotc("evaluate", tmp_path / "out", tmp_path / "RLG-1").returncode == 0
+    assert json.loads((tmp_path / "out" / "evaluate.json").read_text()) == first
 
 
 def test_meta_and_warnings_travel_into_the_model(tmp_path: Path, gyrotc: Command) -> None:

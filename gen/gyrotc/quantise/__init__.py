@@ -3,7 +3,7 @@
 Stage 5 of the house (… → model → **tables** → C → proof). After it only 32-bit words exist. The bound
 that a table carries covers arithmetic, rounded parameters and rounded inputs against the model in
 float64; extension terms are not part of it. A format that would cost more than 1 % of the noise floor
-is refused, with the reason.
+is refused, with the reason; where the recordings show no noise at all, there is nothing to hold it against.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def quantise(model: Model, numeric: str) -> Table:
         raise InputError("--numeric", repr(numeric), " or ".join(NUMERICS))
     table = with_probes(model, _MAKERS[numeric](model))
     floor = model.noise_floor_dph
-    if floor is not None and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
+    if floor and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
         worst = max(table.bound_parts_dph, key=lambda part: table.bound_parts_dph[part])
         raise CheckFailed(
             f"{numeric}: rounding could cost {table.error_bound_dph:.2e} deg/h, more than 1 % of the noise "

@@ -119,6 +119,6 @@ def _no_information(samples: TrainingData) -> dict[str, object]:
     span = float(np.ptp(samples.temperature_c))
     return {
         "id": "no_temperature_information",
-        "text": f"Temperature spans only {span:.2f} C: the model is the mean bias.",
+        "text": f"Temperature spans only {span:.2f} C: nothing can be learnt about it; the model is the mean bias.",
         "evidence": {"span_c": span, "required_c": MIN_TEMPERATURE_SPAN_C},
     }
