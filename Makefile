@@ -33,6 +33,11 @@ test:
 	@ctest --test-dir build/ctest --output-on-failure
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py
 
+## the emitted code on every target, negative controls, nav_loop: docs/results.md
+targets:
+	@tools/setup.sh targets
+	@$(PYTHON) -m pytest -q -rs tests/targets tests/py/test_negative_controls.py --results docs
+
 ## style and promises: ruff, mypy, and what the C library must not contain
 check:
 	@tools/setup.sh test
@@ -65,4 +70,4 @@ bench: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test check picture paper real bench clean
+.PHONY: help setup demo test targets check picture paper real bench clean

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from gyrotc.dataset import Dataset, load
 from gyrotc.emit import emit
 from gyrotc.model import Model, load_model
 from gyrotc.toolchain import Target, all_targets
 from gyrotc.verify import verify
+from recordings import csv_text, toml
 
+#: What the negative controls of this session showed: a record for each program that ran to its end and differed.
+CAUGHT: list[dict[str, Any]] = []
+_SHOWN = ("name", "numeric", "vectors", "mismatches")
 GOLDEN = Path(__file__).resolve().parents[2] / "examples" / "minimal" / "model.json"
 
 
@@ -52,4 +59,31 @@ def with_flags(name: str, *flags: str) -> Target:
 
 def ran_and_differed(entry: dict[str, Any]) -> bool:
     """The program ran to its end and its results differ: what a negative control must show."""
-    return entry["status"] == "fail" and "error" not in entry and entry["mismatches"] > 0
+    caught = entry["status"] == "fail" and "error" not in entry and entry["mismatches"] > 0
+    if caught:
+        control = os.environ.get("PYTEST_CURRENT_TEST", "").partition(" ")[0]
+        CAUGHT.append({"control": control, **{k: entry[k] for k in _SHOWN}})
+    return caught
+
+
+def recorded(folder: Path) -> Dataset:
+    """Two runs of 15 minutes with gaps, an outage, a spike and two auxiliary channels."""
+    folder.mkdir()
+    rng = np.random.default_rng(5)
+    for k in range(2):
+        time_s = np.delete(np.arange(900.0), [*range(200, 203), *range(500, 540)])
+        temperature = (
+            15.0 + 10.0 * k + 20.0 * np.sin(time_s / 400.0 + k) + rng.normal(0.0, 0.003, time_s.size)
+        )
+        temperature[300 + k] += 25.0
+        columns = {
+            "time_s": time_s,
+            "temperature_c": np.round(temperature, 4),
+            "rate_dph": np.round(rng.normal(0.007, 0.01, time_s.size), 5),
+            "supply_v": np.round(0.2 + rng.normal(0.0, 0.02, time_s.size), 4),
+            "magnetic_ut": np.round(rng.normal(0.0, 0.5, time_s.size), 4),
+        }
+        (folder / f"run-{k}.csv").write_text(csv_text(columns), encoding="utf-8")
+    description = toml('file = "run-0.csv"', 'file = "run-1.csv"')
+    (folder / "dataset.toml").write_text(description, encoding="utf-8")
+    return load(folder)

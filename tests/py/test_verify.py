@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from emitted import emitted, entries, flip, spoil
+from emitted import emitted, entries, flip, recorded, spoil
 from gyrotc import verify as package
 from gyrotc.errors import CheckFailed, InputError
 from gyrotc.reference import answers
@@ -135,6 +135,18 @@ def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
         assert {e["package"] for e in missing} == {"some-package"}
         assert result["missing"] == len(missing)
         assert (result["failed"] > 0) == bool(failed)
+
+
+def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path: Path) -> None:
+    """Host, emulated board, the other byte order; a wrong constant of the front end is seen in the rows."""
+    names = [FAST, "cortex-m4f", "s390x"]
+    dataset = recorded(tmp_path / "recordings")
+    for entry in verify(copy, targets=names, dataset=dataset)["targets"]:
+        assert entry["status"] == "pass"
+        assert entry["replayed"] == {"runs": 2, "rows": 1714, "mismatches": 0, "first_mismatches": []}
+    spoil(copy / "c" / "gtc.c", r"#define NEW_TRUTH 3U", "#define NEW_TRUTH 2U", count=0)
+    for entry in verify(copy, targets=[FAST], dataset=dataset)["targets"]:
+        assert entry["status"] == "fail" and entry["mismatches"] > 0
 
 
 def test_exit_status_of_the_command(copy: Path, gyrotc: Command) -> None:

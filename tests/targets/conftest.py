@@ -1,8 +1,45 @@
-"""The tests of `make targets`: every cross compiler and emulator is required."""
+"""The tests of `make targets`: every cross compiler and emulator is required.
+
+`--results docs` writes what they found into the documentation.
+"""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
+import pytest
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "py")]
+
+from emitted import CAUGHT  # noqa: E402
+from results import Results, machine, write  # noqa: E402
+from targets_page import section  # noqa: E402
+
+_FOUND = Results()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--results", type=Path, help="folder whose results/targets.json and results.md are written"
+    )
+
+
+@pytest.fixture(scope="session")
+def results() -> Results:
+    return _FOUND
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Only a session in which everything passed leaves results."""
+    docs = session.config.getoption("--results")
+    if docs is None or exitstatus != 0:
+        return
+    result = {
+        "schema": "gyrotc.targets/1",
+        "machine": machine(),
+        **_FOUND.lists,
+        "controls": sorted(CAUGHT, key=lambda c: (c["control"], c["name"], c["numeric"])),
+    }
+    write(docs, "targets", result, section)

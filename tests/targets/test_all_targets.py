@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
-from emitted import emitted
-from gyrotc.model import Model, load_model
+from emitted import GOLDEN, emitted, recorded
+from gyrotc.model import Model, Term, load_model
 from gyrotc.toolchain import all_targets
 from gyrotc.verify import verify
 from metered import metered
-from models import random_model
+from models import bank_of, random_model
+from results import Results
 
-BUILD = Path(__file__).resolve().parents[2] / "build"
+_KEPT = (
+    "name", "numeric", "status", "compiler", "flags", "vectors", "mismatches", "instructions", "cycles",
+    "step_instructions", "step_cycles", "stack_bytes", "step_stack_bytes", "code_bytes", "table_bytes",
+    "ram_bytes", "replayed",
+)  # fmt: skip
 
 
 def _wide_model() -> Model:
@@ -32,34 +36,66 @@ def _wide_model() -> Model:
     return model.model_copy(update={"networks": (network,)})
 
 
-MODELS = {"golden": None, "wide": _wide_model()}
+def _with_terms() -> Model:
+    """The golden network seen through a lag of the cavity, with gradient, hysteresis and warm-up."""
+    terms = (
+        Term(id="cavity_lag", parameters={"tau_s": 310.0}),
+        Term(id="thermal_gradient", parameters={"tau_s": 1800.0, "amplitude_dph_per_c": -0.0004}),
+        Term(id="hysteresis", parameters={"width_c": 1.7, "amplitude_dph_per_c": 0.0003}),
+        Term(id="warm_up", parameters={"tau_s": 1200.0, "amplitude_dph": 0.004}),
+    )
+    return load_model(GOLDEN).model_copy(update={"terms": terms})
+
+
+def _bank_with_channels() -> Model:
+    """Three networks with a hand-over, a harmonic, two auxiliary channels."""
+    wave = {"period_c": 11.0, "amplitude_dph": 0.0007, "phase_rad": 2.0}
+    terms = (
+        Term(id="path_length_periodicity", parameters=wave),
+        Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.002, "reference": 0.25}, channel="supply_v"),
+        Term(
+            id="auxiliary", parameters={"slope_dph_per_unit": -0.001, "reference": 0.0}, channel="magnetic_ut"
+        ),
+    )
+    return bank_of(load_model(GOLDEN)).model_copy(update={"terms": terms})
+
+
+MODELS = {
+    "golden": lambda: load_model(GOLDEN),
+    "wide": _wide_model,
+    "terms": _with_terms,
+    "bank": _bank_with_channels,
+}
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_target_agrees_in_every_bit(name: str, tmp_path: Path) -> None:
-    folder = emitted(tmp_path, MODELS[name])
-    result = verify(folder, targets=["all"])
-    _keep(name, result)
-    assert [e["package"] for e in result["targets"] if e["status"] == "missing"] == []
+def test_every_target_agrees_in_every_bit(name: str, tmp_path: Path, results: Results) -> None:
+    model = MODELS[name]()
+    folder = emitted(tmp_path / "model", model)
+    result = verify(folder, targets=["all"], dataset=recorded(tmp_path / "recordings"))
+    missing = {(e["name"], e["package"]) for e in result["targets"] if e["status"] == "missing"}
+    assert not missing, f"install these packages: {' '.join(sorted({p for _, p in missing}))}"
     wrong = [e for e in result["targets"] if e["status"] != "pass" or e["mismatches"]]
     assert wrong == [] and result["failed"] == 0
     assert all(e["vectors"] >= 20000 for e in result["targets"])
     assert len({e["name"] for e in result["targets"]}) >= 12
     assert all(e["ram_bytes"] == 0 for e in result["targets"])
+    streamed = [e["replayed"] for e in result["targets"] if all_targets()[e["name"]].reads_input]
+    assert all((r["rows"], r["mismatches"]) == (1714, 0) for r in streamed), streamed
     assert {e["name"] for e in result["targets"] if e["numeric"] == "q31"} == set(all_targets())
+    results.add("models", _record(name, model, result))
 
 
-def _keep(name: str, result: dict[str, Any]) -> None:
-    """The table of results, for docs/results.md and for whoever reads the log."""
-    BUILD.mkdir(exist_ok=True)
-    (BUILD / f"targets-{name}.json").write_text(json.dumps(result, indent=1))
-    for e in result["targets"]:
-        cost = e.get("instructions") or e.get("cycles") or {}
-        print(
-            f"{name:7s} {e['name']:15s} {e['numeric']} {e['status']:4s} {e.get('vectors')} vectors "
-            f"{e.get('mismatches')} differ, call {cost.get('mean', '-')} (max {cost.get('max', '-')}), "
-            f"code {e.get('code_bytes')}, stack {e.get('stack_bytes', '-')}"
-        )
+def _record(name: str, model: Model, result: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "networks": len(model.networks),
+        "centers": sum(len(n.weights) for n in model.networks),
+        "terms": [t.id for t in model.terms],
+        "passed": result["passed"],
+        "failed": result["failed"],
+        "targets": [{key: e[key] for key in _KEPT if key in e} for e in result["targets"]],
+    }
 
 
 @pytest.mark.parametrize("name", [n for n, t in all_targets().items() if t.counts])
@@ -74,7 +110,7 @@ def test_meter_counts_instructions_cycles_and_stack(name: str, tmp_path: Path) -
 
 
 def test_instruction_counts_repeat_exactly(tmp_path: Path) -> None:
-    folder = emitted(tmp_path, load_model(Path(__file__).parents[2] / "examples" / "minimal" / "model.json"))
+    folder = emitted(tmp_path)
     names = ["cortex-m0", "cortex-m3", "cortex-m4f", "cortex-m7", "rv32imac"]
     first, second = (verify(folder, targets=names)["targets"] for _ in range(2))
     assert [e["instructions"] for e in first] == [e["instructions"] for e in second]

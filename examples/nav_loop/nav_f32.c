@@ -1,0 +1,34 @@
+/* nav_f32.c - the bias compensation of a navigation loop in float32. */
+#include "nav.h"
+
+#include "gtc_rlg_0042.h"
+
+#define SAMPLES_PER_BLOCK 10U /* a block of 10 s, a reading each second */
+#define TICK_S 0.015625F      /* 1/64 s, exact */
+
+static gtc_f32_state_t state;
+
+int nav_start(void)
+{
+    const int checked = gtc_f32_check(&gtc_rlg_0042_f32);
+    return (checked != GTC_OK) ? checked : gtc_f32_init(&state, &gtc_rlg_0042_f32, SAMPLES_PER_BLOCK);
+}
+
+int nav_temperature(int_least32_t word)
+{
+    const float temperature = (float)word * 0.0078125F;
+    return (word == NAV_NO_READING) ? gtc_f32_missed(&state, 1U) : gtc_f32_sample(&state, &temperature);
+}
+
+int nav_increment(int_least32_t counts, int_least64_t *angle)
+{
+    float bias = 0.0F;
+    const int status = gtc_f32_angle(&state, TICK_S, &bias); /* a multiple of 2^-16 arcsec */
+    *angle += counts - (int_least32_t)(bias * 65536.0F);
+    return status;
+}
+
+unsigned nav_angle_bits(void)
+{
+    return 16U;
+}

@@ -1,0 +1,34 @@
+/* nav_q31.c - the bias compensation of a navigation loop in fixed point: no floating-point unit, no flags. */
+#include "nav.h"
+
+#include "gtc_rlg_0042.h"
+
+#define SAMPLES_PER_BLOCK 10U /* a block of 10 s, a reading each second */
+#define TICK_US 15625L        /* 1/64 s */
+
+static gtc_q31_state_t state;
+
+int nav_start(void)
+{
+    const int checked = gtc_q31_check(&gtc_rlg_0042_q31);
+    return (checked != GTC_OK) ? checked : gtc_q31_init(&state, &gtc_rlg_0042_q31, SAMPLES_PER_BLOCK);
+}
+
+int nav_temperature(int_least32_t word)
+{
+    const int_least32_t temperature = word * 512L; /* 2^-16 C */
+    return (word == NAV_NO_READING) ? gtc_q31_missed(&state, 1U) : gtc_q31_sample(&state, &temperature);
+}
+
+int nav_increment(int_least32_t counts, int_least64_t *angle)
+{
+    int_least32_t bias = 0;
+    const int status = gtc_q31_angle(&state, TICK_US, &bias);
+    *angle += ((int_least64_t)counts * ((int_least64_t)1 << (nav_angle_bits() - 16U))) - bias;
+    return status;
+}
+
+unsigned nav_angle_bits(void)
+{
+    return (unsigned)gtc_rlg_0042_q31.bias_frac_bits;
+}

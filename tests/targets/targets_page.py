@@ -1,0 +1,101 @@
+"""The section `targets` of docs/results.md, from docs/results/targets.json."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from results import table
+
+__all__ = ["section"]
+
+_HEAD = """## Every target, bit for bit (`make targets`)
+
+{combinations} combinations of architecture, compiler and optimisation, {entries} with their arithmetics. Every result
+word of the emitted C (map, step functions, statuses) against the reference computed from `model.json`; recordings
+streamed through the step functions besides.
+"""
+_COSTS = """Cost with the golden model ({centers} centers): instructions of a map call, mean (largest); of a call of
+`sample`, the largest (it closes a block); bytes of code that a program with both links, of stack below the caller.
+Counted in emulators; AVR: cycles. float32 is not offered where the compiler does not keep to its arithmetic.
+"""
+_CONTROLS = """Negative controls: builds that are wrong on purpose. Each ran to its end; that many results differed.
+"""
+_NAV = """`examples/nav_loop`, firmware in the emulated board against the host: lines that differ, and the angle over
+20 minutes.
+"""
+
+
+def section(result: dict[str, Any]) -> str:
+    """The section as text."""
+    golden = result["models"][0]
+    names = {t["name"] for t in golden["targets"]}
+    parts = [
+        _HEAD.format(combinations=len(names), entries=len(golden["targets"])),
+        table(
+            ["model", "networks ", "centers ", "terms", "targets × arithmetics ", "vectors each ", "mismatches ",
+             "rows replayed ", "rows that differ "],
+            [_model_row(m) for m in result["models"]],
+        ),
+        _COSTS.format(centers=golden["centers"]),
+        table(
+            ["target", "arithmetic", "compiler", "vectors ", "mismatches ", "map ", "sample ", "code ", "stack ",
+             "stack of sample "],
+            [_target_row(t) for t in golden["targets"]],
+        ),
+        _CONTROLS,
+        table(
+            ["control", "target", "arithmetic", "results ", "mismatches "],
+            [_control_row(c) for c in result["controls"]],
+        ),
+        _NAV,
+        table(
+            ["arithmetic", "lines ", "differing ", "measured, arcsec ", "compensated, arcsec "],
+            [
+                [n["numeric"], n["lines"], n["differing_lines"], f"{n['measured_arcsec']:.2f}",
+                 f"{n['compensated_arcsec']:.2f}"]
+                for n in result["nav_loop"]
+            ],
+        ),
+    ]  # fmt: skip
+    return "\n".join(parts)
+
+
+def _model_row(m: dict[str, Any]) -> list[object]:
+    targets = m["targets"]
+    replayed = [t["replayed"] for t in targets if "replayed" in t]
+    return [
+        m["name"],
+        m["networks"],
+        m["centers"],
+        ", ".join(m["terms"]) or "-",
+        len(targets),
+        min(t["vectors"] for t in targets),
+        sum(t["mismatches"] for t in targets),
+        sum(r["rows"] for r in replayed),
+        sum(r["mismatches"] for r in replayed),
+    ]
+
+
+def _target_row(t: dict[str, Any]) -> list[object]:
+    cost = t.get("instructions") or t.get("cycles")
+    step = t.get("step_instructions") or t.get("step_cycles")
+    return [
+        t["name"],
+        t["numeric"],
+        t["compiler"],
+        t["vectors"],
+        t["mismatches"],
+        f"{cost['mean']:.0f} ({cost['max']})" if cost else "-",
+        step["max"] if step else "-",
+        t["code_bytes"],
+        t.get("stack_bytes", "-"),
+        t.get("step_stack_bytes", "-"),
+    ]
+
+
+def _control_row(c: dict[str, Any]) -> list[object]:
+    words = c["control"].rpartition("::")[2].removeprefix("test_")
+    name, _, case = words.partition("[")
+    text = re.sub(r"_", " ", name) + (f" ({case.rstrip(']')})" if case else "")
+    return [text, c["name"], c["numeric"], c["vectors"], c["mismatches"]]
