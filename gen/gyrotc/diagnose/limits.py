@@ -16,7 +16,7 @@ from .likelihood import Gains
 from .refine import Refined
 from .search import Search
 
-__all__ = ["Limit", "detection_limits", "overlap"]
+__all__ = ["Limit", "detection_limits", "limit_of", "overlap"]
 
 Array = NDArray[np.float64]
 
@@ -74,10 +74,11 @@ def detection_limits(search: Search) -> dict[str, Limit]:
         found.setdefault(key, []).append(
             (candidate, float(size[at_extra]) * min(search.extra_norm[k], 1e150) ** 2)
         )
-    return {key: _limit(key.split(":")[0], points) for key, points in found.items()}
+    return {key: limit_of(key.split(":")[0], points) for key, points in found.items()}
 
 
-def _limit(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
+def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
+    """Limit from the energies of unit amplitudes over the grid of a cause."""
     d = _D.get(cause, _D_OTHERS)
     parameter = shape_parameter(cause)
     unit = _UNITS[cause]

@@ -13,7 +13,7 @@ from ..terms.base import History
 from .noise import Declared
 from .records import Record, Records
 
-__all__ = ["declared_noise", "records_of"]
+__all__ = ["block_length", "declared_noise", "records_of"]
 
 Array = NDArray[np.float64]
 
@@ -42,10 +42,10 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
         found.append(_record(run, dataset.channels, k, len(runs), day, block_s))
     if sum(int(r.usable.sum()) for r in found) == 0:
         raise InputError(str(dataset.folder), "no usable row", "rows with a temperature and a rate")
-    return Records(tuple(found), _block(found, block_s, average_s))
+    return Records(tuple(found), block_length(found, block_s, average_s))
 
 
-def _block(runs: Sequence[Record], block_s: float, average_s: float) -> float:
+def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> float:
     """Length of a block, s."""
     row = max(run.row_s for run in runs)
     total = sum(float(r.usable.sum()) * r.row_s for r in runs)
