@@ -73,6 +73,13 @@ def test_the_prediction_is_withheld_where_the_residual_is_not_white() -> None:
     assert slow.withheld
 
 
+def test_a_single_run_predicts_nothing_about_another() -> None:
+    data = samples(0)
+    found = fit(data.select(data.run == 1))
+    assert found.predicted_rms_ratio is None
+    assert "single run" in found.withheld
+
+
 def test_a_seed_gives_one_model_to_the_bit() -> None:
     data = samples(1)
     assert fit(data, seed=3).networks == fit(data, seed=3).networks

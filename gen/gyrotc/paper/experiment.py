@@ -5,8 +5,7 @@ Beside it gyrotc's own way: one model over all environments.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,14 +55,12 @@ class Cell:
         before, predicted: Measured bias and the model's, shape (n,).
         train_rms_dph: RMS of what is left of the training means.
         centers: Of the model that was used here.
-        seconds: Processor time of the training.
     """
 
     before: Array
     predicted: Array
     train_rms_dph: float
     centers: int
-    seconds: float
 
     @property
     def after(self) -> Array:
@@ -90,13 +87,10 @@ def experiment(seed: int, noise: Noise, folder: Path) -> Experiment:
     groups, floor = _groups(folder)
     cells: dict[str, dict[str, Cell]] = {}
     for method in ("constant", "mlr", "rbf_random", "mrbf_paper"):
-        cells[method] = {
-            group.environment: _cell(group, *_timed(group.train, _trainer(method, group.environment, seed)))
-            for group in groups
-        }
+        cells[method] = {group.environment: _cell(group, _trained(method, group, seed)) for group in groups}
     whole = _joined([group.train for group in groups])
-    trained, seconds = _timed(whole, lambda data: fit(data, method="mrbf", average_s=AVERAGE_S))
-    cells["mrbf"] = {group.environment: _cell(group, trained, seconds) for group in groups}
+    trained = fit(whole, method="mrbf", average_s=AVERAGE_S)
+    cells["mrbf"] = {group.environment: _cell(group, trained) for group in groups}
     return Experiment(cells, floor)
 
 
@@ -118,32 +112,24 @@ def _joined(parts: Sequence[TrainingData]) -> TrainingData:
     return TrainingData(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
-def _timed(data: TrainingData, train: Callable[[TrainingData], Fit]) -> tuple[Fit, float]:
-    began = time.process_time()
-    return train(data), time.process_time() - began
-
-
-def _trainer(method: str, environment: str, seed: int) -> Callable[[TrainingData], Fit]:
-    """Trains one model on one environment as the paper does, whatever the temperature tells there."""
-
-    def train(data: TrainingData) -> Fit:
-        scaling = scaling_of(data)
-        if method in ("constant", "mlr"):
-            outcome = _least_squares(data, variables=2 if method == "mlr" else 0)
-        else:
-            outcome = fit_ols(
-                method,
-                data,
-                scaling,
-                seed=seed,
-                centers=NEURONS[environment] if method == "rbf_random" else None,
-                rho=None,
-                size_rule=None,
-                average_s=AVERAGE_S,
-            )
-        return Fit(method, outcome, scaling, [], 0.0, AVERAGE_S, float(data.bias_dph.mean()))
-
-    return train
+def _trained(method: str, group: Group, seed: int) -> Fit:
+    """One model on one environment as the paper does, whatever the temperature tells there."""
+    data = group.train
+    scaling = scaling_of(data)
+    if method in ("constant", "mlr"):
+        outcome = _least_squares(data, variables=2 if method == "mlr" else 0)
+    else:
+        outcome = fit_ols(
+            method,
+            data,
+            scaling,
+            seed=seed,
+            centers=NEURONS[group.environment] if method == "rbf_random" else None,
+            rho=None,
+            size_rule=None,
+            average_s=AVERAGE_S,
+        )
+    return Fit(method, outcome, scaling, [], 0.0, AVERAGE_S, float(data.bias_dph.mean()))
 
 
 def _least_squares(data: TrainingData, variables: int) -> Outcome:
@@ -155,14 +141,13 @@ def _least_squares(data: TrainingData, variables: int) -> Outcome:
     return Outcome(networks=(network(weights[0], (weights[1], weights[2])),), curves={})
 
 
-def _cell(group: Group, trained: Fit, seconds: float) -> Cell:
+def _cell(group: Group, trained: Fit) -> Cell:
     left = _means(group.train, group.train.bias_dph) - _means(group.train, _predicted(trained, group.train))
     return Cell(
         before=_means(group.exam, group.exam.bias_dph),
         predicted=_means(group.exam, _predicted(trained, group.exam)),
         train_rms_dph=float(np.sqrt(np.mean(left**2))),
         centers=sum(len(part["centers"]) for part in trained.networks),
-        seconds=seconds,
     )
 
 

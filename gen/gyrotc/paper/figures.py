@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots import AFTER, BEFORE, COVERED, svg
+from ..plots import AFTER, BEFORE, COVERED, STYLE, svg
 from ..simulate.instrument import Record
 from ..simulate.noise import CELL_S
 from .experiment import AVERAGE_S, Cell, Experiment
@@ -19,13 +19,6 @@ from .published import ENVIRONMENTS
 
 __all__ = ["FIGURES", "draw", "draw_run"]
 
-_STYLE: Any = {
-    "svg.hashsalt": "gyrotc",
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
 _ZOOM = slice(50, 101)
 _CONSTANT, _VARIABLE = ENVIRONMENTS[:3], ENVIRONMENTS[3:]
 
@@ -80,7 +73,7 @@ def _figure(result: Experiment, number: int) -> str:
     rows = [(_CONSTANT, whole), (_VARIABLE, whole)]
     if enlarged:
         rows += [(_CONSTANT, _ZOOM), (_VARIABLE, _ZOOM)]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 0.6 + 1.8 * len(rows)), layout="constrained")
         axes = figure.subplots(len(rows), 3, sharey=True, squeeze=False)
         for letter, line, (environments, part) in zip("abcd", axes, rows, strict=False):
@@ -110,7 +103,7 @@ def draw_run(record: Record, title: str, path: Path) -> None:
     measured, true = (
         np.diff(angle[::average]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec)
     )
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
         above.plot(hours, record.air_c, color=COVERED, linewidth=0.8, label="air in the chamber")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,13 @@ from .published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 __all__ = ["filled", "gyros_table", "scatter_table", "table_1", "times_table"]
 
 _Row = Sequence[str]
+_MEASURED = {
+    "mlr": "paper: mlr, with BIC",
+    "rbf_random": "paper: rbf_random",
+    "mrbf_paper": "paper: mrbf_paper",
+    "mrbf": "gyrotc mrbf (default)",
+}
+"""Names in docs/results/bench.json."""
 
 
 def filled(text: str, parts: Mapping[str, str]) -> str:
@@ -59,6 +67,10 @@ def table_1(result: Experiment, *, published: bool) -> str:
         if published and method in AFTER_DPH:
             ratios = (BEFORE_DPH[name] / AFTER_DPH[method][name] for name in ENVIRONMENTS)
             rows.append(["*paper*", *(f"*{ratio:.1f}*" for ratio in ratios)])
+    for method, label in METHODS.items():
+        rows.append(
+            [f"improvement of σ, {label}", *(_of_sigma(result.cells[method][n]) for n in ENVIRONMENTS)]
+        )
     for method in ("rbf_random", "mrbf_paper", "mrbf"):
         counts = (str(result.cells[method][name].centers) for name in ENVIRONMENTS)
         rows.append([f"centers, {METHODS[method]}", *counts])
@@ -71,6 +83,10 @@ def _row(result: Experiment, label: str, value: Callable[[Cell], float], factor:
 
 def _improvement(cell: Cell) -> str:
     return f"{_rms(cell.before) / _rms(cell.after):.1f}"
+
+
+def _of_sigma(cell: Cell) -> str:
+    return f"{float(cell.before.std() / cell.after.std()):.2f}"
 
 
 def gyros_table(results: Mapping[str, Sequence[Experiment]]) -> str:
@@ -105,13 +121,16 @@ def _scatter(values: Sequence[float]) -> str:
     return f"{100.0 * float(np.std(values, ddof=1) / np.mean(values)):.1f} %"
 
 
-def times_table(result: Experiment) -> str:
-    """Running times of the training, all six environments together."""
+def times_table(measured: Sequence[Mapping[str, Any]]) -> str:
+    """Running times of the training: the paper's, and what `make bench` measured for all six environments.
+
+    Args:
+        measured: Whole methods on one gyro of scenario `paper`, as in docs/results/bench.json.
+    """
+    seconds = {row["name"]: f"{row['seconds']:.3f}" for row in measured if "seconds" in row}
     rows = []
-    for method in ("mlr", "rbf_random", "mrbf_paper", "mrbf"):
-        cells = result.cells[method].values()
-        seconds = next(iter(cells)).seconds if method == "mrbf" else sum(cell.seconds for cell in cells)
+    for method, name in _MEASURED.items():
         each = RUNNING_S.get(method)
         paper = f"{min(each.values()):.1f} ... {max(each.values()):.1f} for one environment" if each else "-"
-        rows.append([METHODS[method], paper, f"{seconds:.1g}" if seconds >= 1e-3 else "< 0.001"])
+        rows.append([METHODS[method], paper, seconds.get(name, "-")])
     return _markdown(["running time, s", "paper", "here, all six"], rows)

@@ -43,7 +43,8 @@ def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
 def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
     """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
 
-    Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box).
+    Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box). A
+    single run passes neither: what another run would bring was never seen.
     """
     n = len(residual)
     scaled = residual * np.sqrt(weight)
@@ -51,6 +52,8 @@ def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
     if sigma == 0.0 or n < 4 * _LAGS:
         return "too few samples to test the residual"
     runs, index = np.unique(run, return_inverse=True)
+    if len(runs) < 2:
+        return "a single run does not show how runs differ"
     total = np.bincount(index, weight * residual) / np.sqrt(np.bincount(index, weight))
     if chdtrc(len(runs), float(np.sum((total / sigma) ** 2))) < _SIGNIFICANCE:
         return "run means of the residual scatter more than its noise allows"
