@@ -38,6 +38,7 @@ ORDER = [
     "compare",
     "check",
     "diagnose",
+    "plan",
     "plots",
     "diagnosis_plots",
     "report",
@@ -47,6 +48,7 @@ ORDER = [
     "comparison",
     "triad",
     "build",
+    "commands",
     "cli",
 ]
 

@@ -1,0 +1,96 @@
+"""What every command shares: the application, its options, progress on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from .. import __version__
+from ..model import write_atomically
+
+app = typer.Typer(
+    name="gyrotc",
+    help="From thermal-chamber recordings of a gyro to verified C tables that compensate its bias.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+OUT = Console(width=None if sys.stdout.isatty() else 120)
+ERR = Console(stderr=True)
+
+DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
+JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the machine-readable result here.")]
+AxisOption = Annotated[
+    str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
+]
+AverageOption = Annotated[
+    float, typer.Option("--average-s", min=0.001, help="Averaging of all RMS figures, s.")
+]
+MethodOption = Annotated[str, typer.Option("--method", help="mrbf (default), mrbf_paper, rbf_ols, ...")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.")]
+CentersOption = Annotated[
+    int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")
+]
+RhoOption = Annotated[
+    float | None, typer.Option("--rho", min=0.0, max=1.0, help="The paper's threshold, eq. (16).")
+]
+BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
+NumericOption = Annotated[
+    str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
+]
+AppliedOption = Annotated[
+    Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
+]
+DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """A line on stderr that says what is being done; nothing when stderr is no terminal."""
+    if not ERR.is_terminal:
+        yield lambda _: None
+        return
+    with ERR.status("") as status:
+        yield status.update
+
+
+def tell(text: str) -> None:
+    """A line of the result on stdout, as it is."""
+    OUT.print(text, highlight=False, soft_wrap=True, markup=False)
+
+
+def write_json(path: Path | None, result: dict[str, Any]) -> None:
+    if path is not None:
+        write_atomically(path, json_text(result))
+
+
+def json_text(result: dict[str, Any]) -> str:
+    return json.dumps(result, indent=1, allow_nan=False) + "\n"
+
+
+def numerics_of(text: str | None) -> list[str] | None:
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"gyrotc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass

@@ -1,0 +1,177 @@
+"""Whole jobs: build, compare, diagnose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import CheckFailed
+from ..model import write_atomically
+from .base import (
+    OUT,
+    AppliedOption,
+    AverageOption,
+    AxisOption,
+    BlockOption,
+    CentersOption,
+    DatasetArg,
+    JsonOption,
+    MethodOption,
+    NumericOption,
+    OutOption,
+    RhoOption,
+    SeedOption,
+    app,
+    json_text,
+    numerics_of,
+    progress,
+    tell,
+    write_json,
+)
+from .diagnosis_lines import diagnosis_lines, extension_lines
+from .results import evaluation_table, span_lines, summary, verify_table
+
+if TYPE_CHECKING:
+    from ..build import Built
+
+
+@app.command()
+def build(
+    dataset: DatasetArg,
+    out: OutOption = Path("build"),
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    numeric: NumericOption = None,
+    applied: AppliedOption = None,
+    extend: Annotated[
+        bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """The main job: check, fit, emit, verify, evaluate, report.
+
+    Example: gyrotc build recordings --out result
+    """
+    from ..build import build as run
+    from ..fitting import FitOptions
+
+    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    with progress() as say:
+        results = run(
+            dataset,
+            out,
+            options,
+            axis=axis,
+            numerics=numerics_of(numeric),
+            applied=applied,
+            extend=extend,
+            progress=say,
+        )
+    if len(results) == 1:
+        write_json(json_file, results[0].evaluation)
+    else:
+        write_json(json_file, {r.evaluation["axis"]: r.evaluation for r in results})
+    for result in results:
+        _print_built(result)
+    tell(f"report: {out / 'report.html'}")
+    failures = [failure for result in results for failure in result.failures]
+    if failures:
+        raise CheckFailed("; ".join(failures))
+
+
+def _print_built(result: Built) -> None:
+    OUT.print(evaluation_table(result.evaluation))
+    OUT.print(verify_table(result.verification))
+    for line in span_lines(result.training):
+        tell(line)
+    for name, reason in result.refused.items():
+        tell(f"{name} left out: {reason}")
+    for line in extension_lines(result.diagnosis) if result.diagnosis else ():
+        tell(line)
+    for finding in result.evaluation["findings"]:
+        tell(f"finding {finding['id']}: {finding['text']}")
+    tell(summary(result.evaluation))
+
+
+@app.command()
+def compare(
+    dataset: DatasetArg,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
+    ] = None,
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The paper's Table 1 on this data: every training method side by side.
+
+    Example: gyrotc compare recordings --out comparison
+    """
+    from ..applied import applied_of
+    from ..compare import CompareOptions
+    from ..compare import compare as run
+    from ..comparison import comparison_picture, comparison_tables, with_published
+    from ..dataset import load
+
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+    options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
+    with progress() as say:
+        result = with_published(run(recordings, options, progress=say))
+    write_json(json_file, result)
+    if out is not None:
+        write_atomically(out / "compare.json", json_text(result))
+        write_atomically(out / "compare.svg", comparison_picture(result))
+    for table in comparison_tables(result):
+        OUT.print(table)
+
+
+@app.command()
+def diagnose(
+    dataset: DatasetArg,
+    model: Annotated[Path | None, typer.Option("--model", help="A model.json made before.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
+    ] = None,
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """What the simulation gets wrong about recordings, the named cause, the extended model, the measured gain.
+
+    Example: gyrotc diagnose recordings --out diagnosis
+    """
+    from ..applied import applied_of
+    from ..dataset import load
+    from ..diagnose import diagnose as run
+    from ..diagnosis import diagnose_into
+    from ..fitting import FitOptions
+    from ..model import load_model
+
+    known = load_model(model) if model else None
+    options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+    with progress() as say:
+        if out is None:
+            result = run(recordings, model=known, options=options, progress=say).result
+        else:
+            found = diagnose_into(out, recordings, model=known, options=options, progress=say)
+            result = found.result
+    write_json(json_file, result)
+    for line in diagnosis_lines(result):
+        tell(line)

@@ -1,0 +1,103 @@
+"""Results as tables and lines for a terminal: what was trained, evaluated, verified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table as RichTable
+
+
+def _e(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}e}"
+
+
+def evaluation_table(result: dict[str, Any]) -> RichTable:
+    title = f"{result['serial']}: means over {result['average_s']:g} s, deg/h"
+    table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("run", "role", "environment"):
+        table.add_column(name, no_wrap=True)
+    for name in ("before", "after", "std after", "samples"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for run in result["runs"]:
+        table.add_row(
+            run["file"] + (f"@{run['from_s']:g}" if run.get("from_s") is not None else ""),
+            run["role"], run["environment"] or "", _e(run["before"]["rms_dph"]), _e(run["after"]["rms_dph"]),
+            _e(run["after"]["std_dph"]), str(run["samples"]),
+        )  # fmt: skip
+    for role in ("train", "exam", "left_out"):
+        part = result.get(role)
+        if part:
+            table.add_row(
+                "all", role, "", _e(part["before"]["rms_dph"]), _e(part["after"]["rms_dph"]),
+                _e(part["after"]["std_dph"]), str(part["samples"]), style="bold",
+            )  # fmt: skip
+    return table
+
+
+def span_lines(training: dict[str, Any]) -> Iterator[str]:
+    """What was cut where there are fewer than three training runs."""
+    spans = training["spans"]
+    if spans:
+        yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
+        for s in spans:
+            yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
+
+
+def verify_table(result: dict[str, Any]) -> RichTable:
+    table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("target", "", "status"):
+        table.add_column(name, no_wrap=True)
+    for name in ("vectors", "rows", "differ", "map call", "code", "stack"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for entry in result["targets"]:
+        replayed = entry.get("replayed") or {}
+        counted = next((n for n in ("instructions", "cycles", "ticks") if n in entry), None)
+        table.add_row(
+            entry["name"], entry["numeric"], entry["status"], str(entry.get("vectors", "-")),
+            str(replayed.get("rows", "-")),
+            str(entry["mismatches"] + replayed.get("mismatches", 0)) if "mismatches" in entry else "-",
+            f"{entry[counted]['mean']:.0f} {counted[:5]}" if counted else "-",
+            str(entry.get("code_bytes", "-")), str(entry.get("stack_bytes", "-")),
+        )  # fmt: skip
+    return table
+
+
+def verify_notes(result: dict[str, Any]) -> Iterator[str]:
+    """What is missing, and what differs, with all bits; one line each."""
+    for entry in result["targets"]:
+        if entry["status"] == "missing":
+            yield f"{entry['name']} {entry['numeric']}: missing; it needs the packages {entry['package']}"
+        replayed = entry.get("replayed") or {}
+        found = [entry.get("error"), replayed.get("error"), *entry.get("first_mismatches", ())]
+        for text in [*found, *replayed.get("first_mismatches", ())]:
+            if text:
+                yield f"{entry['name']} {entry['numeric']}: {text}"
+    for file in result["emitted"]:
+        if file["status"] == "fail":
+            yield f"{file['file']}: {file['mismatches']} lines or words differ from what the model gives"
+    for error in result["errors"]:
+        for text in error.get("first_mismatches", ()):
+            yield f"{error['numeric']}: {text}"
+        yield (
+            f"{error['numeric']}: worst error {error['worst_dph']:.2e} deg/h of {error['inputs_visited']} inputs "
+            f"visited; the bound is {error['bound_dph']:.2e}"
+            + (" and is EXCEEDED" if error["worst_dph"] > error["bound_dph"] else "")
+        )
+
+
+def summary(result: dict[str, Any]) -> str:
+    """One line that says what was gained; the paper's own figure beside it for the paper's scenario."""
+    part = result.get("exam") or result.get("left_out") or result.get("train")
+    if not part or not part["improvement"]:
+        return "no sample to judge by"
+    text = (
+        f"improvement {part['improvement']:.2f} (paper: 9.8-10.4)"
+        if result.get("exam")
+        else (f"improvement on spans left out {part['improvement']:.2f}")
+    )
+    floor, rms = result["noise_floor_dph"], part["after"]["rms_dph"]
+    if floor:
+        text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result['noise_floor_source']})"
+    return f"{text}; {result['model']['centers']} centers, {result['model']['table_bytes']} bytes of table"

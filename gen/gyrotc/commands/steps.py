@@ -1,0 +1,197 @@
+"""The steps of the main job, one by one: fit, emit, verify, evaluate, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from ..errors import CheckFailed
+from ..model import write_atomically
+from .base import (
+    ERR,
+    OUT,
+    AppliedOption,
+    AverageOption,
+    AxisOption,
+    BlockOption,
+    CentersOption,
+    DatasetArg,
+    DirArg,
+    JsonOption,
+    MethodOption,
+    NumericOption,
+    OutOption,
+    RhoOption,
+    SeedOption,
+    app,
+    json_text,
+    numerics_of,
+    progress,
+    tell,
+    write_json,
+)
+from .results import evaluation_table, span_lines, verify_notes, verify_table
+
+
+@app.command()
+def fit(
+    dataset: DatasetArg,
+    out: OutOption,
+    method: MethodOption = "mrbf",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Train a model: DIR/model.json and DIR/training.json.
+
+    Example: gyrotc fit recordings --out result
+    """
+    from ..applied import applied_of
+    from ..dataset import load
+    from ..fitting import FitOptions, fit_dataset
+
+    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    known = applied_of(applied) if applied else None
+    with progress() as say:
+        fitted = fit_dataset(load(dataset, axis=axis, applied=known), options, progress=say)
+    write_atomically(out / "model.json", fitted.model.to_json())
+    write_atomically(out / "training.json", json_text(fitted.training))
+    write_json(json_file, fitted.training)
+    for line in span_lines(fitted.training):
+        tell(line)
+    for finding in fitted.training["findings"]:
+        tell(f"finding {finding['id']}: {finding['text']}")
+    tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
+
+
+@app.command()
+def emit(
+    model: Annotated[Path, typer.Argument(help="A model.json.")],
+    out: OutOption,
+    numeric: NumericOption = None,
+    zero_at: Annotated[
+        float | None,
+        typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Write the C files of a model into DIR/c.
+
+    Example: gyrotc emit result/model.json --out result
+    """
+    from ..emit import emit as run
+    from ..model import load_model
+
+    loaded = load_model(model)
+    emission = run(loaded, out, numerics=numerics_of(numeric), zero_at=zero_at)
+    target = out / "model.json"
+    if target.resolve() != (model / "model.json" if model.is_dir() else model).resolve():
+        loaded.save(target)
+    result = {
+        "schema": "gyrotc.emit/1",
+        "gyrotc_version": __version__,
+        "serial": loaded.serial,
+        "axis": loaded.axis,
+        "id": loaded.id,
+        "tables": [
+            {"numeric": n, "table_bytes": t.table_bytes, "error_bound_dph": t.error_bound_dph}
+            for n, t in emission.tables.items()
+        ],
+        "refused": emission.refused,
+    }
+    write_json(json_file, result)
+    for name, reason in emission.refused.items():
+        ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
+
+
+@app.command()
+def verify(
+    folder: DirArg,
+    target: Annotated[
+        list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
+    ] = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", help="Replay these recordings on every target besides.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
+    ] = None,
+    exhaustive: Annotated[
+        bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Compile DIR/c for each target and compare bit for bit with the reference.
+
+    Example: gyrotc verify result --target all
+    """
+    from ..dataset import load
+    from ..model import load_model
+    from ..verify import verify as run
+
+    recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
+    with progress() as say:
+        result = run(
+            folder, targets=target or (), dataset=recordings, log=log, exhaustive=exhaustive, progress=say
+        )
+    write_atomically(folder / "verify.json", json_text(result))
+    write_json(json_file, result)
+    OUT.print(verify_table(result))
+    for line in verify_notes(result):
+        tell(line)
+    if result["failed"]:
+        raise CheckFailed(f"{result['failed']} checks failed; {len(result['targets'])} targets")
+
+
+@app.command()
+def evaluate(
+    folder: DirArg,
+    dataset: DatasetArg,
+    numeric: NumericOption = None,
+    trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
+    average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
+    applied: AppliedOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Replay recordings through the compiled C code, compare every step, measure.
+
+    Example: gyrotc evaluate result recordings --trace result/trace
+    """
+    from ..applied import applied_of
+    from ..dataset import load
+    from ..evaluate import evaluate as run
+    from ..model import load_model
+
+    axis = load_model(folder / "model.json").axis
+    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
+    with progress() as say:
+        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=trace, progress=say)
+    write_atomically(folder / "evaluate.json", json_text(result))
+    write_json(json_file, result)
+    OUT.print(evaluation_table(result))
+    if result["mismatches"]:
+        raise CheckFailed(f"{result['mismatches']} steps differ from the reference")
+
+
+@app.command()
+def report(folder: DirArg) -> None:
+    """Write DIR/report.html from what build or diagnose left in DIR.
+
+    Example: gyrotc report result
+    """
+    from ..diagnosis_page import is_diagnosis, write_page
+    from ..report import write_report
+
+    with progress() as say:
+        say("drawing")
+        path = write_page(folder) if is_diagnosis(folder) else write_report(folder)
+    tell(f"report: {path}")
