@@ -21,7 +21,7 @@ from .metrics import Averages, pooled
 from .model import Model
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
-from .train import Fit, TrainingData, coverage, fit, predict, uncertainty
+from .train import NETWORK_METHODS, Fit, TrainingData, coverage, fit, predict, uncertainty
 
 __all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of", "training_of"]
 
@@ -117,8 +117,11 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     """Fits a model to the training runs of a data set.
 
     Raises:
-        InputError: No training run, or too few usable samples.
+        InputError: No training run, too few usable samples, or a method whose map is no network.
     """
+    if options.method not in NETWORK_METHODS:
+        expected = f"one of {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
+        raise InputError("--method", repr(options.method), expected)
     runs = [run for run in dataset.runs if run.role == "train"]
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")

@@ -18,6 +18,7 @@ from gyrotc.train.uncertainty import coverage, uncertainty
 
 __all__ = [
     "METHODS",
+    "NETWORK_METHODS",
     "SIZE_RULES",
     "Fit",
     "Outcome",
@@ -29,6 +30,8 @@ __all__ = [
 ]
 
 METHODS = ("mlr", "poly", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
+NETWORK_METHODS = METHODS[2:]
+"""Those whose map is networks alone, so that a table can hold it."""
 _MAX_CENTERS = 512
 
 
