@@ -38,6 +38,11 @@ targets:
 	@tools/setup.sh targets
 	@$(PYTHON) -m pytest -q -rs tests/targets tests/py/test_negative_controls.py --results docs
 
+## every input of a table, no run-time error, rounding bounds (Frama-C, Gappa, Z3; minutes): docs/results.md
+prove:
+	@tools/setup.sh prove
+	@$(PYTHON) -m pytest -q -rs tests/prove --results docs
+
 ## style and promises: ruff, mypy, and what the C library must not contain
 check:
 	@tools/setup.sh test
@@ -70,4 +75,4 @@ bench: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets check picture paper real bench clean
+.PHONY: help setup demo test targets prove check picture paper real bench clean

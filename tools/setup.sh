@@ -18,7 +18,7 @@ test=(clang cmake cppcheck gcc-arm-none-eabi qemu-system-arm gcc-s390x-linux-gnu
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
          gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386 lib32gcc-12-dev
          gcc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc simavr)
-prove=(frama-c-base gappa)
+prove=(frama-c-base gappa z3)
 
 case $level in
   demo) packages=("${base[@]}") ;;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from pathlib import Path
@@ -12,49 +11,55 @@ from emitted import GOLDEN, emitted
 from gyrotc.emit import emitted_tables
 from gyrotc.model import Model, load_model
 from gyrotc.verify.exhaustive import visit_all
+from results import Results
 from test_primitives import F32_GAUSS_ERROR, _run
 
-BUILD = Path(__file__).resolve().parents[2] / "build"
+
+def _golden() -> Model:
+    return load_model(GOLDEN)
 
 
 def _wide_envelope() -> Model:
     """The golden network over ±5 C/min, so that every position of the slope can be reached."""
-    model = load_model(GOLDEN)
+    model = _golden()
     envelope = model.envelope.model_copy(update={"slope_c_per_min": (-5.0, 5.0)})
     return model.model_copy(update={"envelope": envelope, "coverage": None})
 
 
-@pytest.mark.parametrize(
-    ("name", "model", "inputs"), [("wide", _wide_envelope(), 2**32), ("golden", None, None)]
-)
+MODELS = {"every position reached": (_wide_envelope, 2**32), "golden": (_golden, None)}
+
+
+@pytest.mark.parametrize("name", MODELS)
 def test_every_input_agrees_and_keeps_the_bound(
-    name: str, model: Model | None, inputs: int | None, tmp_path: Path
+    name: str, tmp_path: Path, results: Results, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = emitted(tmp_path, model)
+    make, inputs = MODELS[name]
+    folder = emitted(tmp_path, make())
     model = load_model(folder / "model.json")
     table = emitted_tables(folder / "c", model)["q31"]
     start = time.monotonic()
 
     def progress(text: str) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{name}: {text}", end="", file=sys.stderr, flush=True)
+        with capsys.disabled():
+            print(f"\r{name}: {text}, {time.monotonic() - start:.0f} s ", end="", file=sys.stderr, flush=True)
 
-    visited = visit_all(folder / "c", model, table, progress=progress)
-    taken = time.monotonic() - start
-    BUILD.mkdir(exist_ok=True)
-    result = {
-        "inputs": visited.inputs,
-        "mismatches": visited.mismatches,
-        "worst_dph": visited.worst_dph,
-        "arithmetic_dph": visited.arithmetic_dph,
-        "mean_dph": visited.mean_dph,
-        "bound_dph": table.error_bound_dph,
-        "sum_abs_weights_dph": model.sum_abs_weights_dph,
-        "centers": table.n_centers,
-        "wall_s": round(taken, 1),
-    }
-    (BUILD / f"prove-{name}.json").write_text(json.dumps(result, indent=1) + "\n")
-    print(f"{name}: {result}")
+    shown = progress if sys.__stderr__ is not None and sys.__stderr__.isatty() else None
+    visited = visit_all(folder / "c", model, table, progress=shown)
+    results.add(
+        "every_input",
+        {
+            "name": name,
+            "centers": table.n_centers,
+            "inputs": visited.inputs,
+            "mismatches": visited.mismatches,
+            "worst_dph": visited.worst_dph,
+            "arithmetic_dph": visited.arithmetic_dph,
+            "mean_dph": visited.mean_dph,
+            "bound_dph": table.error_bound_dph,
+            "sum_abs_weights_dph": model.sum_abs_weights_dph,
+            "wall_s": round(time.monotonic() - start, 1),
+        },
+    )
     assert visited.mismatches == 0, visited.first
     assert visited.inputs == (inputs or visited.inputs) > 2**31
     assert visited.worst_dph <= table.error_bound_dph
@@ -62,7 +67,29 @@ def test_every_input_agrees_and_keeps_the_bound(
     assert visited.arithmetic_dph <= arithmetic
 
 
-def test_every_argument_of_the_float32_gaussian(tmp_path: Path) -> None:
+def test_every_argument_of_the_float32_gaussian(tmp_path: Path, results: Results) -> None:
     visited, wrong, worst = _run("primitives_f32", tmp_path)["gauss"]
+    _add(results, "float32 Gaussian", visited, wrong)
     assert (int(visited), wrong) == (0x45800000, "0")
     assert float(worst) <= F32_GAUSS_ERROR
+
+
+def test_every_float32_number_is_told_from_a_missing_one(tmp_path: Path, results: Results) -> None:
+    """What the proofs of the step functions take for granted (tests/prove/eva/step.c)."""
+    visited, wrong = _run("primitives_f32", tmp_path)["missing"]
+    _add(results, "float32: missing or not", visited, wrong)
+    assert (int(visited), wrong) == (2**32, "0")
+
+
+@pytest.mark.parametrize("half", [0, 1], ids=["long multiply", "16-bit halves"])
+def test_every_argument_of_the_fixed_point_gaussian(half: int, tmp_path: Path, results: Results) -> None:
+    """Of the other primitives: every input of some ranges, corners and random arguments."""
+    found = _run("primitives_q31", tmp_path, half=half)
+    for name, (visited, wrong, *_) in found.items():
+        _add(results, f"fixed point, {'16-bit halves' if half else 'long multiply'}: {name}", visited, wrong)
+    assert {words[1] for words in found.values()} == {"0"}
+    assert int(found["gauss"][0]) == 2**29
+
+
+def _add(results: Results, name: str, visited: str, wrong: str) -> None:
+    results.add("primitives", {"name": name, "arguments": int(visited), "differ": int(wrong)})

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from emitted import emitted, spoil
+from results import Results
 
 HERE = Path(__file__).resolve().parent / "eva"
 OPTIONS = ["-eva", "-warn-signed-overflow", "-warn-signed-downcast", "-warn-special-float", "none"]
@@ -49,14 +50,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("machine", ["gcc_x86_64", "gcc_x86_16"])
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("part", PARTS)
-def test_no_alarm(part: str, numeric: str, machine: str, folder: Path) -> None:
+def test_no_alarm(part: str, numeric: str, machine: str, folder: Path, results: Results) -> None:
     output = _analysed(folder, part, numeric, machine)
+    record = {"part": part, "numeric": numeric, "machine": machine, "alarms": _alarms(output)}
     assert _alarms(output) == 0, re.findall(r"alarm\].*(?:\n .*)*", output)
     assert "100% of the logical properties reached have been proven" in output
     assert "User Error" not in output and "NON TERMINATING" not in output
     checks = re.search(r"Assertions +(\d+) valid +0 unknown +0 invalid", output)
     assert checks is not None
     assert int(checks[1]) == {"map": 1, "mean": 0, "slope": 2, "step": 16}[part]
+    reached = re.search(r"(\d+) statements reached", output)
+    assert reached is not None
+    results.add("run_time_errors", record | {"checks": int(checks[1]), "reached": int(reached[1])})
 
 
 @pytest.mark.parametrize(
