@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 
-from .commands import app
 from .errors import GyrotcError
 
 
@@ -15,14 +14,26 @@ def main() -> None:
     Arrow's read-ahead threads may still hold a Python file when the interpreter goes; it would end them inside C++
     code, which aborts the process after its work is done.
     """
+    _single_threaded()
     status = _status()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)
 
 
+def _single_threaded() -> None:
+    """One thread of BLAS unless the user says otherwise; read when numpy is first imported.
+
+    The matrices here are small: more threads gain nothing, and on a busy machine they cost many times the work.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
 def _status() -> int:
     """Runs the command; errors become one message on stderr and their exit status."""
+    from .commands import app
+
     try:
         app(standalone_mode=True)
     except GyrotcError as error:

@@ -91,11 +91,12 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
     ]
 
 
-def fine_columns(records: Records) -> Array:
-    """Local functions of T, spacing 2.5 C over the recorded range, as block means, shape (N, k)."""
+def fine_columns(records: Records, spacing_c: float = _FINE_C) -> Array:
+    """Local functions of T over the recorded range, as block means, shape (N, k); none that is zero."""
     low = min(float(r.history.temperature_c.min()) for r in records.runs)
     high = max(float(r.history.temperature_c.max()) for r in records.runs)
-    nodes = np.arange(low, high + _FINE_C, _FINE_C)
-    return records.columns(
-        lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / _FINE_C)
+    nodes = np.arange(low, high + spacing_c, spacing_c)
+    columns = records.columns(
+        lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / spacing_c)
     )
+    return columns[:, columns.max(axis=0) > 0.0]

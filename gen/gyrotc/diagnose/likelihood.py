@@ -143,10 +143,14 @@ class Gains:
 
     def single(self) -> Iterator[Point]:
         """All models of one candidate."""
-        yield from self._on(self.base, ())
+        yield from self.added()
         for base in self.bases():
             assert base.candidate is not None
             yield Point((base.candidate,), base.gain)
+
+    def added(self) -> Iterator[Point]:
+        """Those models of one candidate that leave the map's input as it is."""
+        yield from self._on(self.base, ())
 
     def pairs(self) -> Iterator[Point]:
         """All models of two candidates of which at most one changes the input."""

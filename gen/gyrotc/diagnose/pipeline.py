@@ -154,7 +154,7 @@ def needs_finer(search: Search) -> bool:
     bank: Bank = search.bank
     finer = gains.whiten(bank.finer)
     best = max(
-        (p for p in gains.single() if p.members[0].id == "path_length_periodicity"), key=lambda p: p.gain
+        (p for p in gains.added() if p.members[0].id == "path_length_periodicity"), key=lambda p: p.gain
     )
     wave = columns_of(search.records, best.members[0].id, best.members[0].values)
     memory = np.column_stack(

@@ -23,6 +23,7 @@ _ROUNDS = 2
 _HALF_95 = 3.84
 _STEP = 0.02  # relative step of the derivative to a parameter
 _NORMAL_95 = 1.96
+_FINEST_C = 1.25  # spacing of the map's local functions once it is named too coarse
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ def _columns(search: Search, candidate: Candidate) -> Array:
     if candidate.role == "input":
         return replaced_map(records, search.bank.basis, candidate)[0]
     if candidate.id == "map_too_coarse":
-        return fine_columns(records)
+        return fine_columns(records, _FINEST_C)
     if candidate.channel is not None:
         return records.average([r.channels[candidate.channel] for r in records.runs])[:, None]
     return columns_of(records, candidate.id, candidate.values)
