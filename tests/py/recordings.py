@@ -284,6 +284,10 @@ REFUSED: dict[str, Refused] = {
         ("field earth_rate", "'yes'", "'removed'", "'compute'"),
     ),
     "no runs": Refused(lambda folder: _only_toml(folder, HEAD), ("dataset.toml, field run", "missing")),
+    "empty list of runs": Refused(
+        lambda folder: _only_toml(folder, HEAD + "\nrun = []"),
+        ("dataset.toml, field run", "is empty", "at least one [[run]]"),
+    ),
     "no training run": Refused(
         description(RUN + '\nrole = "exam"'), ("dataset.toml", "no run has the role train")
     ),
@@ -300,6 +304,10 @@ REFUSED: dict[str, Refused] = {
     "unknown kind of file": Refused(description('file = "run-01.xls"'), (".csv or .parquet",)),
     "same file twice": Refused(
         description(RUN, RUN), ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1")
+    ),
+    "same file in two spellings": Refused(
+        description(RUN, 'file = "./run-01.csv"'),
+        ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1"),
     ),
     "same span twice": Refused(
         description(*[RUN + "\nfrom_s = 0.0\nto_s = 500.0"] * 2), ("run 2 (run-01.csv)", "overlaps")

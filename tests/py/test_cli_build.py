@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -162,27 +159,6 @@ def test_usage_errors_exit_2_and_help_shows_an_example(gyrotc: Command, tmp_path
         done = gyrotc(command, "--help")
         assert done.returncode == 0
         assert "Example: gyrotc" in done.stdout
-
-
-def test_a_kill_at_any_moment_leaves_no_half_written_result(demo: Path, tmp_path: Path) -> None:
-    """The result folder appears whole or not at all, whenever the job is killed."""
-    rng = np.random.default_rng()
-    seed = int(rng.integers(2**32))
-    print("seed", seed)
-    rng = np.random.default_rng(seed)
-    program = Path(sys.executable).with_name("gyrotc")
-    for trial in range(6):
-        out = tmp_path / f"r{trial}"
-        job = subprocess.Popen(
-            [program, "build", demo / "data", "--out", out],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
-        time.sleep(float(rng.uniform(0.3, 8.0)))
-        os.killpg(job.pid, signal.SIGKILL)
-        job.wait()
-        if out.exists():
-            assert (out / "report.html").is_file() and (out / "manifest.json").is_file()
-            assert load_model(out / "model.json").serial == "SIM-0001"
 
 
 def _three_axes(source: Path, folder: Path) -> None:

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
+from gyrotc.build import build
+from gyrotc.errors import InputError
+from gyrotc.fitting import FitOptions
 from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv
 
 
@@ -49,6 +52,19 @@ def test_what_is_refused_writes_nothing(case: str, command: str, tmp_path: Path,
     assert done.returncode == 2, done.stdout
     assert all(part in done.stderr for part in refused.message)
     assert done.stderr.count("\n") == 1, "one message"
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_build_refuses_every_case_before_it_writes(case: str, tmp_path: Path) -> None:
+    """The job itself, without a process for each."""
+    refused = REFUSED[case]
+    folder = tmp_path / refused.folder
+    refused.make(folder)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError) as caught:
+        build(folder, tmp_path / "out", FitOptions())
+    assert "\n" not in str(caught.value)
     assert sorted(tmp_path.rglob("*")) == before
 
 

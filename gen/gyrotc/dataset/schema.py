@@ -49,12 +49,13 @@ def check_serial(serial: str) -> str:
 
 
 def _plain_name(name: str) -> str:
+    """The name in one spelling, so that one file has one name."""
     path = Path(name)
     if path.is_absolute() or ".." in path.parts or "\x00" in name or "\\" in name:
         raise PydanticCustomError("file", "a file inside the folder of the data set")
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise PydanticCustomError("file", "a name that ends in .csv or .parquet")
-    return name
+    return path.as_posix()
 
 
 def _instant(value: object) -> object:
@@ -188,9 +189,10 @@ def parse_description(path: Path, problems: Problems) -> Description | None:
         try:
             return Description.model_validate(_tuples(content))
         except ValidationError as error:
-            for detail in error.errors():
+            details = _causes(error.errors())
+            for detail in details:
                 problems.add(_wrong_field(detail, content))
-            if not all(_dropped(content, detail) for detail in error.errors()):
+            if not all(_dropped(content, detail) for detail in details):
                 return None
     return None
 
@@ -207,6 +209,12 @@ def _content(path: Path) -> dict[str, Any]:
         raise InputError(FILE, f"no UTF-8 text ({error.reason})", "a TOML file") from error
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(FILE, f"no TOML: {error}", "a TOML file") from error
+
+
+def _causes(details: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Without what only follows: a wrong run does not count, and then there may be too few."""
+    wrong_run = any(d["loc"][0] == "run" and len(d["loc"]) > 1 for d in details)
+    return [d for d in details if not (wrong_run and d["type"] == "too_short" and d["loc"] == ("run",))]
 
 
 def _dropped(content: dict[str, Any], detail: ErrorDetails) -> bool:
@@ -237,6 +245,8 @@ def _wrong_field(detail: ErrorDetails, content: dict[str, Any]) -> InputError:
         return InputError(where, "is missing", f"{detail['loc'][-1]} = ...")
     if kind == "extra_forbidden":
         return InputError(where, "is not known", "a field named in docs/recordings.md (a typing error?)")
+    if kind == "too_short":
+        return InputError(where, "is empty", "at least one [[run]]")
     expected = re.sub(r"^Input should be |^Value error, ", "", detail["msg"])
     return InputError(where, _shown(detail["input"]), expected)
 
