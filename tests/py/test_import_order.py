@@ -44,6 +44,8 @@ ORDER = [
     "report",
     "diagnosis_page",
     "diagnosis",
+    "plan_plots",
+    "plan_page",
     "paper",
     "comparison",
     "triad",

@@ -175,3 +175,5 @@ def diagnose(
     write_json(json_file, result)
     for line in diagnosis_lines(result):
         tell(line)
+    if out is not None:
+        tell(f"report: {out / 'report.html'}")

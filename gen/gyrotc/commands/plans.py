@@ -1,0 +1,62 @@
+"""Before anything is recorded: plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .base import OUT, JsonOption, SeedOption, app, progress, tell, write_json
+from .plan_lines import limits_of, pair_of, plan_parts
+
+
+@app.command()
+def plan(
+    profile: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
+    noise: Annotated[
+        str, typer.Option("--noise", help="paper, or class, where the scenario gives none.")
+    ] = "paper",
+    seed: SeedOption = 1,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--require",
+            help="A limit to reach, e.g. hysteresis=5e-5; repeatable. Gives the shortest profile.",
+        ),
+    ] = None,
+    separate: Annotated[
+        str | None,
+        typer.Option(
+            "--separate", help="Two causes, e.g. hysteresis,turn_on_offset: which further run parts them."
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """What a programmed profile will be able to tell, before it is run.
+
+    Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
+    """
+    from ..plan import plan as run
+    from ..plan_page import write_plan
+
+    with progress() as say:
+        result = run(
+            profile,
+            noise=noise,  # type: ignore[arg-type]
+            seed=seed,
+            required=limits_of(require or ()),
+            pair=pair_of(separate),
+            progress=say,
+        )
+    write_json(json_file, result)
+    if out is not None:
+        write_plan(out, result)
+    for part in plan_parts(result):
+        if isinstance(part, str):
+            tell(part)
+        else:
+            OUT.print(part)
+    if out is not None:
+        tell(f"report: {out / 'report.html'}")

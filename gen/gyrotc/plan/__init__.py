@@ -1,0 +1,169 @@
+"""`gyrotc plan`: what a programmed profile will be able to tell, before the chamber is booked.
+
+The temperatures come from the simulation of chamber and gyro, the rest from the search that `diagnose` would
+make on them: detection limits, separability, how well the map will be known after how many hours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__, terms
+from ..diagnose.records import Record
+from ..diagnose.words import separate_by
+from ..simulate.campaign import Noise
+from .programme import Programme, programme_of
+from .sensitivity import Sensitivity
+from .separate import Row, additions, separability
+from .shortest import shortest
+
+__all__ = ["plan"]
+
+_AVERAGE_S = 100.0
+_PICTURE_POINTS = 200
+_HARD = 10.0  # d above which two causes count as hard to tell apart
+
+
+def plan(
+    scenario: str | Path,
+    *,
+    noise: Noise = "paper",
+    seed: int = 1,
+    required: Mapping[str, float] | None = None,
+    pair: tuple[str, str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """The JSON object of `gyrotc plan`.
+
+    Args:
+        scenario: Profiles: a scenario that comes with gyrotc, or a TOML file.
+        noise: Levels where the scenario gives none.
+        seed: Draws the simulated gyro, on whose bias the limits of `cavity_lag` and `time_misalignment` depend.
+        required: Detection limits to reach, by cause, for the shortest profile.
+        pair: Two causes; further runs are ranked by how they part them.
+        progress: Called with what is being done.
+
+    Raises:
+        InputError: A scenario, profile or cause that cannot be.
+    """
+    say = progress or (lambda _: None)
+    say("simulating the profile")
+    programme = programme_of(scenario, noise=noise, seed=seed)
+    say("computing signatures")
+    sensitivity = Sensitivity(programme)
+    say("comparing causes")
+    rows = separability(sensitivity)
+    result = _head(programme) | {
+        "runs": [
+            {"profile": run.name, "hours": h, "temperature": _temperature(run)}
+            for run, h in zip(programme.records.runs, programme.hours, strict=True)
+        ],
+        "limits": _limits(sensitivity),
+        "not_testable": dict(sensitivity.bank.untestable),
+        "separability": [{"id": r.id, "parameter": r.parameter, "value": r.value, "d": r.d} for r in rows],
+        "hard_to_separate": list(_hard(rows)),
+        "accuracy": list(_accuracy(sensitivity)),
+        "shortest": None,
+        "additions": None,
+    }
+    if required:
+        say("looking for the shortest profile")
+        found = shortest(sensitivity, required)
+        result["shortest"] = {
+            "required": dict(required),
+            "runs": None if found.runs is None else list(found.runs),
+            "hours": found.hours,
+            "reached": found.reached,
+        }
+    if pair:
+        say("trying further runs")
+        ranked = additions(scenario, pair, noise=noise, seed=seed)
+        result["additions"] = {
+            "pair": list(pair),
+            "runs": [{"profile": name, "hours": hours, "d": d} for name, hours, d in ranked],
+        }
+    return result
+
+
+def _head(programme: Programme) -> dict[str, Any]:
+    noise = programme.declared
+    return {
+        "schema": "gyrotc.plan/1",
+        "gyrotc_version": __version__,
+        "serial": None,
+        "axis": None,
+        "scenario": programme.name,
+        "hours": sum(programme.hours),
+        "noise": {
+            "arw_deg_per_sqrt_h": noise.arw_deg_per_sqrt_h,
+            "bias_instability_dph": noise.bias_instability_dph,
+            "rate_random_walk_dph_per_sqrt_h": noise.rate_random_walk_dph_per_sqrt_h,
+            "quantum_arcsec": noise.quantum_arcsec,
+        },
+        "bias_range_dph": list(programme.bias_range_dph),
+    }
+
+
+def _temperature(run: Record) -> dict[str, list[float]]:
+    """The run's temperature for a picture."""
+    step = max(run.history.time_s.size // _PICTURE_POINTS, 1)
+    return {
+        "time_h": [round(float(t) / 3600.0, 4) for t in run.history.time_s[::step]],
+        "value_c": [round(float(c), 2) for c in run.history.temperature_c[::step]],
+    }
+
+
+def _limits(sensitivity: Sensitivity) -> list[dict[str, Any]]:
+    found = sensitivity.limits()
+    return [
+        {
+            "id": id,
+            "family": terms.CATALOGUE[id].family,
+            "detection_limit": {
+                "value": limit.value,
+                "unit": limit.unit,
+                "parameter": limit.parameter,
+                "over": [list(p) for p in limit.at],
+            },
+        }
+        for id, limit in found.items()
+    ]
+
+
+def _hard(rows: list[Row]) -> list[dict[str, Any]]:
+    """Pairs that need more than d = 10 in either direction, the hardest first, and what would part them."""
+    worst: dict[frozenset[str], tuple[float, str, str]] = {}
+    for row in rows:
+        for other, d in row.d.items():
+            key = frozenset({row.id, other})
+            if d > _HARD and d > worst.get(key, (0.0, "", ""))[0] and other != "map_too_coarse":
+                worst[key] = (d, row.id, other)
+    ranked = sorted(worst.values(), reverse=True)
+    return [{"pair": [a, b], "d": d, "add": separate_by(a, b)} for d, a, b in ranked]
+
+
+def _accuracy(sensitivity: Sensitivity) -> list[dict[str, Any]]:
+    """Predicted accuracy after each run: error of the map over the whole programme, RMS of means over 100 s."""
+    programme = sensitivity.programme
+    floor = float(
+        np.sqrt(programme.declared.colour(_AVERAGE_S).matrix(np.zeros(1, dtype=np.int64), _AVERAGE_S)[0, 0])
+    )
+    out = []
+    hours = np.cumsum(programme.hours)
+    for count in range(1, len(hours) + 1):
+        error = sensitivity.map_error(range(count))
+        rms = float(np.hypot(floor, error))
+        out.append(
+            {
+                "hours": float(hours[count - 1]),
+                "runs": count,
+                "map_error_dph": error,
+                "rms_dph": rms,
+                "rms_over_floor": rms / floor,
+            }
+        )
+    return out
