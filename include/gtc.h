@@ -33,7 +33,8 @@
 extern "C" {
 #endif
 
-/* Semantic version of the functions below. The table layout has a number of its own. */
+/* Semantic version of the functions below. The table layout has a number of its own.
+ * MISRA 2.5: for users; the runtime itself does not ask for it. */
 #define GTC_VERSION_MAJOR 0
 #define GTC_VERSION_MINOR 1
 #define GTC_VERSION_PATCH 0

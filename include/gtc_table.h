@@ -17,27 +17,28 @@
 #include "gtc_config.h"
 
 /* A runtime reads exactly this layout; an emitted file refuses to compile against another. */
-#define GTC_TABLE_LAYOUT 1
+#define GTC_TABLE_LAYOUT 1U
 
 /* First word of a binary image; reads 0x31435447 when the image has the other byte order. */
 #define GTC_IMAGE_MAGIC 0x47544331UL
 
 /* Codes of `quantity` and `unit`. */
-#define GTC_QUANTITY_BIAS 0 /* bias of angular rate */
-#define GTC_UNIT_DEG_PER_H 0
+#define GTC_QUANTITY_BIAS 0U /* bias of angular rate */
+#define GTC_UNIT_DEG_PER_H 0U
 
 /* Kinds of extension terms (first word of a term record). */
-#define GTC_TERM_MEMORY 1    /* first-order memory: cavity_lag (input) and thermal_gradient */
-#define GTC_TERM_PLAY 2      /* play operator: hysteresis */
-#define GTC_TERM_WARM_UP 3   /* exponential in the time since power-on */
-#define GTC_TERM_HARMONIC 4  /* harmonic in T: path_length_periodicity */
-#define GTC_TERM_AUXILIARY 5 /* linear in an auxiliary channel */
+#define GTC_TERM_MEMORY 1U    /* first-order memory: cavity_lag (input) and thermal_gradient */
+#define GTC_TERM_PLAY 2U      /* play operator: hysteresis */
+#define GTC_TERM_WARM_UP 3U   /* exponential in the time since power-on */
+#define GTC_TERM_HARMONIC 4U  /* harmonic in T: path_length_periodicity */
+#define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel */
 
 #if (UINT_LEAST32_MAX != 4294967295U) || (INT_LEAST32_MIN + 1 != -2147483647)
 #error "gtc needs least-width 32-bit integers of just 32 bits, in two's complement"
 #endif
 
-/* One 32-bit word: an unsigned integer, a float32 value, or a signed integer. */
+/* One 32-bit word: an unsigned integer, a float32 value, or a signed integer.
+ * MISRA 19.2 throughout: one array of words is table and flash image for both arithmetics. */
 typedef union {
     uint_least32_t bits;
     float value;
@@ -45,10 +46,10 @@ typedef union {
 } gtc_word_t;
 
 /* Sizes of the records in the arrays below, in words. */
-#define GTC_NETWORK_WORDS 8 /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
-#define GTC_CENTER_WORDS 5  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
-#define GTC_TERM_WORDS 8    /* kind, channel, then six parameters of the kind */
-#define GTC_PROBE_WORDS 4   /* temperature, slope, bias, status */
+#define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
+#define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
+#define GTC_TERM_WORDS 8U    /* kind, channel, then six parameters of the kind */
+#define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
 struct gtc_f32_term_code; /* the functions of one kind of term; private */
 struct gtc_q31_term_code;

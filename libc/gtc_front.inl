@@ -222,10 +222,10 @@ static int FN(is_suspect)(STATE *state, NUM x)
 /* 1 if x may be believed as far as it can be told without the samples around it. */
 static int FN(is_sound)(STATE *state, NUM x)
 {
-    if (FN(is_missing)(x)) {
+    if (FN(is_missing)(x) != 0) {
         return 0;
     }
-    if (FN(is_stuck)(state, x)) {
+    if (FN(is_stuck)(state, x) != 0) {
         return 0;
     }
     return ((x >= NUM_PLAUSIBLE_MIN) && (x <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
@@ -269,7 +269,7 @@ int FN(init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
     state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
     state->received = NUM_MISSING_BITS;
     state->status = GTC_HELD;
-    for (i = 0U; i < GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         state->term[i][0] = FN(missing)();
         state->term[i][1] = FN(missing)();
     }
@@ -299,6 +299,7 @@ int FN(sample)(STATE *state, const NUM *channels)
 
 int FN(missed)(STATE *state, uint_least32_t count)
 {
+    uint_least32_t rest = count;
     uint_least32_t blocks;
     uint_least32_t most;
 
@@ -312,21 +313,21 @@ int FN(missed)(STATE *state, uint_least32_t count)
     most = state->table->hold_blocks + state->table->slope_blocks + 2U;
     blocks = count / state->samples_per_block;
     if (blocks > most) {
-        count -= (blocks - most) * state->samples_per_block;
+        rest -= (blocks - most) * state->samples_per_block;
         FN(pass)(state, blocks - most);
     }
     state->suspects = 0U;
-    FN(hold)(state, count);
-    while (count > 0U) {
+    FN(hold)(state, rest);
+    while (rest > 0U) {
         uint_least32_t step;
 
         if (state->position >= state->samples_per_block) {
             FN(close)(state);
         }
         step = state->samples_per_block - state->position;
-        step = (step < count) ? step : count;
+        step = (step < rest) ? step : rest;
         state->position += step;
-        count -= step;
+        rest -= step;
     }
     return (int)state->status | GTC_HELD;
 }

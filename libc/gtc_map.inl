@@ -10,13 +10,15 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
 {
     uint_least32_t cell[2];
     uint_least32_t index;
+    uint_least32_t rest;
 
     if (table->coverage == NULL) {
         return 1;
     }
     FN(cells)(table, in, table->coverage_cells, cell);
     index = (cell[1] * table->coverage_cells[0]) + cell[0];
-    return (int)((table->coverage[index >> 5].bits >> (index & 31U)) & 1U);
+    rest = table->coverage[index >> 5].bits >> (index & 31U);
+    return ((rest & 1U) != 0U) ? 1 : 0;
 }
 
 int FN(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)

@@ -18,7 +18,9 @@
 #error "the float32 runtime needs IEEE arithmetic: compile without -ffast-math"
 #endif
 
+/* MISRA 20.10: one text gives its names to both arithmetics. */
 #define FN(name) gtc_f32_##name
+
 #define TABLE gtc_f32_table_t
 #define STATE gtc_f32_state_t
 #define EFFECT gtc_f32_effect_t
@@ -64,19 +66,7 @@ static inline float FN(missing)(void)
  * c 2^(-i/64), and i in the bits from which i is subtracted again with the exponent. */
 #define F32_H 0x1.71549ep+6F
 #define F32_G 0x1.0a69ccp+13F
-static const uint_least32_t FN(exp2_table)[64] = {
-    0x3875FE11UL, 0x387557B6UL, 0x3874B8A9UL, 0x387420D7UL, 0x3873902CUL, 0x38730694UL,
-    0x387283FAUL, 0x3872084DUL, 0x38719379UL, 0x3871256BUL, 0x3870BE10UL, 0x38705D57UL,
-    0x3870032BUL, 0x386FAF7DUL, 0x386F6239UL, 0x386F1B4EUL, 0x386EDAABUL, 0x386EA03DUL,
-    0x386E6BF5UL, 0x386E3DC1UL, 0x386E1590UL, 0x386DF352UL, 0x386DD6F6UL, 0x386DC06CUL,
-    0x386DAFA5UL, 0x386DA48FUL, 0x386D9F1CUL, 0x386D9F3CUL, 0x386DA4E0UL, 0x386DAFF7UL,
-    0x386DC075UL, 0x386DD648UL, 0x386DF164UL, 0x386E11B8UL, 0x386E3737UL, 0x386E61D3UL,
-    0x386E917DUL, 0x386EC628UL, 0x386EFFC5UL, 0x386F3E47UL, 0x386F81A1UL, 0x386FC9C5UL,
-    0x387016A6UL, 0x38706837UL, 0x3870BE6BUL, 0x38711935UL, 0x38717889UL, 0x3871DC59UL,
-    0x3872449BUL, 0x3872B140UL, 0x3873223EUL, 0x38739789UL, 0x38741113UL, 0x38748ED3UL,
-    0x387510BBUL, 0x387596C2UL, 0x387620DAUL, 0x3876AEFAUL, 0x38774116UL, 0x3877D722UL,
-    0x38787115UL, 0x38781DC7UL, 0x38776105UL, 0x3876ABCFUL
-};
+extern const uint_least32_t FN(exp2_table)[64];
 
 /* 1.5 * 2^23: what is added to it is rounded to an integer, which then stands in the low bits. */
 #define F32_ROUND 12582912.0F
@@ -180,9 +170,10 @@ GTC_IN_LOOP float FN(gaussian)(float acc, const gtc_word_t *center, const POINT 
 
 /* One network: w0 + linear part + its Gaussians. */
 static inline float FN(network)(const TABLE *table, const gtc_word_t *network,
-                                const gtc_word_t *center, const POINT *in)
+                                const gtc_word_t *centers, const POINT *in)
 {
-    const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
+    const gtc_word_t *center = centers;
+    const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
     float acc = network[1].value;
     float term;
 
@@ -409,15 +400,20 @@ static inline void FN(follow)(float z[2], float x, float gain)
 /* What is left of a difference after so many blocks, each of which takes the share `gain`. */
 static inline float FN(power)(float gain, uint_least32_t blocks)
 {
+    uint_least32_t rest = blocks;
     float factor;
     float left = 1.0F;
 
     factor = 1.0F - gain;
-    for (; (blocks != 0U) && (left > 0x1p-30F); blocks >>= 1) {
-        if ((blocks & 1U) != 0U) {
+    while (rest != 0U) {
+        if ((rest & 1U) != 0U) {
             left = left * factor;
         }
         factor = factor * factor;
+        rest >>= 1;
+        if (left <= 0x1p-30F) {
+            rest = 0U;
+        }
     }
     left = 1.0F - left;
     return left;

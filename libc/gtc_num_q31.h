@@ -15,7 +15,9 @@
 #include <arm_acle.h>
 #endif
 
+/* MISRA 20.10: one text gives its names to both arithmetics. */
 #define FN(name) gtc_q31_##name
+
 #define TABLE gtc_q31_table_t
 #define STATE gtc_q31_state_t
 #define EFFECT gtc_q31_effect_t
@@ -62,28 +64,16 @@ static inline int_least32_t FN(missing)(void)
  * The table also makes up for the truncation of t: its errors go to both sides alike. */
 #define Q31_H 1557473452U
 #define Q31_G 558709134U
-static const uint_least32_t FN(exp2_table)[65] = {
-    0x7A54FA4FUL, 0x7903A1B7UL, 0x77B5EB65UL, 0x766BCD55UL, 0x75253D9BUL, 0x73E2326BUL,
-    0x72A2A211UL, 0x716682F3UL, 0x702DCB94UL, 0x6EF87291UL, 0x6DC66E9EUL, 0x6C97B68CUL,
-    0x6B6C4143UL, 0x6A4405C6UL, 0x691EFB2EUL, 0x67FD18B0UL, 0x66DE5597UL, 0x65C2A947UL,
-    0x64AA0B3AUL, 0x63947305UL, 0x6281D84FUL, 0x617232DCUL, 0x60657A82UL, 0x5F5BA730UL,
-    0x5E54B0EAUL, 0x5D508FCBUL, 0x5C4F3C03UL, 0x5B50ADD7UL, 0x5A54DDA4UL, 0x595BC3DAUL,
-    0x586558FCUL, 0x577195A6UL, 0x56807285UL, 0x5591E85CUL, 0x54A5F000UL, 0x53BC825CUL,
-    0x52D5986EUL, 0x51F12B46UL, 0x510F3408UL, 0x502FABEBUL, 0x4F528C39UL, 0x4E77CE4FUL,
-    0x4D9F6B99UL, 0x4CC95D9AUL, 0x4BF59DE3UL, 0x4B242619UL, 0x4A54EFF1UL, 0x4987F533UL,
-    0x48BD2FB7UL, 0x47F49966UL, 0x472E2C3AUL, 0x4669E23EUL, 0x45A7B58DUL, 0x44E7A051UL,
-    0x44299CC8UL, 0x436DA53BUL, 0x42B3B406UL, 0x41FBC393UL, 0x4145CE5DUL, 0x4091CEECUL,
-    0x3FDFBFDAUL, 0x3F2F9BCCUL, 0x3E815D7AUL, 0x3DD4FFA7UL,
-    Q31_G,
-};
+extern const uint_least32_t FN(exp2_table)[65];
 
 /* u in 2^-24, below 32; 2^-u is 0 in 2^-29. */
-#define Q31_LAST 0x1FFFFFFF
+#define Q31_LAST 0x1FFFFFFFU
 
 /* ---- products, in halves of 16 bits where a core has no long multiplication */
 
 #if GTC_HALF_MULTIPLY
-/* floor(x / 2^16); what >> does to a negative number is up to the compiler, but all do the same. */
+/* floor(x / 2^16).
+ * MISRA 10.1: what >> does to a negative number is up to the compiler; the first half asks which it is. */
 static inline int_least32_t FN(upper)(int_least32_t x)
 {
     return ((-1 >> 1) == -1) ? (x >> 16) : ((int_least32_t)((FN(bits)(x) ^ 0x80000000U) >> 16) - 32768);
@@ -130,15 +120,15 @@ GTC_IN_LOOP uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
     const uint_least32_t q1 = q >> 16;
     const uint_least32_t low_p = p0 * p0;
     const uint_least32_t low = low_p + (q0 * q0);
-    const uint_least32_t carry = (low < low_p) ? 0x8000U : 0U;
+    const uint_least32_t carry = (uint_least32_t)(low < low_p) << 15;
     const uint_least32_t cross = (p0 * p1) + (q0 * q1) + (low >> 17) + carry;
 
     return (p1 * p1) + (q1 * q1) + (cross >> 15);
 #else
-    const uint_least64_t sum = (uint_least64_t)((int_least64_t)a * a)
-                               + (uint_least64_t)((int_least64_t)b * b);
+    const int_least64_t p = (int_least64_t)a * a;
+    const int_least64_t q = (int_least64_t)b * b;
 
-    return (uint_least32_t)(sum >> 32);
+    return (uint_least32_t)(((uint_least64_t)p + (uint_least64_t)q) >> 32);
 #endif
 }
 
@@ -152,15 +142,16 @@ typedef struct {
 
 GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
-    const int_least32_t w0 = (int_least32_t)(FN(bits)(w) & 0xFFFFU);
+    const uint_least32_t w0 = FN(bits)(w) & 0xFFFFU;
     const int_least32_t w1 = FN(upper)(w);
-    const int_least32_t e0 = e & 0xFFFF;
-    const int_least32_t e1 = e >> 16;
-    const uint_least32_t carry = ((uint_least32_t)w0 * (uint_least32_t)e0) >> 16;
-    const int_least32_t middle = (w1 * e0) + (w0 * e1) + (int_least32_t)carry;
+    const uint_least32_t e0 = FN(bits)(e) & 0xFFFFU;
+    const int_least32_t e1 = FN(upper)(e);
+    const uint_least32_t carry = (w0 * e0) >> 16;
+    const int_least32_t middle = (w1 * (int_least32_t)e0) + ((int_least32_t)w0 * e1) + (int_least32_t)carry;
+    const int_least32_t high = (w1 * e1) + FN(upper)(middle);
     const uint_least32_t low = (uint_least32_t)w * (uint_least32_t)e;
 
-    sum.high += (uint_least32_t)((w1 * e1) + FN(upper)(middle));
+    sum.high += (uint_least32_t)high;
     sum.low += low;
     sum.high += (sum.low < low) ? 1U : 0U;
     return sum;
@@ -193,9 +184,10 @@ GTC_IN_LOOP int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
 {
     const uint_least32_t v = Q31_H - ((u << 14) >> 8);
     const uint_least32_t s = FN(high_of_square)(v) + g;
+    const uint_least32_t e = FN(high)(FN(exp2_table)[(u >> 18) & 63U], s) >> (u >> 24);
 
     GTC_ASSERT_RANGE((u <= Q31_LAST) && (v <= Q31_H) && (s >= Q31_G));
-    return (int_least32_t)FN(high)(FN(exp2_table)[(u >> 18) & 63U], s) >> (u >> 24);
+    return (int_least32_t)e;
 }
 
 /* The inputs of a network: 0 ... 2^16 - 1 over the envelope. */
@@ -278,14 +270,15 @@ GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
 
 /* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
  * larger. A file of its own, because few tables need it. */
-FN(sum_t) FN(narrow)(FN(sum_t) sum, const gtc_word_t *center, const gtc_word_t *end,
-                          uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
+FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_t *end,
+                     uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
 
 /* One network: w0 + linear part + its Gaussians. */
 static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
-                                        const gtc_word_t *center, const POINT *in)
+                                        const gtc_word_t *centers, const POINT *in)
 {
-    const gtc_word_t *const end = &center[network[0].bits * GTC_CENTER_WORDS];
+    const gtc_word_t *center = centers;
+    const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
     /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
     const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
     FN(sum_t) sum = {0};
@@ -320,9 +313,9 @@ static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *ne
 static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
 {
     const uint_least64_t magnitude = (num < 0) ? (uint_least64_t)(-num) : (uint_least64_t)num;
-    const int_least64_t q = (int_least64_t)((magnitude + (den / 2U)) / den);
+    const uint_least64_t q = (magnitude + (den / 2U)) / den;
 
-    return (num < 0) ? -q : q;
+    return (num < 0) ? -(int_least64_t)q : (int_least64_t)q;
 }
 
 /* ---- the bank of networks --------------------------------------------------------------- */
@@ -361,9 +354,13 @@ static inline int_least32_t FN(lesser)(int_least32_t a, int_least32_t b)
 /* Where x is on the way between two different positions, in 2^-24; 0 before `from`. */
 static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, int_least32_t to)
 {
-    const int_least32_t way = (to > from) ? (x - from) : (from - x);
-    const int_least32_t whole = (to > from) ? (to - from) : (from - to);
+    int_least32_t way = x - from;
+    int_least32_t whole = to - from;
 
+    if (whole < 0) {
+        way = -way;
+        whole = -whole;
+    }
     return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
 }
 
@@ -458,8 +455,10 @@ static inline int_least32_t FN(parameter)(const STATE *state, uint_least32_t ter
 /* floor(x / 2^n) */
 static inline int_least64_t FN(floored)(int_least64_t x, uint_least32_t n)
 {
-    return (x >= 0) ? (int_least64_t)((uint_least64_t)x >> n)
-                    : (-(int_least64_t)((uint_least64_t)(-(x + 1)) >> n) - 1);
+    const int_least64_t magnitude = (x >= 0) ? x : (-1 - x);
+    const uint_least64_t whole = (uint_least64_t)magnitude >> n;
+
+    return (x >= 0) ? (int_least64_t)whole : (-1 - (int_least64_t)whole);
 }
 
 /* First-order memory: z in 2^-16 C, and its fraction in 2^-32 C. */
@@ -485,14 +484,15 @@ static inline int_least32_t FN(power)(int_least32_t gain, uint_least32_t blocks)
 {
     uint_least32_t factor = 0x7FFFFFFFU - (uint_least32_t)gain;
     uint_least32_t left = 0x7FFFFFFFU;
+    uint_least32_t rest;
 
-    for (; blocks != 0U; blocks >>= 1) {
-        if ((blocks & 1U) != 0U) {
+    for (rest = blocks; rest != 0U; rest >>= 1) {
+        if ((rest & 1U) != 0U) {
             left = (uint_least32_t)(((uint_least64_t)left * factor) >> 31);
         }
         factor = (uint_least32_t)(((uint_least64_t)factor * factor) >> 31);
     }
-    return (int_least32_t)(0x7FFFFFFFU - left);
+    return 0x7FFFFFFF - (int_least32_t)left;
 }
 
 /* factor (a - b), factor in units of the bias for each C */
@@ -525,8 +525,9 @@ static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, i
     const int_least64_t turns = FN(floored)((int_least64_t)x * frequency, 16U) + phase;
     const uint_least32_t part = (uint_least32_t)((uint_least64_t)turns & 0xFFFFFFFFU);
     /* A quarter turn less the distance from the nearest whole turn. */
-    const int_least64_t t = 1073741824 - (int_least64_t)((part > 0x80000000U) ? (0U - part) & 0xFFFFFFFFU : part);
-    const int_least64_t s = (t * t) >> 30;
+    const uint_least32_t back = (0U - part) & 0xFFFFFFFFU;
+    const int_least64_t t = 1073741824 - (int_least64_t)((part > 0x80000000U) ? back : part);
+    const int_least64_t s = FN(floored)(t * t, 30U);
     int_least64_t h = 161942;
 
     h = FN(floored)(h * s, 30U) - 5016767;

@@ -84,7 +84,7 @@ static void FN(find_code)(TABLE *table)
     };
     uint_least32_t i;
 
-    for (i = 0U; (i < table->n_terms) && (i < GTC_MAX_TERMS); i++) {
+    for (i = 0U; (i < table->n_terms) && (i < (uint_least32_t)GTC_MAX_TERMS); i++) {
         const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
 
         if ((kind >= 1U) && (kind <= 5U)) {

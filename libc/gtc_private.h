@@ -3,6 +3,9 @@
  * The functions are external only because they live in files of their own; they are not part of
  * the interface and may change at any time.
  *
+ * MISRA 15.5 throughout: wrong arguments, and cases that end early, leave a function at once; what
+ * follows need not be indented for them.
+ *
  * SPDX-License-Identifier: MIT
  */
 #ifndef GTC_PRIVATE_H_INCLUDED

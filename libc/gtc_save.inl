@@ -14,6 +14,7 @@
     (ARITHMETIC + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
 
 #define SAVE_HEAD 3U
+#define CRC_AT (GTC_SAVE_WORDS - 1)
 
 /* Where the next word goes to, or, if that is NULL, comes from. */
 typedef struct {
@@ -76,7 +77,7 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
     FN(carry)(at, &state->mean);
     FN(carry)(at, &state->bias);
     FN(carry_wide)(at, &state->sum);
-    for (i = 0U; i < GTC_MAX_SLOPE_BLOCKS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         FN(carry)(at, &state->window[i]);
     }
 }
@@ -88,7 +89,7 @@ static void FN(carry_terms)(FN(cursor_t) *at, STATE *state)
 
     FN(carry_bits)(at, &state->elapsed);
     FN(carry_bits)(at, &state->off_blocks);
-    for (i = 0U; i < GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         FN(carry)(at, &state->term[i][0]);
         FN(carry)(at, &state->term[i][1]);
         FN(carry_wide)(at, &state->channel[i]);
@@ -114,7 +115,7 @@ static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
 {
-    return gtc_crc_words(GTC_CRC_START, words, GTC_SAVE_WORDS - 1U) ^ GTC_CRC_FINAL;
+    return gtc_crc_words(GTC_CRC_START, words, CRC_AT) ^ GTC_CRC_FINAL;
 }
 
 int FN(save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
@@ -129,7 +130,7 @@ int FN(save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
     words[1].bits = SAVE_OPTIONS;
     words[2].bits = state->table->crc;
     FN(carry_state)(&copy, &words[SAVE_HEAD], NULL);
-    words[GTC_SAVE_WORDS - 1U].bits = FN(save_crc)(words);
+    words[CRC_AT].bits = FN(save_crc)(words);
     return GTC_OK;
 }
 
@@ -139,7 +140,7 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
     int status = GTC_OK;
 
     if ((words[0].bits != SAVE_MAGIC)
-        || (words[GTC_SAVE_WORDS - 1U].bits != FN(save_crc)(words))) {
+        || (words[CRC_AT].bits != FN(save_crc)(words))) {
         status = GTC_E_IMAGE;
     } else if (words[1].bits != SAVE_OPTIONS) {
         status = GTC_E_LAYOUT;
@@ -156,9 +157,10 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
 static void FN(outlast)(STATE *state, const STATE *saved, uint_least32_t off_blocks)
 {
     const uint_least32_t before = (saved->gap == 0U) ? saved->off_blocks : 0U;
+    const uint_least32_t room = 0xFFFFFFFFUL - before;
     uint_least32_t i;
 
-    state->off_blocks = ((0xFFFFFFFFUL - before) > off_blocks) ? (before + off_blocks) : 0xFFFFFFFFUL;
+    state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
     for (i = 0U; i < state->table->n_terms; i++) {
         if (state->table->term_code[i]->survives != 0U) {
             state->term[i][0] = saved->term[i][0];

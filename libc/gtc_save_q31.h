@@ -15,7 +15,7 @@ static void FN(to_words)(int_least64_t x, gtc_word_t words[2])
 
 static int_least64_t FN(from_words)(const gtc_word_t words[2])
 {
-    return ((int_least64_t)words[1].integer * 4294967296) + words[0].bits;
+    return ((int_least64_t)words[1].integer * 4294967296) + (int_least64_t)words[0].bits;
 }
 
 static void FN(angle_to_words)(const STATE *state, gtc_word_t words[2])

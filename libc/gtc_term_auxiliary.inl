@@ -18,10 +18,10 @@ static void FN(auxiliary_take)(STATE *state, uint_least32_t i, NUM x)
     NUM *const mean = &state->term[i][0];
     NUM *const base = &state->term[i][1];
 
-    if (FN(is_missing)(x)) {
+    if (FN(is_missing)(x) != 0) {
         return;
     }
-    if (FN(is_missing)(*mean)) {
+    if (FN(is_missing)(*mean) != 0) {
         *mean = x;
     }
     if (state->channel_valid[i] == 0U) {
@@ -51,7 +51,7 @@ static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFF
     const NUM reference = FN(parameter)(state, i, 1U);
 
     (void)x;
-    if (FN(is_missing)(state->term[i][1])) {
+    if (FN(is_missing)(state->term[i][1]) != 0) {
         effect->remarks |= GTC_HELD;
     }
     if (!FN(is_missing)(state->term[i][0])) {

@@ -10,7 +10,7 @@ static void FN(memory_begin)(STATE *state, uint_least32_t i, NUM x)
 {
     NUM *const z = state->term[i];
 
-    if (FN(is_missing)(z[0])) {
+    if (FN(is_missing)(z[0]) != 0) {
         FN(settle)(z, x);
     } else {
         FN(follow)(z, x, FN(power)(FN(parameter)(state, i, 0U), state->off_blocks));

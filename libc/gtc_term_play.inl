@@ -24,7 +24,7 @@ static void FN(play_step)(STATE *state, uint_least32_t i, NUM x)
 
 static void FN(play_begin)(STATE *state, uint_least32_t i, NUM x)
 {
-    if (FN(is_missing)(state->term[i][0])) {
+    if (FN(is_missing)(state->term[i][0]) != 0) {
         state->term[i][0] = x;
     }
     FN(play_step)(state, i, x);

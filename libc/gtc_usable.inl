@@ -31,7 +31,7 @@ static int FN(arrays_fit)(const TABLE *table)
 {
     return (FN(fits)(table->networks, table->n_networks, MAX_NETWORKS)
             && FN(fits)(table->centers, table->n_centers, MAX_CENTERS)
-            && FN(fits)(table->terms, table->n_terms, GTC_MAX_TERMS)
+            && FN(fits)(table->terms, table->n_terms, (uint_least32_t)GTC_MAX_TERMS)
             && FN(fits)(table->probes, table->n_probes, MAX_PROBES)
             && FN(grid_fits)(table->coverage, table->coverage_cells)
             && FN(grid_fits)(table->sigma, table->sigma_cells)) ? 1 : 0;
@@ -40,7 +40,7 @@ static int FN(arrays_fit)(const TABLE *table)
 static int FN(settings_fit)(const TABLE *table)
 {
     return ((table->quantity == GTC_QUANTITY_BIAS) && (table->unit == GTC_UNIT_DEG_PER_H)
-            && (table->slope_blocks >= 2U) && (table->slope_blocks <= GTC_MAX_SLOPE_BLOCKS)
+            && (table->slope_blocks >= 2U) && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
             && (table->hold_blocks >= 1U) && (table->hold_blocks <= MAX_HOLD_BLOCKS)
             && (table->stuck_samples <= MAX_STUCK_SAMPLES)) ? 1 : 0;
 }
@@ -82,7 +82,7 @@ static int FN(terms_fit)(const TABLE *table)
             return 0;
         }
     }
-    return ((table->n_channels >= 1U) && (table->n_channels <= (1U + GTC_MAX_TERMS))) ? 1 : 0;
+    return ((table->n_channels >= 1U) && (table->n_channels <= (1U + (uint_least32_t)GTC_MAX_TERMS))) ? 1 : 0;
 }
 
 /* One network, or several where the code of the hand-over is there. */
