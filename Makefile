@@ -71,8 +71,12 @@ bench: setup
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
+## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
+blind: setup
+	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $(if $(SEED),--seed $(SEED))
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check picture paper real bench clean
+.PHONY: help setup demo test targets prove check picture paper real bench blind clean

@@ -14,6 +14,7 @@ from scipy.linalg import solve_triangular
 
 from . import chamber, effects, noise
 from .effects import Scene
+from .noise import Noise
 
 Array = NDArray[np.float64]
 ROW_S = 10
@@ -82,12 +83,10 @@ class Hidden:
     k: list[float]
     amplitude: list[float]
     parameters: list[dict[str, float]]
-    noise: noise.Noise
+    noise: Noise
     stress: str = ""
-    declared: noise.Noise | None = None  # what the data set says, where it differs from the truth
+    declared: Noise | None = None  # what the data set says, where it differs from the truth
     rows: list[Array] = field(default_factory=list)  # deg/h at 10 s
-    effect_rows: list[Array] = field(default_factory=list)
-    map_rows: list[Array] = field(default_factory=list)
     noise_rows: list[Array] = field(default_factory=list)
 
 
@@ -117,7 +116,7 @@ class Yardstick:
         self.map = left[:, size > 1e-3 * size[0]]
         self.lengths = [x.size for x in t]
 
-    def d(self, effect: list[Array], level: noise.Noise) -> float:
+    def d(self, effect: list[Array], level: Noise) -> float:
         """d of one effect given per run at one second."""
         h = np.concatenate([mean_of(effect[k], BLOCK_S) for k in self.use])
         factor = {n: np.linalg.cholesky(noise.covariance(level, n, BLOCK_S)) for n in set(self.lengths)}
@@ -136,7 +135,7 @@ def draw_recording(
     campaign: Campaign,
     yardstick: Yardstick,
     wanted: list[tuple[str, float]],
-    level: noise.Noise,
+    level: Noise,
     rng: np.random.Generator,
     *,
     stress: str = "",
@@ -165,24 +164,19 @@ def draw_recording(
         truth.amplitude.append(amplitude)
         truth.parameters.append(parameters)
     offset = rng.uniform(-0.01, 0.01)
-    for run, rate, extra in zip(campaign.runs, scene.rates(), total, strict=True):
+    for run, extra in zip(campaign.runs, total, strict=True):
         seen = run.block_c
-        if (
-            stress == "sensor_lag"
-        ):  # the bias knows the temperature before the thermometer does: T = T_s + tau dT_s/dt
+        if stress == "sensor_lag":  # the bias knows T before the thermometer does: T = T_s + tau dT_s/dt
             seen = seen + 60.0 * np.gradient(seen)
-            rate = np.gradient(seen) * 60.0
-        static = offset + contrast * scene.map(seen, rate)
+        static = offset + contrast * scene.map(seen, np.gradient(seen) * 60.0)
         drawn = noise.draw(level, run.block_c.size, rng)
         rows = _stressed(mean_of(drawn, ROW_S), mean_of(run.block_c, ROW_S), stress, level, rng)
         truth.noise_rows.append(rows)
-        truth.map_rows.append(mean_of(static, ROW_S))
-        truth.effect_rows.append(mean_of(extra, ROW_S))
-        truth.rows.append(rows + truth.map_rows[-1] + truth.effect_rows[-1])
+        truth.rows.append(rows + mean_of(static + extra, ROW_S))
     return truth
 
 
-def _stressed(rows: Array, t: Array, stress: str, level: noise.Noise, rng: np.random.Generator) -> Array:
+def _stressed(rows: Array, t: Array, stress: str, level: Noise, rng: np.random.Generator) -> Array:
     """Noise that the tool's model of noise does not foresee."""
     if stress == "outliers":
         sigma = level.white_dph * (100.0 / ROW_S) ** 0.5

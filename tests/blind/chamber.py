@@ -7,6 +7,7 @@ time constant is above 60 s.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +59,7 @@ def draw_unit(rng: np.random.Generator) -> Unit:
     )
 
 
-def steps(start: float, legs: list[tuple[float, float, float]], seconds: int) -> Array:
+def steps(start: float, legs: Sequence[tuple[float, float, float]], seconds: int) -> Array:
     """Programme from (rate C/min, target C, hold s) legs, repeated until `seconds` are filled."""
     out = np.empty(seconds)
     level, n = start, 0

@@ -54,8 +54,7 @@ def orders(total: int, rng: np.random.Generator) -> list[Order]:
         out.append(
             Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),))
         )
-    rng.shuffle(out)  # type: ignore[arg-type]
-    return out
+    return [out[k] for k in rng.permutation(len(out))]
 
 
 def _k(rng: np.random.Generator) -> float:

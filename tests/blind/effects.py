@@ -254,6 +254,25 @@ def dead_zone(scene: Scene, rng: np.random.Generator) -> Effect:
     return out, {}
 
 
+def peak_memory(scene: Scene, rng: np.random.Generator) -> Effect:
+    """The bias keeps a trace of the highest temperature since power-on, which fades."""
+    fade = log_uniform(rng, 4000, 15000)
+    out = []
+    for run in scene.runs:
+        peak, trace = float(run.block_c[0]), np.empty_like(run.block_c)
+        for k, x in enumerate(run.block_c.tolist()):
+            peak = max(x, peak - (peak - x) / fade)
+            trace[k] = peak - x
+        out.append(np.sqrt(np.maximum(trace, 0.0)))
+    return out, {}
+
+
+def rate_heating(scene: Scene, rng: np.random.Generator) -> Effect:
+    """Friction: the square of dT/dt, smoothed, whatever its sign."""
+    tau = log_uniform(rng, 600, 2500)
+    return [follow(r**2, tau, 0.0) for r in scene.rates()], {}
+
+
 def thermometer_drift(scene: Scene, rng: np.random.Generator) -> Effect:
     """The thermometer drifts within each run at random: the map is read at the wrong place."""
     out = []
@@ -297,6 +316,8 @@ FOREIGN: dict[str, Mechanism] = {
     "asymmetric_lag": asymmetric_lag,
     "node_product": node_product,
     "dead_zone": dead_zone,
+    "peak_memory": peak_memory,
+    "rate_heating": rate_heating,
     "thermometer_drift": thermometer_drift,
 }
 FOREIGN_RANDOM: dict[str, Mechanism] = {"telegraph": telegraph, "pulses": pulses, "room_cycle": room_cycle}

@@ -14,6 +14,7 @@ from .effects import FAMILY
 Row = dict[str, Any]
 
 _AVERAGE = 10  # rows of 10 s in 100 s
+_GAINING = ("cavity_lag", "thermal_gradient", "hysteresis", "warm_up", "auxiliary")
 
 
 def grade(
@@ -146,12 +147,8 @@ def _one(low: float, high: float = 1e9, *, offset: bool = False) -> Callable[[Ro
     )
 
 
-def _any(low: float, high: float = 1e9) -> Callable[[Row], bool]:
-    return lambda r: r["stratum"] == "one" and low <= _k(r) < high and r["verdict"] != "consistent"
-
-
-REPRODUCIBLE = ("relay_texture", "creep", "asymmetric_lag", "node_product", "dead_zone")
 RANDOM = ("thermometer_drift", "telegraph", "pulses", "room_cycle")
+UNFORESEEN = ("peak_memory", "rate_heating")
 
 CHECKS: list[Check] = [
     ("false alarm, clean", "≤ 2 %", lambda r: r["stratum"] == "clean", alarmed, 0.02, "max"),
@@ -185,7 +182,7 @@ CHECKS: list[Check] = [
     (
         "family right, k 1.7-2.5",
         "≥ 95 %",
-        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r),
+        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5,
         family_right,
         0.95,
         "min",
@@ -193,7 +190,7 @@ CHECKS: list[Check] = [
     (
         "family right, k ≥ 2.5",
         "≥ 98 %",
-        lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r),
+        lambda r: r["stratum"] == "one" and _k(r) >= 2.5,
         family_right,
         0.98,
         "min",
@@ -201,7 +198,7 @@ CHECKS: list[Check] = [
     (
         "truth in the set, k 1.7-2.5",
         "≥ 90 %",
-        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5 and alarmed(r),
+        lambda r: r["stratum"] == "one" and 1.7 <= _k(r) < 2.5,
         in_set,
         0.90,
         "min",
@@ -209,7 +206,7 @@ CHECKS: list[Check] = [
     (
         "truth in the set, k ≥ 2.5",
         "≥ 95 %",
-        lambda r: r["stratum"] == "one" and _k(r) >= 2.5 and alarmed(r),
+        lambda r: r["stratum"] == "one" and _k(r) >= 2.5,
         in_set,
         0.95,
         "min",
@@ -237,6 +234,14 @@ CHECKS: list[Check] = [
         lambda r: r["stratum"] == "foreign" and _k(r) >= 5,
         lambda r: bool(r["named"]),
         0.02,
+        "max",
+    ),
+    (
+        "... of these, of a kind that the tool has no shape for",
+        "≤ 10 %",
+        lambda r: r["stratum"] == "foreign" and _k(r) >= 2.5 and r["truth"][0] in UNFORESEEN,
+        lambda r: bool(r["named"]),
+        0.10,
         "max",
     ),
     (
@@ -270,89 +275,65 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Every requirement with its count, share, limits, and whether it is met."""
     out: list[dict[str, Any]] = []
     for name, goal, select, hit, bound, kind in CHECKS:
-        chosen = [r for r in rows if select(r)]
-        hits = sum(hit(r) for r in chosen)
-        if chosen:
-            low, high = limits(hits, len(chosen))
-            share = hits / len(chosen)
-            met = share <= bound if kind == "max" else share >= bound
-            out.append(
-                {
-                    "name": name,
-                    "goal": goal,
-                    "hits": hits,
-                    "of": len(chosen),
-                    "share": share,
-                    "low": low,
-                    "high": high,
-                    "met": met,
-                    "bound": bound,
-                    "kind": kind,
-                }
-            )
-    return out + _quantiles(rows)
+        out += _share(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
+    return out + _parameters_met(rows) + _sets(rows) + _gains(rows) + _honesty(rows) + _time(rows)
 
 
-def _quantiles(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Parameters, intervals, sizes of sets, gain, honesty of the printed limits."""
+def _share(name: str, goal: str, hits: Sequence[bool], bound: float, kind: str) -> list[dict[str, Any]]:
+    """A share with its limits; nothing where nothing was counted."""
+    if not hits:
+        return []
+    count, total = int(np.sum(hits)), len(hits)
+    low, high = limits(count, total)
+    share = count / total
+    met = share <= bound if kind == "max" else share >= bound
+    entry = {"name": name, "goal": goal, "hits": count, "of": total, "share": share}
+    return [{**entry, "low": low, "high": high, "met": met}]
+
+
+def _value(name: str, goal: str, value: float, met: bool, of: int) -> list[dict[str, Any]]:
+    return [{"name": name, "goal": goal, "value": value, "met": bool(met), "of": of}]
+
+
+def _parameters_met(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Errors of parameters, and how often their intervals hold the truth, at k ≥ 2.5."""
+    strong = [p for r in rows if r["stratum"] == "one" and _k(r) >= 2.5 for p in r["parameters"]]
     out: list[dict[str, Any]] = []
-    strong = [r for r in rows if r["stratum"] == "one" and _k(r) >= 2.5]
-
-    def add(name: str, goal: str, value: float, met: bool, of: int) -> None:
-        out.append({"name": name, "goal": goal, "value": value, "met": met, "of": of})
-
-    for key, bound, label in (
-        ("tau_s", 0.25, "tau (lag, gradient)"),
-        ("width_c", 0.25, "width"),
-        ("warm_up.tau_s", 0.20, "tau (warm-up)"),
-        ("period_c", 0.02, "period"),
-        ("shift_s", 0.25, "shift"),
-        ("amplitude", 0.15, "amplitude"),
+    for label, bound, wanted in (
+        ("tau of lag and gradient", 0.25, ("cavity_lag.tau_s", "thermal_gradient.tau_s")),
+        ("width", 0.25, ("hysteresis.width_c",)),
+        ("tau of warm-up", 0.20, ("warm_up.tau_s",)),
+        ("period", 0.02, ("path_length_periodicity.period_c",)),
+        ("shift", 0.25, ("time_misalignment.shift_s",)),
+        ("amplitude", 0.15, ("amplitude", "slope")),
     ):
-        errors = [
-            abs(np.log(abs(p["got"] / p["true"]))) if p["got"] * p["true"] > 0 else 9.9
-            for r in strong
-            for p in r["parameters"]
-            if key in p["name"] and (key != "tau_s" or "warm_up" not in p["name"])
-        ]
-        if errors:
-            share = float(np.mean(np.array(errors) <= bound))
-            add(f"{label} within {bound:.0%}, k ≥ 2.5", "≥ 90 %", share, share >= 0.9, len(errors))
-    inside = [p["inside"] for r in strong for p in r["parameters"]]
-    if inside:
-        share = float(np.mean(inside))
-        add("95 % intervals cover", "90-98 %", share, 0.90 <= share <= 0.985, len(inside))
-    sizes = [
-        1 + max((len(e) for e in r["equivalent"]), default=0)
-        for r in rows
-        if r["stratum"] == "one" and _k(r) >= 1.7 and r["named"]
-    ]
-    if sizes:
-        add(
-            "mean size of the set, k ≥ 1.7",
-            "≤ 2",
-            float(np.mean(sizes)),
-            float(np.mean(sizes)) <= 2,
-            len(sizes),
-        )
-    told = [
-        r for r in rows if r["stratum"] == "one" and r["design"] == "separating" and r["named"] and _told(r)
-    ]
-    if told:
-        share = float(np.mean([r["truth"][0] == r["named"][0] for r in told]))
-        add("member right where printed d_sep ≤ d (separating)", "≥ 90 %", share, share >= 0.9, len(told))
-    out += _gains(rows)
-    out += _honesty(rows)
-    seconds = [r["seconds"] for r in rows if r["seconds"]]
-    if seconds:
-        add(
-            "median time of a diagnosis, s (cached bank, machine shared)",
-            "≤ 3",
-            float(np.median(seconds)),
-            float(np.median(seconds)) <= 3.0,
-            len(seconds),
-        )
+        found = [p for p in strong if any(w in p["name"] for w in wanted)]
+        close = [p["got"] * p["true"] > 0 and abs(np.log(p["got"] / p["true"])) <= bound for p in found]
+        out += _share(f"{label} within {bound:.0%}, k ≥ 2.5", "≥ 90 %", close, 0.9, "min")
+    inside = [p["inside"] for p in strong]
+    for entry in _share("95 % intervals cover, k ≥ 2.5", "90-98 %", inside, 0.9, "min"):
+        out.append({**entry, "met": entry["high"] >= 0.9 and entry["low"] <= 0.98})
     return out
+
+
+def _sets(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Sizes of equivalence sets, and members named right where the printed separation says they can be."""
+    named = [r for r in rows if r["stratum"] == "one" and r["named"]]
+    sizes = [1 + max(len(e) for e in r["equivalent"]) for r in named if _k(r) >= 1.7]
+    mean = float(np.mean(sizes)) if sizes else 0.0
+    told = [r["truth"][0] == r["named"][0] for r in named if r["design"] == "separating" and _told(r)]
+    return [
+        *(_value("mean size of the set, k ≥ 1.7", "≤ 2", mean, mean <= 2, len(sizes)) if sizes else []),
+        *_share("member right where printed d_sep ≤ d (separating)", "≥ 90 %", told, 0.9, "min"),
+    ]
+
+
+def _time(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    seconds = [r["seconds"] for r in rows if r["seconds"]]
+    middle = float(np.median(seconds)) if seconds else 0.0
+    return _value(
+        "median CPU time of a diagnosis, bank cached, s", "≤ 3", middle, middle <= 3.0, len(seconds)
+    )
 
 
 def _told(row: Row) -> bool:
@@ -369,35 +350,17 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
         and _k(r) >= 1.7
         and r["gain"]
         and family_right(r)
-        and r["truth"][0] in ("cavity_lag", "thermal_gradient", "hysteresis", "warm_up", "auxiliary")
+        and r["truth"][0] in _GAINING
     ]
     out: list[dict[str, Any]] = []
     if chosen:
         got = sum(max(g["before2"], 0) / g["noise2"] - g["after2"] / g["noise2"] for g in chosen)
         best = sum(g["before2"] / g["noise2"] - 1.0 for g in chosen)
-        share = got / best
-        out.append(
-            {
-                "name": "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)",
-                "goal": "≥ 85 %",
-                "value": share,
-                "met": share >= 0.85,
-                "of": len(chosen),
-            }
-        )
+        name = "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"
+        out += _value(name, "≥ 85 %", got / best, got / best >= 0.85, len(chosen))
     shipped = [r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]]
-    if shipped:
-        worse = float(np.mean([g["after2"] > g["before2"] for g in shipped]))
-        out.append(
-            {
-                "name": "shipped although worse on the exam",
-                "goal": "0",
-                "value": worse,
-                "met": worse == 0.0,
-                "of": len(shipped),
-            }
-        )
-    return out
+    worse = [g["after2"] > g["before2"] for g in shipped]
+    return out + _share("shipped although worse on the exam", "0", worse, 0.0, "max")
 
 
 def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -414,30 +377,27 @@ def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if like.max() > best:
             best, at = float(like.max()), (float(c), float(widths[like.argmax()]))
     ratio = float(np.exp(at[0] + at[1] * np.log(19.0)))
-    return [
-        {
-            "name": "95 %-power amplitude over printed limit",
-            "goal": "0.75-1.25",
-            "value": ratio,
-            "met": 0.75 <= ratio <= 1.25,
-            "of": len(data),
-        }
-    ]
+    return _value(
+        "95 %-power amplitude over printed limit", "0.75-1.25", ratio, 0.75 <= ratio <= 1.25, len(data)
+    )
 
 
 def text(rows: Sequence[Row]) -> str:
-    """The table as Markdown."""
+    """The table of some rows as Markdown."""
+    return markdown(table(rows))
+
+
+def markdown(entries: Sequence[dict[str, Any]]) -> str:
+    """A table as Markdown; what is not met is in bold."""
     lines = [
         "| requirement | figure | measured | 95 % limits | records | met |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for t in table(rows):
+    for t in entries:
+        met = "yes" if t["met"] else "**no**"
         if "hits" in t:
-            lines.append(
-                f"| {t['name']} | {t['goal']} | {t['share']:.1%} | {t['low']:.1%}-{t['high']:.1%} | {t['hits']}/{t['of']} | {'yes' if t['met'] else 'no'} |"
-            )
+            measured = f"{t['share']:.1%} | {t['low']:.1%}-{t['high']:.1%} | {t['hits']} of {t['of']}"
         else:
-            lines.append(
-                f"| {t['name']} | {t['goal']} | {t['value']:.3g} | | {t['of']} | {'yes' if t['met'] else 'no'} |"
-            )
+            measured = f"{t['value']:.3g} | | {t['of']}"
+        lines.append(f"| {t['name']} | {t['goal']} | {measured} | {met} |")
     return "\n".join(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import pickle
@@ -46,6 +47,7 @@ def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _:
     return bank
 
 
+@functools.cache
 def _code() -> str:
     """Hash of the modules that make a bank: a new version of one makes new banks."""
     here = Path(__file__).parent
