@@ -18,6 +18,7 @@ from gyrotc.simulate.campaign import NOISE, campaign, gyro_map
 from gyrotc.simulate.recording import RowLength
 from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import simulated_floor
+from gyrotc.terms import CATALOGUE
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
@@ -168,6 +169,42 @@ def test_a_cause_changes_nothing_but_its_own_effect() -> None:
     on_s = np.arange(len(plain.bias_dph)) - plain.power_on_s
     assert np.allclose(warming.bias_dph - plain.bias_dph, 2e-3 * np.exp(-on_s / 1800.0), atol=1e-12)
     noise = [r.rough_arcsec - r.true_arcsec for r in (plain, warming)]
+    assert np.allclose(noise[0], noise[1], atol=1e-9)
+
+
+SWITCHED_ON: dict[str, dict[str, float | str]] = {
+    "cavity_lag": {"tau_s": 300.0},
+    "thermal_gradient": {"tau_s": 400.0, "amplitude_dph_per_c": 1e-3},
+    "time_misalignment": {"shift_s": 60.0},
+    "hysteresis": {"width_c": 2.0, "amplitude_dph_per_c": 1e-3},
+    "warm_up": {"tau_s": 600.0, "amplitude_dph": 1e-2},
+    "turn_on_offset": {"std_dph": 1e-2},
+    "ageing": {"slope_dph_per_day": 1e-3},
+    "map_too_coarse": {"amplitude_dph": 1e-3, "at_c": 15.0},
+    "path_length_periodicity": {"period_c": 11.0, "amplitude_dph": 1e-3},
+    "auxiliary": {"channel": "supply_v", "slope_dph_per_unit": 0.1, "reference": 28.0},
+    "sensor_lag": {"tau_s": 120.0},
+    "earth_rate_tilt": {"twist_arcsec_per_c": 2.0},
+}
+ON_THE_RECORD = {"time_misalignment", "sensor_lag"}  # these move temperature readings, the others the bias
+
+
+@pytest.mark.parametrize("cause", list(CATALOGUE))
+def test_every_cause_is_switched_on_from_a_scenario_file(cause: str, short: Path, tmp_path: Path) -> None:
+    """In the second run, a day after the first: readings or bias change, and nothing else does."""
+    more = "".join(f"{key} = {json.dumps(value)}\n" for key, value in SWITCHED_ON[cause].items())
+    path = tmp_path / "with.toml"
+    path.write_text(f'extends = "{short}"\n[[cause]]\nid = "{cause}"\n{more}', "utf-8")
+    plain, moved = (list(campaign(read(str(name))[1], 5))[1] for name in (short, path))
+    readings = np.abs(moved.reading_c - plain.reading_c).max()
+    bias = np.abs(moved.bias_dph - plain.bias_dph).max()
+    if cause in ON_THE_RECORD:
+        assert readings > 0.1
+        assert bias == 0.0
+    else:
+        assert readings == 0.0
+        assert bias > 1e-5
+    noise = [r.rough_arcsec - r.true_arcsec for r in (plain, moved)]
     assert np.allclose(noise[0], noise[1], atol=1e-9)
 
 
