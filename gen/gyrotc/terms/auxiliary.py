@@ -1,4 +1,7 @@
-"""A recorded channel (supply, discharge current, pressure, magnetic field) that the bias follows."""
+"""A recorded channel (supply, discharge current, pressure, magnetic field) that the bias follows.
+
+bias += slope (channel − reference)
+"""
 
 from __future__ import annotations
 

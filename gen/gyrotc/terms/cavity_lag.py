@@ -1,4 +1,7 @@
-"""The cavity lags the temperature sensor: the bias acts on a filtered temperature."""
+"""The cavity lags the temperature sensor: the bias acts on a filtered temperature.
+
+tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
+"""
 
 from __future__ import annotations
 

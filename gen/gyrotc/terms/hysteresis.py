@@ -1,4 +1,9 @@
-"""Rate-independent hysteresis: a play operator, as mounts, glue joints and mirror contacts show."""
+"""Rate-independent hysteresis: a play operator, as mounts, glue joints and mirror contacts show.
+
+    z = max(T − w, min(T + w, z)),    bias += a (z − T)
+
+Source: the play of Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Static structure finer than the map: looks like memory, is none; mended by more centers, not by a term."""
+"""Static structure finer than the map: looks like memory, is none; mended by more centers, not by a term.
+
+bias += A tanh((T − T0)/w)
+"""
 
 from __future__ import annotations
 

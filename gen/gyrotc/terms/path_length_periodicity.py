@@ -1,6 +1,10 @@
 """Path-length periodicity: the phase of backscatter turns with the optical path, so the bias waves over T.
 
-The period is lambda/(alpha L): 11 C for a 0.28 m path, 633 nm and alpha = 2e-7/C.
+    bias += A cos(2 pi T/P + phi)
+
+The period P is lambda/(alpha L): 11 C for a 0.28 m path, 633 nm and alpha = 2e-7/C.
+Source: Aronowitz, "Fundamentals of the ring laser gyro", in Optical Gyros and their Application, RTO AGARDograph
+339, 1999.
 """
 
 from __future__ import annotations

@@ -1,4 +1,11 @@
-"""A second thermal node: the bias follows its temperature difference to the sensor (gas flow, alignment)."""
+"""A second thermal node: the bias follows its temperature difference to the sensor (gas flow, alignment).
+
+    tau dz/dt = T − z,    bias += a (z − T)
+
+Source: in the two arms of the discharge Langmuir flow drags the light and cancels only while both are alike; a
+temperature difference unbalances them (Podgorski and Aronowitz, "Langmuir flow effects in the laser gyro", IEEE
+J. Quantum Electronics 4, 1968).
+"""
 
 from __future__ import annotations
 

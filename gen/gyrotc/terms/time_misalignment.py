@@ -1,4 +1,7 @@
-"""The temperature record is late or early: another clock, a filter's delay. Mended in the data, not in C."""
+"""The temperature record is late or early: another clock, a filter's delay. Mended in the data, not in C.
+
+recorded T(t) = T(t − shift)
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Turn-on offset: every power-on draws another constant. An uncertainty, or re-zeroed at rest; in no map."""
+"""Turn-on offset: every power-on draws another constant. An uncertainty, or re-zeroed at rest; in no map.
+
+bias += one normal draw with standard deviation std_dph for each run
+"""
 
 from __future__ import annotations
 

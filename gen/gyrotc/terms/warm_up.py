@@ -1,4 +1,7 @@
-"""Warm-up: fades with the time since power-on whatever T does (discharge, electrodes, electronics)."""
+"""Warm-up: fades with the time since power-on whatever T does (discharge, electrodes, electronics).
+
+bias += A exp(−t_on/tau)
+"""
 
 from __future__ import annotations
 
