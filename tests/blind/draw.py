@@ -34,23 +34,23 @@ class Order:
 
 
 def orders(total: int, rng: np.random.Generator) -> list[Order]:
-    """The strata in their shares: 30 % clean (a third of them under stress), 50 % one cause, 10 % two, 10 % foreign."""
+    """The strata in their shares; of 640, more than 200 are clean, as the limit of false alarms asks."""
     out = []
-    for _ in range(round(0.22 * total)):
+    for _ in range(round(0.34 * total)):
         out.append(Order("clean", ()))
     for k in range(round(0.09 * total)):
         out.append(Order("stress", (), STRESS[k % len(STRESS)]))
     for k in range(round(0.02 * total)):
         del k
         out.append(Order("sensor lag", (), "sensor_lag"))
-    for k in range(round(0.47 * total)):
+    for k in range(round(0.37 * total)):
         name = ALONE[k % len(ALONE)]
         out.append(Order("one", ((name, _k(rng)),)))
-    for k in range(round(0.08 * total)):
+    for k in range(round(0.07 * total)):
         pair = PAIRS[k % len(PAIRS)]
         out.append(Order("two", tuple((name, float(rng.uniform(2.5, 5.0))) for name in pair)))
     foreign = (*effects.FOREIGN, *effects.FOREIGN_RANDOM)
-    for k in range(round(0.12 * total)):
+    for k in range(round(0.11 * total)):
         out.append(
             Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),))
         )

@@ -1,6 +1,6 @@
 """Blind runs: recordings are drawn, diagnosed by a process that does not know the truth, and graded.
 
-    python -m tests.blind.run [--records 400] [--seed N] [--workers 1] [--docs docs]
+    python -m tests.blind.run [--records 640] [--seed N] [--workers 1] [--docs docs]
 
 The seed comes from the operating system and is printed. The same seed makes the same recordings again
 (`--seed N`, and `--only 17` for one of them), so a printed seed is enough to replay what was seen. A run that
@@ -218,7 +218,7 @@ def _begin(arguments: argparse.Namespace) -> tuple[Plan, dict[str, Any]]:
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--records", type=int, default=416)
+    parser.add_argument("--records", type=int, default=640)
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--only", type=int, default=None, help="write this recording of --seed and stop")
     parser.add_argument("--workers", type=int, default=1)

@@ -105,16 +105,17 @@ def attribute(search: Search) -> Attribution:
             stage = _deeper(search, gains, stage, pair.members)
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
+    rivals = _rivals(singles, pairs, tuple(stage.chosen[k] for k in order), gains.size)
     return Attribution(
         first=first,
         causes=refined,
         p_values=tuple(_p_value(first, r.candidate) for r in refined),
-        rivals=_rivals(singles, pairs, tuple(stage.chosen[k] for k in order), gains.size),
+        rivals=rivals,
         gain=stage.gain,
         misfit_p=stage.misfit_p,
         share=stage.share,
         last=stage.found,
-        other=contest(gains, refined),
+        other=contest(gains, refined, [[r.id for r in near] for near in rivals]),
     )
 
 

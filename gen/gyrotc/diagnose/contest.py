@@ -30,18 +30,22 @@ class Contest:
     lead: float
 
 
-def contest(gains: Gains, causes: Sequence[Refined]) -> Contest:
+def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[str]]) -> Contest:
     """Each other shape alone and in the place of each of the causes, against all of them together.
 
     The criterion is that of the search: twice the log-likelihood less log N for every parameter. The causes
-    have their parameters at the optimum, the others on their grid.
+    have their parameters at the optimum, the others on their grid. A cause may stand back for one of its
+    `rivals` (ids, for each cause): what matters is whether any causes do as well as the other shape.
     """
     edges = [gains.whiten(c.edges) for c in causes if c.edges is not None]
     white = [gains.whiten(c.columns) for c in causes]
     others = gains.whiten(gains.search.bank.others)
     groups = gains.search.bank.other_groups
     price = float(np.log(gains.size))
-    own = _criterion(gains, edges, causes, white, price)
+    own = max(
+        _criterion(gains, edges, causes, white, price),
+        *(_instead(gains, edges, causes, white, price, k, ids) for k, ids in enumerate(rivals)),
+    )
     local = any(c.candidate.id == "map_too_coarse" for c in causes)
     instead = [g for g in groups if not (local and g.common)]
     found = []
@@ -56,6 +60,30 @@ def contest(gains: Gains, causes: Sequence[Refined]) -> Contest:
         held = _held(gains, edges, causes, white)
         found.append(_strongest(held, gains, others, price, [g for g in groups if g.common]))
     return max(found, key=lambda c: c.lead)
+
+
+def _instead(
+    gains: Gains,
+    edges: list[Array],
+    causes: Sequence[Refined],
+    white: list[Array],
+    price: float,
+    k: int,
+    ids: Sequence[str],
+) -> float:
+    """Criterion with the k-th cause replaced by the best of some that add one column."""
+    kept = [i for i in range(len(causes)) if i != k]
+    held = _held(gains, edges, [causes[i] for i in kept], [white[i] for i in kept])
+    at = [s.start for c, s in gains.plain if c.id in ids and s.stop - s.start == 1]
+    if not at:
+        return -np.inf
+    columns = gains.whole[:, at]
+    rest = columns - held @ (held.T @ columns)
+    power = np.einsum("ij,ij->j", rest, rest)
+    own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
+    energy = np.where(own, (rest.T @ gains.target) ** 2 / np.where(own, power, 1.0), 0.0)
+    free = sum(PENALTY[causes[i].candidate.id] for i in kept) + max(PENALTY[i] for i in ids)
+    return _energy(held, gains.target) + float(energy.max()) - price * free
 
 
 def _held(gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array]) -> Array:

@@ -60,6 +60,7 @@ class Gains:
     Attributes:
         target: Whitened data over the noise scale, shape (N,).
         map, dropped: Whitened map functions and nuisance columns.
+        whole: Whitened bank and channel columns, nothing projected out.
         size: Number of blocks.
     """
 
@@ -73,7 +74,7 @@ class Gains:
         columns = np.column_stack([bank.signatures, search.extra[:, :own]])
         taken = np.column_stack([bank.on_map, search.extra_on_map[:, :own]])
         self._columns = self.whiten(columns)
-        self._whole = self._columns + self.whiten(bank.map) @ taken
+        self.whole = self._columns + self.whiten(bank.map) @ taken
         self.target = self.whiten(search.y) / self.scale
         self.dropped = self.whiten(search.extra[:, len(search.extra_candidates) :])
         self.map = self.whiten(bank.map)
@@ -123,7 +124,7 @@ class Gains:
         q, r = np.linalg.qr(np.column_stack([*blocks, design]))
         size = np.abs(np.diag(r))
         q = q[:, size > 1e-9 * size.max()]
-        columns = self._columns if candidate is None else self._whole
+        columns = self._columns if candidate is None else self.whole
         cross, c = q.T @ columns, q.T @ self.target
         energy = float(c @ c)
         gain = 0.0
@@ -139,7 +140,7 @@ class Gains:
 
     @cached_property
     def _whole_gram(self) -> Array:
-        return np.asarray(self._whole.T @ self._whole)
+        return np.asarray(self.whole.T @ self.whole)
 
     def single(self) -> Iterator[Point]:
         """All models of one candidate."""
