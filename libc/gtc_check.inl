@@ -28,17 +28,16 @@ static void FN(header)(const TABLE *table, uint_least32_t words[HEADER_WORDS])
         table->sigma_cells[1],
         table->n_probes,
     };
-    uint_least32_t *const numbers = &words[9];
     uint_least32_t i;
 
-    numbers[0] = MEMBER_BITS(table->max_step);
-    numbers[1] = MEMBER_BITS(table->max_slope);
-    numbers[2] = MEMBER_BITS(table->fallback);
+    words[9] = MEMBER_BITS(table->max_step);
+    words[10] = MEMBER_BITS(table->max_slope);
+    words[11] = MEMBER_BITS(table->fallback);
     for (i = 0U; i < 3U; i++) {
-        numbers[3U + i] = MEMBER_BITS(table->scale[i]);
+        words[12U + i] = MEMBER_BITS(table->scale[i]);
     }
     for (i = 0U; i < 4U; i++) {
-        numbers[6U + i] = MEMBER_BITS(table->envelope[i]);
+        words[15U + i] = MEMBER_BITS(table->envelope[i]);
     }
     for (i = 0U; i < 9U; i++) {
         words[i] = integers[i];

@@ -129,7 +129,7 @@ int FN(save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
     words[0].bits = SAVE_MAGIC;
     words[1].bits = SAVE_OPTIONS;
     words[2].bits = state->table->crc;
-    FN(carry_state)(&copy, &words[SAVE_HEAD], NULL);
+    FN(carry_state)(&copy, &words[SAVE_HEAD], words);
     words[CRC_AT].bits = FN(save_crc)(words);
     return GTC_OK;
 }
