@@ -41,7 +41,7 @@ def test_every_input_agrees_and_keeps_the_bound(
 
     def progress(text: str) -> None:
         with capsys.disabled():
-            print(f"\r{name}: {text}, {time.monotonic() - start:.0f} s ", end="", file=sys.stderr, flush=True)
+            print(f"\r{name}, {text}  ", end="", file=sys.stderr, flush=True)
 
     shown = progress if sys.__stderr__ is not None and sys.__stderr__.isatty() else None
     visited = visit_all(folder / "c", model, table, progress=shown)

@@ -10,6 +10,7 @@ import math
 import os
 import subprocess
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from ..toolchain import Target, all_targets, compile_objects, link
 __all__ = ["Visited", "visit_all"]
 
 _SLICES = 128  # of exhaustive.c
+_BAR = 32  # characters
 _COMPILERS = ("host-clang-O3", "host-gcc-O3")
 _SOURCE = Path(__file__).resolve().parent / "exhaustive.c"
 
@@ -58,7 +60,7 @@ def visit_all(
     Args:
         model: The model that the table was made of.
         table: Its fixed-point table.
-        progress: Called with the share done.
+        progress: Called with a line that shows the share done and the time left.
 
     Raises:
         CheckFailed: The emitted code does not compile, or the program failed.
@@ -123,15 +125,19 @@ def _numbers(model: Model, table: Table) -> Iterator[str]:
 
 
 class _Counter:
-    """Slices done, by all processes together."""
+    """Slices done, by all processes together, shown as a bar with the time that is left."""
 
     def __init__(self, progress: Callable[[str], None]) -> None:
         self._progress = progress
         self._done = 0
+        self._start = time.monotonic()
 
     def one_more(self) -> None:
         self._done += 1
-        self._progress(f"every input: {self._done / _SLICES:.0%}")
+        share = self._done / _SLICES
+        bar = "█" * round(_BAR * share) + "░" * (_BAR - round(_BAR * share))
+        left = (time.monotonic() - self._start) * (1.0 - share) / share
+        self._progress(f"every input: {share:.0%} {bar} {left:.0f} s left")
 
 
 def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:
