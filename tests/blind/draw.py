@@ -33,8 +33,14 @@ class Order:
     stress: str = ""
 
 
-def orders(total: int, rng: np.random.Generator) -> list[Order]:
-    """The strata in their shares; of 640, more than 200 are clean, as the limit of false alarms asks."""
+def orders(total: int, rng: np.random.Generator, weakest: float = 0.5) -> list[Order]:
+    """The strata in their shares; of 640, more than 200 are clean, as the limit of false alarms asks.
+
+    Args:
+        total: Number of recordings, about.
+        rng: Where the draws come from.
+        weakest: Smallest k of a cause that is hidden alone.
+    """
     out = []
     for _ in range(round(0.34 * total)):
         out.append(Order("clean", ()))
@@ -45,7 +51,7 @@ def orders(total: int, rng: np.random.Generator) -> list[Order]:
         out.append(Order("sensor lag", (), "sensor_lag"))
     for k in range(round(0.37 * total)):
         name = ALONE[k % len(ALONE)]
-        out.append(Order("one", ((name, _k(rng)),)))
+        out.append(Order("one", ((name, effects.log_uniform(rng, weakest, 6.0)),)))
     for k in range(round(0.07 * total)):
         pair = PAIRS[k % len(PAIRS)]
         out.append(Order("two", tuple((name, float(rng.uniform(2.5, 5.0))) for name in pair)))
@@ -55,11 +61,6 @@ def orders(total: int, rng: np.random.Generator) -> list[Order]:
             Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),))
         )
     return [out[k] for k in rng.permutation(len(out))]
-
-
-def _k(rng: np.random.Generator) -> float:
-    """Amplitude in units of the detection limit."""
-    return effects.log_uniform(rng, 0.5, 6.0)
 
 
 def campaign_of(seed: int, number: int) -> tuple[Campaign, Yardstick]:

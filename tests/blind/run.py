@@ -42,15 +42,27 @@ Store = Callable[[Row], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """A run: everything follows from its seed, its number of recordings and of those that share a campaign."""
+    """A run: everything follows from its seed and its size.
+
+    Attributes:
+        seed: Of everything that is drawn.
+        records: How many recordings.
+        per_campaign: How many of them share their temperature records.
+        weakest: Smallest k of a cause that is hidden alone.
+    """
 
     seed: int
     records: int
     per_campaign: int = PER_CAMPAIGN
+    weakest: float = 0.5
+
+    def orders(self) -> list[Order]:
+        """What to hide in every recording."""
+        return orders(self.records, np.random.default_rng([self.seed, 0]), self.weakest)
 
     def jobs(self, done: set[int]) -> list[tuple[int, list[tuple[int, Order]]]]:
         """Campaigns with the recordings that are still to be made."""
-        wanted = orders(self.records, np.random.default_rng([self.seed, 0]))
+        wanted = self.orders()
         out = []
         for first in range(0, len(wanted), self.per_campaign):
             numbers = range(first, min(first + self.per_campaign, len(wanted)))
@@ -198,7 +210,7 @@ def _begin(arguments: argparse.Namespace) -> tuple[Plan, dict[str, Any]]:
     version = code_version()
     heads = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.head.json"))]
     for head in sorted(heads, key=lambda h: str(h["started"]), reverse=True):
-        plan = Plan(head["seed"], head["records"])
+        plan = Plan(head["seed"], head["records"], arguments.per_campaign, arguments.weakest)
         same = head["code"] == version and head["records"] == arguments.records
         left = plan.jobs({r["number"] for r in rows_of(folder / f"{plan.seed}-{plan.records}.jsonl")})
         if head["seed"] == arguments.seed or (arguments.seed is None and same and left):
@@ -212,7 +224,7 @@ def _begin(arguments: argparse.Namespace) -> tuple[Plan, dict[str, Any]]:
         "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
     }
     (folder / f"{seed}-{arguments.records}.head.json").write_text(json.dumps(head), encoding="utf-8")
-    return Plan(seed, arguments.records), head
+    return Plan(seed, arguments.records, arguments.per_campaign, arguments.weakest), head
 
 
 def main() -> None:
@@ -221,12 +233,15 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=640)
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--only", type=int, default=None, help="write this recording of --seed and stop")
+    parser.add_argument("--per-campaign", type=int, default=PER_CAMPAIGN)
+    parser.add_argument("--weakest", type=float, default=0.5, help="smallest k of a cause hidden alone")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "blind")
     parser.add_argument("--docs", type=Path, default=None)
     arguments = parser.parse_args()
     if arguments.only is not None:
-        print(_replay(Plan(arguments.seed, arguments.records), arguments.only, arguments.folder))
+        plan = Plan(arguments.seed, arguments.records, arguments.per_campaign, arguments.weakest)
+        print(_replay(plan, arguments.only, arguments.folder))
         return
     plan, head = _begin(arguments)
     print(f"blind run, seed {plan.seed} (go on or repeat with --seed {plan.seed})", flush=True)
@@ -242,7 +257,7 @@ def main() -> None:
 
 def _replay(plan: Plan, number: int, folder: Path) -> str:
     """Writes one recording of a run and says what is hidden in it."""
-    order = orders(plan.records, np.random.default_rng([plan.seed, 0]))[number]
+    order = plan.orders()[number]
     campaign, yardstick = campaign_of(plan.seed, number // plan.per_campaign)
     hidden, declared = recording_of(plan.seed, number, order, campaign, yardstick)
     target = folder / f"{plan.seed}-{number:04d}"
