@@ -43,12 +43,18 @@ prove:
 	@tools/setup.sh prove
 	@$(PYTHON) -m pytest -q -rs tests/prove --results docs
 
-## style and promises: ruff, mypy, and what the C library must not contain
+## style and promises: ruff, mypy; of the C library words, warnings, symbols, fused operations, MISRA, analysers
 check:
-	@tools/setup.sh test
+	@tools/setup.sh check
 	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
 	@cd gen && ../.venv/bin/mypy gyrotc
+	@$(PYTHON) tools/promises
+
+## branch coverage of libc/ by the C tests: 100 %, or it fails
+cov:
+	@tools/setup.sh test
+	@$(PYTHON) tools/coverage.py
 
 ## the picture of a report in README.md, by a headless browser
 picture: demo

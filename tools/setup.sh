@@ -3,6 +3,7 @@
 #
 #   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt
 #   tools/setup.sh test       besides, what `make test` uses
+#   tools/setup.sh check      besides, the cross compilers of `make check`
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
 #   tools/setup.sh picture    besides, the browser of `make picture`
@@ -14,7 +15,8 @@ level=${1:-demo}
 
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
 test=(clang cmake cppcheck gcc-arm-none-eabi qemu-system-arm gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
-      libclang-rt-14-dev clang-tidy lcov)
+      libclang-rt-14-dev clang-tidy lcov pkg-config)
+check=(gcc-aarch64-linux-gnu gcc-avr avr-libc)
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
          gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386 lib32gcc-12-dev
          gcc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc simavr)
@@ -23,10 +25,11 @@ prove=(frama-c-base gappa z3)
 case $level in
   demo) packages=("${base[@]}") ;;
   test) packages=("${base[@]}" "${test[@]}") ;;
+  check) packages=("${base[@]}" "${test[@]}" "${check[@]}") ;;
   targets) packages=("${base[@]}" "${test[@]}" "${targets[@]}") ;;
   prove) packages=("${base[@]}" "${test[@]}" "${prove[@]}") ;;
   picture) packages=("${base[@]}" chromium) ;;
-  *) echo "setup: unknown level '$level' (demo, test, targets, prove, picture)" >&2; exit 2 ;;
+  *) echo "setup: unknown level '$level' (demo, test, check, targets, prove, picture)" >&2; exit 2 ;;
 esac
 
 install_missing() {
