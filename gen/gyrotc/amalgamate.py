@@ -6,6 +6,7 @@ arithmetic, and the names that an arithmetic defines for it are undefined behind
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,8 +35,9 @@ def runtime_folders() -> tuple[Path, Path]:
     raise InputError(str(here), "the C runtime is missing", "folders include and libc")
 
 
+@functools.cache
 def amalgamate(include_dir: Path, libc_dir: Path, *, bank: bool = False) -> tuple[str, str]:
-    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone.
+    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
 
     Args:
         include_dir, libc_dir: As `runtime_folders` gives them.

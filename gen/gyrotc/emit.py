@@ -7,6 +7,7 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
+import functools
 import re
 import shutil
 import struct
@@ -17,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
+from numpy.typing import NDArray
 
 from .amalgamate import amalgamate, runtime_folders
 from .errors import CheckFailed, InputError
@@ -207,12 +210,6 @@ def emit_texts(
         "warnings": list(model.meta.get("warnings", ())),
         **_example_values(model),
     }
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
     named = {
         f"gtc_{model.id}.h": "table.h.j2",
         f"gtc_{model.id}.c": "table.c.j2",
@@ -220,7 +217,7 @@ def emit_texts(
         "board_test.c": "board_test.c.j2",
         "main.c": "main.c.j2",
     }
-    texts = {name: environment.get_template(t).render(values).encode("ascii") for name, t in named.items()}
+    texts = {name: _templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
     header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
@@ -235,9 +232,27 @@ def _answers_text(emission: Emission, vectors: Any) -> bytes:
     parts = []
     for numeric, table in emission.tables.items():
         rows = answers(table, vectors)
-        lines = [f"{int(s) & 0xFFFFFFFF:08x} {int(b):08x}\n" for s, b in rows]
-        parts.append(f"begin {numeric} {len(lines):08x}\n" + "".join(lines))
-    return "".join(parts).encode("ascii")
+        parts.append(f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows))
+    return b"".join(parts)
+
+
+@functools.cache
+def _templates() -> jinja2.Environment:
+    """Compiled once in a process."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("gyrotc", "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
+    """Two words a line, in eight hex digits each."""
+    digits = np.frombuffer(rows.astype(">u4").tobytes().hex().encode("ascii"), dtype=np.uint8).reshape(-1, 16)
+    lines = np.full((len(rows), 18), ord(" "), dtype=np.uint8)
+    lines[:, :8], lines[:, 9:17], lines[:, 17] = digits[:, :8], digits[:, 8:], ord("\n")
+    return lines.tobytes()
 
 
 def _facts(model: Model) -> Iterator[tuple[str, str]]:

@@ -8,6 +8,7 @@ The answers come from the reference, which loads no compiled code.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import struct
 import zlib
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from .model import Model
 
-__all__ = ["MISSING", "Event", "Segment", "Vectors", "make_vectors"]
+__all__ = ["MISSING", "Calls", "Segment", "Vectors", "make_vectors"]
 
 N_RANDOM = 20000
 SAMPLES_PER_BLOCK = 8
@@ -44,11 +45,15 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """One call of a step function: a sample (bits of every channel), or `missed` samples."""
+class Calls:
+    """Calls of the step functions, one entry each, in order.
 
-    channels: tuple[int, ...]
-    missed: int = 0
+    `missed[k]`: 0 for a call of `sample` with the bits `channels[k]`, shape (n, n_channels); else the count of a
+    call of `missed`.
+    """
+
+    channels: NDArray[np.uint32]
+    missed: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,62 +78,80 @@ class Vectors:
 
     def map_inputs(self, numeric: str) -> NDArray[np.uint32]:
         """Bits of (temperature, slope) of all map vectors, shape (n, 2)."""
-        draw = _Draw(self.seed)
-        words = []
-        to_bits = _BITS[numeric]
-        for _ in range(self.n_random):
-            t, s = draw.between(self.t_low, self.t_span), draw.between(self.s_low, self.s_span)
-            words.append((to_bits(t, 12), to_bits(s, 16)))
-        return np.array([*self.direct[numeric], *words], dtype=np.uint32).reshape(-1, 2)
+        draws = _draws(self.seed, 2 * self.n_random).reshape(-1, 2)
+        t = _scaled(draws[:, 0], self.t_low, self.t_span)
+        slope = _scaled(draws[:, 1], self.s_low, self.s_span)
+        drawn = np.stack([_bits(numeric, t, 12), _bits(numeric, slope, 16)], axis=1)
+        return np.concatenate([np.array(self.direct[numeric], dtype=np.uint32).reshape(-1, 2), drawn])
 
-    def events(self, numeric: str) -> Iterator[Event]:
-        """The calls of the step functions, in order (the draws go on after those of the map)."""
-        draw = _Draw(self.seed)
-        to_bits = _BITS[numeric]
-        for _ in range(2 * self.n_random):
-            draw.next()
+    def calls(self, numeric: str) -> Calls:
+        """The calls of the step functions (the draws go on after those of the map)."""
+        start = 2 * self.n_random
+        length = sum(s.count for s in self.segments if s.kind != "MISSED") * self.n_channels
+        draws = _draws(self.seed, start + length)[start:]
+        channels, missed = [], []
         for segment in self.segments:
             if segment.kind == "MISSED":
-                yield Event((), segment.count)
+                channels.append(np.zeros((1, self.n_channels), dtype=np.uint32))
+                missed.append(np.array([segment.count], dtype=np.int64))
                 continue
-            for j in range(segment.count):
-                noise = draw.between(-segment.noise, 2 * segment.noise + 1)
-                others = [to_bits(draw.between(-4096, 8192), 12) for _ in range(1, self.n_channels)]
-                if segment.kind == "ALONE":
-                    others = [MISSING[numeric]] * len(others)
-                t = segment.start + j * segment.step + noise
-                held = segment.kind == "BITS"
-                yield Event((segment.bits[numeric] if held else to_bits(t, 12), *others))
+            used, draws = np.split(draws, [segment.count * self.n_channels])
+            channels.append(_samples(segment, numeric, used.reshape(-1, self.n_channels)))
+            missed.append(np.zeros(segment.count, dtype=np.int64))
+        return Calls(np.concatenate(channels), np.concatenate(missed))
 
 
-class _Draw:
-    """Marsaglia's xorshift32, as in board_test.c."""
-
-    def __init__(self, seed: int) -> None:
-        self._x = seed
-
-    def next(self) -> int:
-        x = self._x
-        x ^= (x << 13) & 0xFFFFFFFF
-        x ^= x >> 17
-        x ^= (x << 5) & 0xFFFFFFFF
-        self._x = x
-        return x
-
-    def between(self, low: int, span: int) -> int:
-        return low + ((self.next() * span) >> 32)
+def _samples(segment: Segment, numeric: str, draws: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Bits of every channel of a segment's samples."""
+    words = np.empty(draws.shape, dtype=np.uint32)
+    noise = _scaled(draws[:, 0], -segment.noise, 2 * segment.noise + 1)
+    steps = segment.start + segment.step * np.arange(segment.count, dtype=np.int64)
+    words[:, 0] = segment.bits[numeric] if segment.kind == "BITS" else _bits(numeric, steps + noise, 12)
+    alone = segment.kind == "ALONE"
+    words[:, 1:] = MISSING[numeric] if alone else _bits(numeric, _scaled(draws[:, 1:], -4096, 8192), 12)
+    return words
 
 
-def _f32_bits(n: int, fraction_bits: int) -> int:
-    """Bits of n 2^-fraction_bits, rounded to nearest even where n has more than 24 bits."""
-    return int(struct.unpack("<I", struct.pack("<f", n * 2.0**-fraction_bits))[0])
+@functools.lru_cache(maxsize=4)
+def _draws(seed: int, count: int) -> NDArray[np.uint32]:
+    """The first numbers of Marsaglia's xorshift32, as in board_test.c.
+
+    A step is linear over the bits of the state. From n numbers and what n steps make of each bit follow the next
+    n numbers, and what 2n steps make of each bit.
+    """
+    numbers = _stepped(np.array([seed], dtype=np.uint32))
+    steps = _stepped(np.uint32(1) << np.arange(32, dtype=np.uint32))
+    while numbers.size < count:
+        numbers = np.concatenate([numbers, _after(steps, numbers[: count - numbers.size])])
+        steps = _after(steps, steps)
+    numbers.flags.writeable = False
+    return numbers[:count]
 
 
-def _q31_bits(n: int, fraction_bits: int) -> int:
-    return (n << (16 - fraction_bits)) & 0xFFFFFFFF
+def _stepped(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    x = x ^ (x << np.uint32(13))
+    x = x ^ (x >> np.uint32(17))
+    return np.asarray(x ^ (x << np.uint32(5)))
 
 
-_BITS = {"f32": _f32_bits, "q31": _q31_bits}
+def _after(steps: NDArray[np.uint32], x: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """States after some steps, by what these make of each bit."""
+    result = np.zeros_like(x)
+    for bit in range(32):
+        result ^= ((x >> np.uint32(bit)) & np.uint32(1)) * steps[bit]
+    return result
+
+
+def _scaled(draws: NDArray[np.uint32], low: int, span: int) -> NDArray[np.int64]:
+    """Numbers in low ... low + span - 1; the product fits 64 bits for any span up to 2^31."""
+    return low + ((draws.astype(np.int64) * span) >> 32)
+
+
+def _bits(numeric: str, n: NDArray[np.int64], fraction_bits: int) -> NDArray[np.uint32]:
+    """Bits of n 2^-fraction_bits; float32 rounds to nearest even where n has more than 24 bits."""
+    if numeric == "f32":
+        return (n * 2.0**-fraction_bits).astype(np.float32).view(np.uint32)
+    return (n << (16 - fraction_bits)).astype(np.uint32)
 
 
 def make_vectors(model: Model, numerics: tuple[str, ...]) -> Vectors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,14 +18,14 @@ __all__ = ["Replay", "answers", "replay"]
 _HELD = 8  # GTC_HELD
 
 
-class Event(Protocol):
-    """One call of a step function: bits of every channel, or `missed` samples."""
+class Calls(Protocol):
+    """Calls of the step functions, one entry each: bits of every channel, or `missed` samples (0: none)."""
 
     @property
-    def channels(self) -> tuple[int, ...]: ...
+    def channels(self) -> Words: ...
 
     @property
-    def missed(self) -> int: ...
+    def missed(self) -> NDArray[np.int64]: ...
 
 
 class Vectors(Protocol):
@@ -37,7 +36,7 @@ class Vectors(Protocol):
 
     def map_inputs(self, numeric: str) -> Words: ...
 
-    def events(self, numeric: str) -> Iterable[Event]: ...
+    def calls(self, numeric: str) -> Calls: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,35 +90,27 @@ def answers(table: Table, vectors: Vectors) -> NDArray[np.uint32]:
     status, bits = evaluate_map(table, vectors.map_inputs(table.numeric))
     maps = np.stack([status.astype(np.uint32), bits], axis=1)
     zero = np.zeros((1, 2), dtype=np.uint32)
-    history = _step_answers(table, vectors.events(table.numeric), vectors.samples_per_block)
+    history = _step_answers(table, vectors.calls(table.numeric), vectors.samples_per_block)
     return np.concatenate([zero, maps, zero, history])
 
 
-def _step_answers(table: Table, events: Iterable[Event], samples_per_block: int) -> NDArray[np.uint32]:
-    """Answers of the step functions; each event is a row, or samples missed before the next row."""
+def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray[np.uint32]:
+    """Answers of the step functions; each call is a row, or samples missed before the next row."""
     settings = settings_of(table, samples_per_block)
-    rows: list[tuple[int, ...]] = []
-    missed: list[int] = []
-    kinds: list[bool] = []
-    waiting = 0
-    for event in events:
-        kinds.append(bool(event.missed))
-        if event.missed:
-            waiting += event.missed
-        else:
-            rows.append(event.channels)
-            missed.append(waiting)
-            waiting = 0
+    was_missed = calls.missed > 0
+    channels = calls.channels[~was_missed]
+    missed = np.diff(np.cumsum(calls.missed)[~was_missed], prepend=0)
+    waiting = int(calls.missed.sum() - missed.sum())
     if waiting:  # the history ends with missing samples: one more holds their place
-        rows.append(tuple([int(table.encode_inputs(np.nan))] * table.n_channels))
-        missed.append(waiting)
-    channels = np.array(rows, dtype=np.uint32)
-    stream = Stream.of_rows(table, settings, channels, np.array(missed, dtype=np.int64))
+        absent = np.full((1, table.n_channels), table.encode_inputs(np.nan), dtype=np.uint32)
+        channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
+    stream = Stream.of_rows(table, settings, channels, missed)
     steps = follow(arithmetic_of(table), stream.samples, settings)
     status, bits = corrections(table, steps, stream, samples_per_block)
-    was_missed = np.array(kinds)
     row = np.cumsum(~was_missed) - 1
-    last = np.where(was_missed, stream.position[np.minimum(row + 1, len(rows) - 1)] - 1, stream.position[row])
+    last = np.where(
+        was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]
+    )
     k = steps.in_force(last) + 1
     held = np.where(was_missed | ~steps.believed[last], _HELD, 0)
     call = status[k] | held

@@ -65,8 +65,12 @@ class Process:
         return self.spread * self.model.sigma
 
 
-def fit_process(data: TrainingData, scaling: Scaling) -> Process:
-    """Maximum evidence on samples; |residual| beyond 4.5 robust σ is dropped; at most three rounds."""
+def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = None) -> Process:
+    """Maximum evidence on samples; |residual| beyond 4.5 robust σ is dropped; at most three rounds.
+
+    Args:
+        like: A process on nearly the same samples, from whose parameters the search starts.
+    """
     means = average(data, MEAN_S)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
     weight = means.weight / np.median(means.weight)
@@ -75,7 +79,7 @@ def fit_process(data: TrainingData, scaling: Scaling) -> Process:
     spread = spread if spread > 0.0 else 1.0
     y = np.round((means.bias_dph - center) / spread * _GRID) / _GRID
     kept = np.ones(len(y), dtype=bool)
-    start = None
+    start = like.model.log_parameters if like else None
     for round_ in range(_TRIMS + 1):
         bins = gather(t[kept], r[kept], y[kept], weight[kept])
         model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)

@@ -52,7 +52,7 @@ def uncertainty(data: TrainingData, fit: Fit, cells: tuple[int, int] = (12, 8)) 
     samples = cleaned(data)
     process = fit_process(samples, fit.scaling)
     t, r = _points(fit, cells)
-    scale, between = _calibrated(samples, fit)
+    scale, between = _calibrated(samples, process, fit)
     departure = predict(fit, t, r) - process.mean_dph(*fit.scaling.normalise(t, r))
     variance = scale * process.variance_dph2(*fit.scaling.normalise(t, r)) + departure**2 + between
     mean = variance.reshape(cells[1], cells[0], -1).mean(axis=2)
@@ -91,14 +91,15 @@ def _parts(samples: TrainingData) -> NDArray[np.int64]:
     return np.arange(len(samples)) * _SPANS // len(samples)
 
 
-def _calibrated(samples: TrainingData, fit: Fit) -> tuple[float, float]:
+def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float, float]:
     """(κ², τ² in (deg/h)²) from parts left out in turn; (1, 0) where that cannot be done."""
     parts = _parts(samples)
     rows = []
     for k in range(int(parts.max()) + 1):
         rest = samples.select(parts != k)
         if len(rest) > len(samples) // 10:
-            rows.append(_surprises(fit_process(rest, fit.scaling), samples.select(parts == k), fit))
+            process = fit_process(rest, fit.scaling, like=whole)
+            rows.append(_surprises(process, samples.select(parts == k), fit))
     if not rows:
         return 1.0, 0.0
     squares, variance, noise = np.concatenate(rows, axis=1)
