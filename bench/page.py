@@ -129,7 +129,7 @@ def _default_row(d: dict[str, Any]) -> list[str]:
         _span(d["centers"]),
         _span(d["bytes"]),
         f"{d['seconds']['median']:.3f} / {d['seconds']['worst']:.3f}",
-        "-" if surplus is None else f"{surplus:+.4f}",
+        "-" if surplus is None else f"{round(surplus, 4) + 0.0:+.4f}",  # + 0.0: not "-0.0000"
         str(d["withheld"]),
         f"{d['sum_abs_weights_dph']:.3f}",
     ]
