@@ -20,6 +20,7 @@ from ..metrics import Averages
 from ..spans import training_spans
 from ..train import Fit, TrainingData
 from .attribute import choose
+from .cycle import cycle_of
 from .gain import Gain, floor_of, gain_of
 from .pipeline import search_of
 from .records import Records
@@ -81,10 +82,16 @@ class Extension:
 
 
 class _Bench:
-    """Training runs after the front end, and the options of every fit."""
+    """Training runs after the front end, and the options of every fit.
 
-    def __init__(self, dataset: Dataset, records: Records, options: FitOptions) -> None:
+    Of a single cycle the map beside any effect is one of T alone (see `cycle`).
+    """
+
+    def __init__(
+        self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool
+    ) -> None:
         self.records = records
+        self.single_cycle = single_cycle
         self.runs = [r for r in dataset.runs if r.role == "train"]
         self.exam_runs = [r for r in dataset.runs if r.role == "exam"]
         self.front = front_end(self.runs, options.block_s)
@@ -106,7 +113,8 @@ class _Bench:
         for known, fitted in self._fits:
             if whole and known == list(effects):
                 return fitted
-        fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept)
+        rate = not (self.single_cycle and effects)
+        fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept, rate=rate)
         if whole:
             self._fits.append((list(effects), fitted))
         return fitted
@@ -146,20 +154,30 @@ class _Bench:
                 end = times[-1] + played.block_s
                 hidden = (run.history.time_s >= times[0] - 1e-6) & (run.history.time_s < end)
             masks.append(run.usable & ~hidden)
-        return choose(search_of(self.records.without_rows(masks)), count)
+        rest = self.records.without_rows(masks)
+        return cycle_of(rest).causes[:count] if self.single_cycle else choose(search_of(rest), count)
 
 
 def extend(
-    dataset: Dataset, records: Records, causes: Sequence[Refined], options: FitOptions, say: Progress
+    dataset: Dataset,
+    records: Records,
+    causes: Sequence[Refined],
+    options: FitOptions,
+    say: Progress,
+    *,
+    single_cycle: bool = False,
 ) -> Extension:
     """Refits the model with the causes and measures the gain."""
     say("measuring the gain")
-    bench = _Bench(dataset, records, options)
+    bench = _Bench(dataset, records, options, single_cycle=single_cycle)
     effects = [Effect.of(c) for c in causes]
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = bench.on_exam(stages) if bench.exam else _crossed(bench, len(effects))
+    if single_cycle and effects:  # found together: one alone is another model
+        chain = [chain[0], *(chain[-1] for _ in effects)]
     floor = floor_of([*chain[-1], *bench.on_training(effects)])
-    steps = [gain_of(a, b, floor, options.average_s) for a, b in itertools.pairwise(chain)]
+    pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
+    steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
     shipped, total = _shipped(bench, effects, steps, chain, floor)
     extended = bench.fit(shipped) if shipped else None
     return Extension(

@@ -1,7 +1,8 @@
 """The gain of an extension on runs that its choice has not seen, with intervals.
 
 Share of removable excess: (before² − after²)/(before² − floor²), RMS of means over `average_s`. Intervals
-come from drawing half-hours (for the angle: hours) of the scored runs again, a paired bootstrap.
+come from drawing half-hours (for the angle: hours) of the scored runs again, a paired bootstrap; where there
+are few half-hours, twelfths of all.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ __all__ = ["Gain", "floor_of", "gain_of"]
 Array = NDArray[np.float64]
 
 _PIECE_S = 1800.0
+_FEWEST_PIECES = 12
 _HOUR_S = 3600.0
 _DRAWS = 1000
 _FAR = 4.0  # robust standard deviations, beyond which a difference says nothing about the floor
@@ -122,7 +124,8 @@ def _pieces(
     before: Sequence[Averages], after: Sequence[Averages], average_s: float
 ) -> tuple[Array, Array, Array]:
     """Sums of squares before and after, and number of samples, of half-hour pieces."""
-    size = max(round(_PIECE_S / average_s), 1)
+    most = sum(x.after_dph.size for x in before) // _FEWEST_PIECES
+    size = max(min(round(_PIECE_S / average_s), most), 1)
     b2, a2, weight = [], [], []
     for x, y in zip(before, after, strict=True):
         cuts = np.arange(0, x.after_dph.size, size)

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _MANY_CENTERS = 24
 _RE_ZERO_S = 600.0
+_FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,14 +179,38 @@ def fit_extended(
     effects: Sequence[Effect],
     arguments: dict[str, Any],
     kept: Sequence[NDArray[np.bool_]] | None = None,
+    *,
+    rate: bool = True,
 ) -> Fit:
-    """The map refitted beside the effects, on the samples `kept` (default: all)."""
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
     parts = [samples(run, effects) for run in runs]
     if kept is not None:
         parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
     if any(e.id == "map_too_coarse" for e in effects):
         arguments = arguments | {"centers": _MANY_CENTERS}
-    return fit(joined(parts), **arguments)
+    data = joined(parts)
+    return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
+
+
+def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
+    """A map of T alone, valid over the rates of the samples."""
+    slope = data.slope_c_per_min
+    fitted = fit(replace(data, slope_c_per_min=np.zeros_like(slope)), **arguments)
+    flat = [
+        {
+            **n,
+            "linear": [n["linear"][0], 0.0],
+            "centers": [[c[0], 0.0] for c in n["centers"]],
+            "widths": [[w[0], _FLAT] for w in n["widths"]],
+        }
+        for n in fitted.networks
+    ]
+    scaling = replace(
+        fitted.scaling,
+        half_range_c_per_min=max(float(np.abs(slope).max()), fitted.scaling.half_range_c_per_min),
+        slope_c_per_min=(float(slope.min()), float(slope.max())),
+    )
+    return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
 
 
 def score(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..fitting import FitOptions, front_end, model_of, training_of
 from ..model import Model
 from ..spans import training_spans
 from .advice import VERDICTS, next_steps
+from .cycle import Cycle, cycle_of, is_single_cycle
 from .extend import Extension, extend
 from .gain import Gain
 from .levels import NoiseFinding
@@ -77,10 +78,20 @@ def diagnose(
     if float(np.ptp(temperature)) < _LITTLE_C:
         return Diagnosis(_not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
-    causes = analysis.attribution.causes if named(analysis.attribution) else ()
-    extension = extend(dataset, records, causes, chosen, say)
+    cycle = cycle_of(records) if is_single_cycle(records) and analysis.attribution.detected else None
+    if cycle is not None:
+        analysis = replace(
+            analysis,
+            attribution=cycle.attribution(analysis.attribution),
+            separations=tuple({} for _ in cycle.causes),
+            extended=None,
+        )
+        causes = cycle.causes
+    else:
+        causes = analysis.attribution.causes if named(analysis.attribution) else ()
+    extension = extend(dataset, records, causes, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
-    result = _result(dataset, analysis, extension, causes, chosen)
+    result = _result(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training)
 
 
@@ -130,9 +141,12 @@ def _result(
     extension: Extension,
     causes: tuple[Refined, ...],
     options: FitOptions,
+    cycle: Cycle | None,
 ) -> dict[str, Any]:
     attribution = analysis.attribution
     verdict = verdict_of(attribution, analysis.noise, [])
+    if cycle is not None and causes:
+        verdict = "ambiguous" if cycle.rivals else "partial"
     listed = [_cause(analysis, extension, k) for k in range(len(causes))]
     listed += [_noise_cause(n) for n in analysis.noise]
     missing = [f"{WORDS[i].name}: {why}" for i, why in analysis.search.bank.untestable.items()]
@@ -146,12 +160,32 @@ def _result(
         "missing": missing,
         "estimated_noise": _estimated_noise(analysis),
         "measured_on": extension.measured_on,
+        "single_cycle": None if cycle is None else _tried(cycle),
         "unexplained": _unexplained(analysis) if verdict in ("unexplained", "partial") else None,
     }
     result["text"] = _sentence(result)
     result["meaning"] = VERDICTS[verdict]
     result["next"] = next_steps(verdict, result["causes"], list(analysis.search.bank.untestable))
     return result
+
+
+def _tried(cycle: Cycle) -> dict[str, Any]:
+    """Every memory that was tried beside a map of T, best first."""
+    return {
+        "map_rms_dph": cycle.rms_dph,
+        "tried": [
+            {
+                "states": [
+                    {"id": m.id, **{n: _interval(i) for n in m.values}}
+                    for m, i in zip(t.members, t.intervals, strict=True)
+                ],
+                "rms_dph": t.rms_dph,
+                "criterion": t.criterion,
+                "resolved": t.resolved,
+            }
+            for t in cycle.tried
+        ],
+    }
 
 
 def _discrepancies(analysis: Analysis) -> list[dict[str, Any]]:
@@ -297,7 +331,10 @@ def _unexplained(analysis: Analysis) -> dict[str, Any]:
 def _sentence(result: dict[str, Any]) -> str:
     """The finding in one or two sentences."""
     causes = [c for c in result["causes"] if c["family"] != "noise"]
-    names = "; ".join(c["name"] for c in causes)
+    names = "; ".join(
+        f"{name} (twice)" if sum(c["name"] == name for c in causes) > 1 else name
+        for name in dict.fromkeys(c["name"] for c in causes)
+    )
     noise = "; ".join(c["name"] for c in result["causes"] if c["family"] == "noise")
     text = {
         "consistent": "Nothing was found beyond the static map and the declared noise.",
