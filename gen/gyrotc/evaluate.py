@@ -28,6 +28,7 @@ from .model import Model, load_model
 from .quantise import Table
 from .simulate.truth import simulated_floor
 from .toolchain import Target, all_targets
+from .verify.footprint import Footprint, footprint
 from .verify.replay import history_of, replay_on, replay_program
 
 __all__ = ["Replayed", "evaluate", "trace_name"]
@@ -99,7 +100,8 @@ def evaluate(
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
-    result = _result(model, dataset, table, parts, average_s=window)
+    sizes = footprint(folder / "c", model, table)
+    result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
     if result["exam"] is None and training:
         result["left_out"] = training.get("left_out")
@@ -209,7 +211,13 @@ def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:
 
 
 def _result(
-    model: Model, dataset: Dataset, table: Table, parts: list[_Part], *, average_s: float
+    model: Model,
+    dataset: Dataset,
+    table: Table,
+    parts: list[_Part],
+    sizes: Footprint | None,
+    *,
+    average_s: float,
 ) -> dict[str, Any]:
     exam = [p.averages for p in parts if p.run.role == "exam"]
     train = [p.averages for p in parts if p.run.role == "train"]
@@ -234,8 +242,9 @@ def _result(
             "method": model.method,
             "centers": model.n_centers,
             "table_bytes": table.table_bytes,
-            "rom_bytes": None,
-            "ram_bytes": None,
+            "rom_bytes": sizes.rom_bytes if sizes else None,
+            "ram_bytes": sizes.ram_bytes if sizes else None,
+            "sizes_on": sizes.target if sizes else None,
             "sum_abs_weights_dph": model.sum_abs_weights_dph,
         },
     }

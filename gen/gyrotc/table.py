@@ -132,12 +132,6 @@ class Table:
         terms = self.terms.size // ARRAYS["terms"]
         return 4 * (3 * networks + 3 + self.centers.size + 6 * terms)
 
-    @property
-    def rom_bytes(self) -> int:
-        """Bytes of the whole table in ROM: its arrays and its struct on a 32-bit target."""
-        pointers = len(ARRAYS) + 4 + 1
-        return 4 * (len(self.words) - 2 + pointers)
-
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""
         x = np.asarray(values, dtype=np.float64)
