@@ -133,4 +133,4 @@ def times_table(measured: Sequence[Mapping[str, Any]]) -> str:
         each = RUNNING_S.get(method)
         paper = f"{min(each.values()):.1f} ... {max(each.values()):.1f} for one environment" if each else "-"
         rows.append([METHODS[method], paper, seconds.get(name, "-")])
-    return _markdown(["running time, s", "paper", "here, all six"], rows)
+    return _markdown(["running time, s", "paper", "here, one model over all six"], rows)
