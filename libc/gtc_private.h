@@ -21,7 +21,7 @@
 
 /* For what stands in the loop over the centers. Where a product is one instruction, a call costs more
  * than it, in time and in code; but a compiler for size makes calls of whatever has two callers. */
-#if defined(__GNUC__) && !GTC_HALF_MULTIPLY
+#if defined(__GNUC__) && defined(__OPTIMIZE__) && !GTC_HALF_MULTIPLY
 #define GTC_IN_LOOP static inline __attribute__((always_inline))
 #else
 #define GTC_IN_LOOP static inline
