@@ -115,7 +115,7 @@ def draw_run(record: Record, title: str, path: Path) -> None:
         )
         below.plot(hours[average::average], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
         below.set_ylabel("1e-3 deg/h")
-        below.set_xlabel("time since power-on, h")
+        below.set_xlabel("time, h")
         for ax in (above, below):
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
