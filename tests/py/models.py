@@ -118,6 +118,31 @@ def bank_of(model: Model) -> Model:
     )
 
 
+def with_memories(model: Model) -> Model:
+    """The same network seen through a lag of the cavity, with gradient, hysteresis and warm-up."""
+    terms = (
+        Term(id="cavity_lag", parameters={"tau_s": 310.0}),
+        Term(id="thermal_gradient", parameters={"tau_s": 1800.0, "amplitude_dph_per_c": -0.0004}),
+        Term(id="hysteresis", parameters={"width_c": 1.7, "amplitude_dph_per_c": 0.0003}),
+        Term(id="warm_up", parameters={"tau_s": 1200.0, "amplitude_dph": 0.004}),
+    )
+    return model.model_copy(update={"terms": terms})
+
+
+def bank_with_channels(model: Model) -> Model:
+    """The same network thrice with a hand-over, a harmonic, two auxiliary channels."""
+    wave = {"period_c": 11.0, "amplitude_dph": 0.0007, "phase_rad": 2.0}
+    terms = (
+        Term(id="path_length_periodicity", parameters=wave),
+        Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.002, "reference": 0.25}, channel="supply_v"),
+        Term(
+            id="auxiliary", parameters={"slope_dph_per_unit": -0.001, "reference": 0.0}, channel="magnetic_ut"
+        ),
+    )
+    # Without a noise floor: fixed point costs 1.05 % of the golden one where networks hand over, and is refused.
+    return bank_of(model).model_copy(update={"terms": terms, "noise_floor_dph": None})
+
+
 def random_channels(model: Model, seed: int, rows: int) -> np.ndarray:
     """Auxiliary channels of a history, with gaps, shape (rows, n)."""
     rng = np.random.default_rng([seed, 2])

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 from emitted import GOLDEN, emitted, recorded
-from gyrotc.model import Model, Term, load_model
+from gyrotc.model import Model, load_model
 from gyrotc.toolchain import all_targets
 from gyrotc.verify import verify
 from metered import metered
-from models import bank_of, random_model
+from models import bank_with_channels, random_model, with_memories
 from results import Results
 
 _KEPT = (
@@ -36,36 +36,11 @@ def _wide_model() -> Model:
     return model.model_copy(update={"networks": (network,)})
 
 
-def _with_terms() -> Model:
-    """The golden network seen through a lag of the cavity, with gradient, hysteresis and warm-up."""
-    terms = (
-        Term(id="cavity_lag", parameters={"tau_s": 310.0}),
-        Term(id="thermal_gradient", parameters={"tau_s": 1800.0, "amplitude_dph_per_c": -0.0004}),
-        Term(id="hysteresis", parameters={"width_c": 1.7, "amplitude_dph_per_c": 0.0003}),
-        Term(id="warm_up", parameters={"tau_s": 1200.0, "amplitude_dph": 0.004}),
-    )
-    return load_model(GOLDEN).model_copy(update={"terms": terms})
-
-
-def _bank_with_channels() -> Model:
-    """Three networks with a hand-over, a harmonic, two auxiliary channels."""
-    wave = {"period_c": 11.0, "amplitude_dph": 0.0007, "phase_rad": 2.0}
-    terms = (
-        Term(id="path_length_periodicity", parameters=wave),
-        Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.002, "reference": 0.25}, channel="supply_v"),
-        Term(
-            id="auxiliary", parameters={"slope_dph_per_unit": -0.001, "reference": 0.0}, channel="magnetic_ut"
-        ),
-    )
-    # Fixed point costs 1.05 % of the noise floor where networks hand over: without one it is not refused.
-    return bank_of(load_model(GOLDEN)).model_copy(update={"terms": terms, "noise_floor_dph": None})
-
-
 MODELS = {
     "golden": lambda: load_model(GOLDEN),
     "wide": _wide_model,
-    "terms": _with_terms,
-    "bank": _bank_with_channels,
+    "terms": lambda: with_memories(load_model(GOLDEN)),
+    "bank": lambda: bank_with_channels(load_model(GOLDEN)),
 }
 
 

@@ -14,6 +14,7 @@ typedef float wide_t;
 #define HIGHEST 200.0F
 #define STEEPEST 100000.0F /* C per block: far more than any slope of plausible means */
 #define FINITE(x) \is_finite(x)
+#define NUMBER(word) ((word).value)
 #define ANY_PLAUSIBLE() Frama_C_float_interval(LOWEST, HIGHEST)
 #else
 #define NAME(x) gtc_q31_##x
@@ -24,6 +25,7 @@ typedef int_least64_t wide_t;
 #define HIGHEST (200L * 65536L)
 #define STEEPEST 2147483647L
 #define FINITE(x) \true
+#define NUMBER(word) ((word).integer)
 #define ANY_PLAUSIBLE() (int_least32_t)Frama_C_long_interval(LOWEST, HIGHEST)
 #endif
 

@@ -1,0 +1,21 @@
+/* follow.c - one step of a memory, for every state, every plausible argument and every gain, and its power. */
+#include "arithmetic.h"
+
+#include "gtc.c"
+
+int main(void)
+{
+    num_t z[2];
+#if defined(F32)
+    const float gain = Frama_C_float_interval(0.0F, 1.0F);
+    z[0] = Frama_C_float_interval(LOWEST, HIGHEST);
+    z[1] = any_number(0);
+#else
+    const int_least32_t gain = (int_least32_t)Frama_C_long_interval(0, 2147483647L);
+    z[0] = (int_least32_t)Frama_C_long_interval(LOWEST - 1L, HIGHEST);
+    z[1] = (int_least32_t)Frama_C_long_interval(0, 65535);
+#endif
+    NAME(follow)(z, ANY_PLAUSIBLE(), gain);
+    (void)NAME(power)(gain, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
+    return 0;
+}

@@ -1,0 +1,102 @@
+/* terms.c - every hook of every extension term of the table, on every state that its invariant allows.
+ *
+ * The step functions call a hook with a plausible temperature; hooks touch nothing but the state of their own term.
+ * Invariant: a memory is plausible, or a last place below it (docs/proof.md); a play is as far from that
+ * as it is wide; a channel sums at most MAX_BLOCK differences. That a memory moves towards its argument and no farther, and
+ * that a mean lies between its samples, is argued there, too; follow.c shows that the first has no error.
+ */
+#include "arithmetic.h"
+
+#if defined(F32)
+#define BELOW 0.0F
+/*@ assigns z[0 .. 1] \from z[0 .. 1], x, gain;
+    ensures FINITE(z[0]) && LOWEST - BELOW <= z[0] <= HIGHEST; */
+static inline void gtc_f32_follow(float z[2], float x, float gain);
+#else
+#define BELOW 1L
+/*@ assigns z[0 .. 1] \from z[0 .. 1], x, gain;
+    ensures LOWEST - BELOW <= z[0] <= HIGHEST && 0 <= z[1] <= 65535; */
+static inline void gtc_q31_follow(int_least32_t z[2], int_least32_t x, int_least32_t gain);
+#endif
+
+/*@ assigns \result \from base, sum, n;
+    ensures FINITE(\result); */
+static inline num_t NAME(mean)(num_t base, wide_t sum, uint_least32_t n);
+
+#include "gtc.c"
+
+static NAME(state_t) state;
+
+/* Everything about term i that hooks may read. */
+static void any_term(unsigned i)
+{
+    const unsigned long kind = THE_TABLE.terms[i * GTC_TERM_WORDS].bits;
+    const num_t width = (kind == GTC_TERM_PLAY) ? NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]) : BELOW;
+    state.samples_per_block = Frama_C_unsigned_long_interval(1, MAX_BLOCK);
+    state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
+    state.off_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    state.channel_valid[i] = Frama_C_unsigned_long_interval(0, MAX_BLOCK);
+#if defined(F32)
+    state.channel[i] = any_number(0);
+    state.term[i][0] = Frama_C_float_interval(LOWEST - width, HIGHEST + width);
+    state.term[i][1] = any_number(0);
+#else
+    state.channel[i] = Frama_C_long_long_interval(-(4294967296LL * (long long)MAX_BLOCK), 4294967296LL * (long long)MAX_BLOCK);
+    state.term[i][0] = (int_least32_t)Frama_C_long_interval(LOWEST - width, HIGHEST + width);
+    state.term[i][1] = (int_least32_t)Frama_C_long_interval(0, 65535);
+#endif
+    if (kind == GTC_TERM_AUXILIARY) {
+        state.term[i][0] = any_number((unsigned)Frama_C_interval(0, KINDS - 1));
+        state.term[i][1] = any_number((unsigned)Frama_C_interval(0, KINDS - 1));
+    }
+}
+
+static void invariant_holds(unsigned i)
+{
+    const unsigned long kind = THE_TABLE.terms[i * GTC_TERM_WORDS].bits;
+    const num_t width = (kind == GTC_TERM_PLAY) ? NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]) : BELOW;
+    if ((kind == GTC_TERM_MEMORY) || (kind == GTC_TERM_PLAY)) {
+        //@ check LOWEST - width <= state.term[i][0] <= HIGHEST + width;
+    }
+}
+
+static void one_hook(unsigned i, unsigned hook)
+{
+    const struct NAME(term_code) *const code = THE_TABLE.term_code[i];
+    NAME(effect_t) effect;
+    any_term(i);
+    if (hook == 0U) {
+        code->begin(&state, i, ANY_PLAUSIBLE());
+    } else if (hook == 1U) {
+        code->take(&state, i, any_number((unsigned)Frama_C_interval(0, KINDS - 1)));
+    } else if (hook == 2U) {
+        code->step(&state, i, ANY_PLAUSIBLE());
+    } else {
+        effect.temp = ANY_PLAUSIBLE();
+        effect.slope = any_number(0);
+        effect.remarks = Frama_C_interval(0, 31);
+#if defined(F32)
+        effect.added = any_number(0);
+#else
+        effect.added = Frama_C_long_long_interval(-0x1000000000000000LL, 0x1000000000000000LL);
+#endif
+        code->apply(&state, i, ANY_PLAUSIBLE(), &effect);
+        (void)NAME(total)(any_number(0), effect.added);
+    }
+    invariant_holds(i);
+}
+
+int main(void)
+{
+    unsigned i;
+    unsigned hook;
+    state.table = &THE_TABLE;
+    /*@ loop unroll GTC_MAX_TERMS; */
+    for (i = 0; i < THE_TABLE.n_terms; i++) {
+        /*@ loop unroll 4; */
+        for (hook = 0; hook < 4U; hook++) {
+            one_hook(i, hook);
+        }
+    }
+    return 0;
+}
