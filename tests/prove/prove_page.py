@@ -34,7 +34,7 @@ def section(result: dict[str, Any]) -> str:
         _EVERY.format(machine=result["machine"]),
         table(
             ["table", "centers ", "inputs ", "mismatches ", "worst departure ", "arithmetic ", "÷ Σ\\|w\\| ",
-             "printed bound ", "s "],
+             "printed bound ", "s ", "CPU s "],
             [_visit_row(v) for v in result["every_input"]],
         ),
         _PRIMITIVES,
@@ -73,4 +73,5 @@ def _visit_row(v: dict[str, Any]) -> list[object]:
         f"{v['arithmetic_dph'] / v['sum_abs_weights_dph']:.2e}",
         f"{v['bound_dph']:.3e}",
         f"{v['wall_s']:.0f}",
+        f"{v['cpu_s']:.0f}",
     ]
