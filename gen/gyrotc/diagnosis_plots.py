@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .diagnose import Diagnosis
 from .diagnose.attribute import Attribution
 from .diagnose.compare import Discrepancy, Ensemble
+from .diagnose.cycle import Cycle
 from .diagnose.records import Records, centred_slope
 from .diagnose.refine import Refined
 from .diagnose.search import Found
@@ -43,9 +44,11 @@ def draw(found: Diagnosis) -> dict[str, str]:
     causes = analysis.attribution.causes[: len(named)]
     term = _beyond_the_map(analysis.search.bank.map, causes) if causes else None
     made: dict[str, str | None] = {
-        "residual": _residual_over_time(analysis.records, analysis.ensemble, term),
+        "residual": _residual_over_time(analysis.records, analysis.ensemble, term)
+        if found.cycle is None
+        else _cycle_over_time(analysis.records, found.cycle),
         "statistics": _statistics(analysis.ensemble, analysis.extended),
-        "inputs": _over_inputs(analysis.records, analysis.ensemble, term),
+        "inputs": _over_inputs(analysis.records, analysis.ensemble, term) if found.cycle is None else None,
         "considered": _considered(analysis.attribution, named=bool(causes)),
     }
     for number, cause in enumerate(causes):
@@ -77,6 +80,30 @@ def _residual_over_time(records: Records, ensemble: Ensemble, term: Array | None
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         figure.supxlabel("h since the first row", fontsize=9)
         figure.supylabel("residual of the static map, deg/h", fontsize=9)
+        return svg(figure)
+
+
+def _cycle_over_time(records: Records, cycle: Cycle) -> str:
+    """Block means of what a map of T alone leaves, and the states' part of it; temperature below."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+        at = 0.0
+        for number, (run, span, kept) in enumerate(
+            zip(records.runs, records.spans(), records.kept, strict=True)
+        ):
+            minutes = at + (kept + 0.5) * records.block_s / 60.0
+            upper.plot(minutes, cycle.residual[span], color=BEFORE, linewidth=1.2, label="measured")
+            if cycle.chosen is not None:
+                upper.plot(minutes, cycle.explained[span], color=AFTER, linewidth=1.2, label="named causes")
+            lower.plot(
+                minutes, records.average_run(number, run.history.temperature_c), color=COVERED, linewidth=1.2
+            )
+            at = float(minutes[-1])
+        upper.set_ylabel("residual of a map of T, deg/h")
+        lower.set(ylabel="T, C", xlabel="min")
+        handles, labels = upper.get_legend_handles_labels()
+        figure.legend(handles[:2], labels[:2], loc="outside upper right", ncols=2, fontsize=8)
         return svg(figure)
 
 
@@ -184,7 +211,6 @@ def _binned(ax: Axes, x: Array, y: Array, term: Array, colour: str, label: str) 
 def _over_power_on(ax: Axes, records: Records, residual: Array) -> None:
     """Half-hour means of every run, and their mean at equal time since power-on."""
     ax.set_xlabel("h since power-on")
-    ax.axhline(0.0, color=ACCENT, linewidth=0.6)
     width = max(round(_SMOOTH_S / records.block_s), 1)
     known = []
     for number, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
@@ -213,7 +239,8 @@ def _over_date(ax: Axes, records: Records, residual: Array) -> None:
 
 def _before_and_after(before: Sequence[Averages], after: Sequence[Averages], average_s: float) -> str:
     """Half-hour means on the scored runs: model without the causes, and with them."""
-    width = max(round(_SMOOTH_S / average_s), 1)
+    smooth_s = min(_SMOOTH_S, min(b.after_dph.size for b in before) * average_s / 16.0)
+    width = max(round(smooth_s / average_s), 1)
     with mpl.rc_context(STYLE):
         figure, axes = _grid(len(before))
         for ax, b, a in zip(axes, before, after, strict=False):

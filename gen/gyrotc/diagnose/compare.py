@@ -81,7 +81,8 @@ def compare(
     normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)
     both = np.column_stack([search.y, noise])
-    model = _orthonormal(search.bank.map, beside)
+    dropped = search.extra[:, len(search.extra_candidates) :]
+    model = _orthonormal(search.bank.map, dropped if beside is None else np.column_stack([dropped, beside]))
     both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
     found = []
@@ -93,9 +94,9 @@ def compare(
     return Ensemble(measured, simulated[:, :100], tuple(found))
 
 
-def _orthonormal(static: Array, beside: Array | None) -> Array:
+def _orthonormal(static: Array, beside: Array) -> Array:
     """Orthonormal columns of the map and of what stands beside it."""
-    if beside is None or beside.shape[1] == 0:
+    if beside.shape[1] == 0:
         return static
     rest = beside - static @ (static.T @ beside)
     length = np.linalg.norm(beside, axis=0)

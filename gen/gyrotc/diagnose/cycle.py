@@ -71,6 +71,8 @@ class Cycle:
         rivals: Causes that would explain the recordings as well.
         rms_dph: What the map of T alone leaves.
         p_value: Of the chosen states together.
+        residual: What the map of T alone leaves, deg/h, shape (N,).
+        explained: The chosen states' part of it, shape (N,).
     """
 
     tried: tuple[Tried, ...]
@@ -79,6 +81,8 @@ class Cycle:
     rivals: tuple[Rival, ...]
     rms_dph: float
     p_value: float
+    residual: Array
+    explained: Array
 
     def attribution(self, before: Attribution) -> Attribution:
         """The attribution with this cycle's causes in place of those of the search."""
@@ -187,7 +191,7 @@ def cycle_of(records: Records) -> Cycle:
     tried = tuple(sorted((_tried(fits, m, effective) for m in best.values()), key=lambda t: t.criterion))
     rms = float(np.sqrt(np.mean(fits.rest**2)))
     if tried[0].criterion >= 0.0:
-        return Cycle(tried, None, (), (), rms, 1.0)
+        return Cycle(tried, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
     near = [t for t in tried if t.criterion - tried[0].criterion <= _EQUIVALENT]
     chosen = next((t for t in near if "hysteresis" not in t.kinds), tried[0])
     others = [
@@ -196,7 +200,9 @@ def cycle_of(records: Records) -> Cycle:
     rivals = (Rival("hysteresis", others[0].criterion - chosen.criterion),) if others else ()
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
     p_value = max(float(chi2.sf(ratio, _PRICE * len(chosen.members))), 1e-300)
-    return Cycle(tried, chosen, tuple(_refined(fits, chosen, effective)), rivals, rms, p_value)
+    causes = tuple(_refined(fits, chosen, effective))
+    explained = fits.rest - fits.left(chosen.members)
+    return Cycle(tried, chosen, causes, rivals, rms, p_value, fits.rest, explained)
 
 
 def _members(fits: _Fits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:

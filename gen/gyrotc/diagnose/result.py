@@ -43,6 +43,7 @@ class Diagnosis:
         extension: Gain; None without an analysis.
         model: The extended model, None if none is shipped.
         training: What `training.json` says of it.
+        cycle: What a single chamber cycle tells; None where there are more.
     """
 
     result: dict[str, Any]
@@ -50,6 +51,7 @@ class Diagnosis:
     extension: Extension | None
     model: Model | None
     training: dict[str, Any] | None = None
+    cycle: Cycle | None = None
 
 
 def diagnose(
@@ -92,7 +94,7 @@ def diagnose(
     extension = extend(dataset, records, causes, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
     result = _result(dataset, analysis, extension, causes, chosen, cycle)
-    return Diagnosis(result, analysis, extension, extended, training)
+    return Diagnosis(result, analysis, extension, extended, training, cycle)
 
 
 def _options_of(model: Model | None) -> FitOptions:
