@@ -25,6 +25,7 @@ Index = NDArray[np.int64]
 
 _SET_95 = 5.99  # chi-square with two degrees of freedom (ratio and correlation time)
 _MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
+_FEW_LEFT = 30  # degrees of freedom below which noise cannot be told from effects
 _SEED = 20140916
 
 
@@ -105,6 +106,8 @@ class Search:
         self.extra_candidates = [*names, *bank.inputs]
         self._index()
         self._held = self._all_effects()
+        if size - self._held.shape[1] < _FEW_LEFT:  # a short recording: what is left may be effect and noise
+            self._held = np.eye(len(self._held))[:, self.base]
         known = (*COLOURS, *(() if declared is None else (declared,)))
         numbers = range(len(known)) if colours is None else colours
         self.views = {k: self._known_view(k) if k < len(COLOURS) else self.view_of(known[k]) for k in numbers}
