@@ -74,7 +74,7 @@ def test_every_argument_of_the_float32_gaussian_and_of_is_missing(tmp_path: Path
     """The proofs of the step functions take the second for granted (tests/prove/eva/step.c)."""
     found = _run("primitives_f32", tmp_path)
     visited, wrong, worst = found["gauss"]
-    _add(results, "float32: Gaussian", visited, wrong)
+    _add(results, "float32: gauss", visited, wrong, float(worst))
     _add(results, "float32: missing or a number", *found["missing"])
     assert (int(visited), wrong) == (0x45800000, "0")
     assert float(worst) <= F32_GAUSS_ERROR
@@ -85,11 +85,13 @@ def test_every_argument_of_the_float32_gaussian_and_of_is_missing(tmp_path: Path
 def test_every_argument_of_the_fixed_point_gaussian(half: int, tmp_path: Path, results: Results) -> None:
     """Of the other primitives: every input of some ranges, corners and random arguments."""
     found = _run("primitives_q31", tmp_path, half=half)
-    for name, (visited, wrong, *_) in found.items():
-        _add(results, f"fixed point, {'16-bit halves' if half else 'long multiply'}: {name}", visited, wrong)
+    kind = f"fixed point, {'16-bit halves' if half else 'long multiply'}"
+    for name, (visited, wrong, *worst) in found.items():
+        _add(results, f"{kind}: {name}", visited, wrong, *(float(units) * 2.0**-29 for units in worst))
     assert {words[1] for words in found.values()} == {"0"}
     assert int(found["gauss"][0]) == 2**29
 
 
-def _add(results: Results, name: str, visited: str, wrong: str) -> None:
-    results.add("primitives", {"name": name, "arguments": int(visited), "differ": int(wrong)})
+def _add(results: Results, name: str, visited: str, wrong: str, worst: float | None = None) -> None:
+    record = {"name": name, "arguments": int(visited), "differ": int(wrong), "worst_error": worst}
+    results.add("primitives", record)
