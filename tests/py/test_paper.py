@@ -66,8 +66,8 @@ def test_each_table_has_its_place_in_the_page(result: Experiment) -> None:
 def test_every_figure_is_drawn_and_shown(result: Experiment, tmp_path: Path) -> None:
     written = draw(result, tmp_path)
     assert [path.name for path in written] == [f"figure-{number:02d}.svg" for number in FIGURES]
-    again = draw(result, tmp_path / "again")
-    assert all(a.read_bytes() == b.read_bytes() for a, b in zip(written, again, strict=True))
+    (again,) = draw(result, tmp_path / "again", [11])
+    assert again.read_bytes() == written[-1].read_bytes()
     shown = re.findall(r"\(paper/(figure-\d+\.svg)\)", PAGE.read_text("utf-8"))
     assert shown == [path.name for path in written]
     assert all((PAGE.with_suffix("") / name).exists() for name in shown)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,11 +55,11 @@ FIGURES: dict[int, tuple[str, str, _Panel, bool]] = {
 """Number in the paper: method, title, what a panel shows, whether samples 50 to 100 are enlarged."""
 
 
-def draw(result: Experiment, folder: Path) -> list[Path]:
-    """Writes `figure-05.svg` to `figure-11.svg` into `folder`."""
+def draw(result: Experiment, folder: Path, numbers: Iterable[int] = tuple(FIGURES)) -> list[Path]:
+    """Writes `figure-05.svg` to `figure-11.svg`, or those of `numbers`, into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for number in FIGURES:
+    for number in numbers:
         path = folder / f"figure-{number:02d}.svg"
         path.write_text(_figure(result, number), "utf-8")
         written.append(path)
