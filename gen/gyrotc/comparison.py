@@ -78,8 +78,10 @@ def comparison_tables(result: dict[str, Any]) -> Iterator[Table]:
 def _table_1(result: dict[str, Any], title: str, unit: float) -> Table:
     environments, methods = _environments(result), result["methods"]
     table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("", "method", *environments):
-        table.add_column(name, justify="right" if name in environments else "left", no_wrap=True)
+    table.add_column(no_wrap=True, min_width=len("improvement"))
+    table.add_column("method", no_wrap=True, min_width=len("  in the paper"))
+    for name in environments:
+        table.add_column(name, justify="right")
     for label, key in (("RMS before", "before_rms_dph"), ("std before", "before_std_dph")):
         table.add_row(label, "", *_numbers((g[key] for g in methods[0]["groups"]), unit))
     table.add_section()
@@ -171,7 +173,7 @@ def _together(ax: Axes, methods: Sequence[dict[str, Any]]) -> None:
     ax.barh(np.arange(len(methods)), excess, height=0.6, color=[_color(m) for m in methods])
     for k, m in enumerate(methods):
         size = f"{m['centers']} centers, " if m["centers"] else ""
-        text = f"{size}{m['table_bytes']} bytes, trained in {m['train_s']:.2f} s"
+        text = f"{size}{m['table_bytes']} bytes, trained in {m['train_s']:.3f} s"
         ax.annotate(text, (excess[k], k), (4, 0), textcoords="offset points", va="center", fontsize=7.5)
     _rows(ax, methods)
     ax.margins(x=0.35)

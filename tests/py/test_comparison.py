@@ -70,6 +70,13 @@ def test_every_environment_and_method_is_in_the_picture(environments: tuple[str,
     assert any("7 centers, 104 bytes" in text for text in found)
 
 
+def test_long_names_of_environments_do_not_cut_those_of_methods() -> None:
+    out = printed(result(tuple(f"recording-of-the-chamber.csv {k}000 ... {k + 1}000 s" for k in range(8))))
+    assert "improvement" in out
+    assert "mrbf_paper" in out
+    assert "…" not in out
+
+
 def test_no_residual_at_all_is_shown_as_zero() -> None:
     shown = result(("20 C",), after=0.0)
     assert "0.00" in printed(shown)
