@@ -16,11 +16,13 @@ from typing import Any
 
 from . import __version__
 from .applied import applied_of
+from .changes import changes_since, load_earlier
 from .dataset import Dataset, axes_of, load
 from .emit import emit
 from .errors import InputError
 from .evaluate import evaluate
 from .fitting import FitOptions, Fitted, fit_dataset
+from .limits import Limits, held_against, load_limits
 from .model import Model, write_atomically
 from .report import write_report
 from .triad import join_axes
@@ -35,7 +37,8 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 @dataclass(frozen=True, slots=True)
 class Built:
     """What `build` made: the JSON objects of its stages, the arithmetics that were refused (with the reason), and the
-    checks that failed (none: exit 0); with `extend` what was diagnosed.
+    checks that failed (none: exit 0); with `extend` what was diagnosed, with `limits` and `previous` the objects of
+    `limits.json` and `changes.json`.
     """
 
     training: dict[str, Any]
@@ -44,6 +47,18 @@ class Built:
     refused: dict[str, str]
     failures: tuple[str, ...]
     diagnosis: dict[str, Any] | None = None
+    limits: dict[str, Any] | None = None
+    changes: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What is asked for besides the options of `fit`."""
+
+    numerics: Sequence[str] | None
+    extend: bool
+    limits: Limits | None
+    previous: Path | None
 
 
 def build(
@@ -55,6 +70,8 @@ def build(
     numerics: Sequence[str] | None = None,
     applied: Path | None = None,
     extend: bool = False,
+    limits: Path | None = None,
+    previous: Path | None = None,
     progress: Progress | None = None,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
@@ -66,6 +83,8 @@ def build(
             `out/c` the runtime once with all tables.
         applied: Model that was subtracted while recording.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
+        limits: A limits file that the result is held against.
+        previous: An earlier result of the same gyro, to say what changed.
 
     Raises:
         InputError: Bad recordings or arguments; `out` is untouched.
@@ -74,35 +93,30 @@ def build(
     say = progress or (lambda _: None)
     say("reading")
     known = applied_of(applied) if applied else None
+    order = _Order(numerics, extend, load_limits(limits) if limits else None, previous)
     axes = axes_of(source) if axis == "all" else ()
     if axis == "all" and not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
     with folder_in_place(out) as work:
         if not axes:
             dataset = load(source, axis=axis, applied=known)
-            return [_build_axis(dataset, work, options, numerics, extend, say)]
+            return [_build_axis(dataset, work, options, order, say)]
         built = []
         for name in axes:
             dataset = load(source, axis=name, applied=known)
-            built.append(_build_axis(dataset, work / name, options, numerics, extend, _of_axis(name, say)))
+            built.append(_build_axis(dataset, work / name, options, order, _of_axis(name, say)))
         join_axes(work, axes)
         return built
 
 
-def _build_axis(
-    dataset: Dataset,
-    work: Path,
-    options: FitOptions,
-    numerics: Sequence[str] | None,
-    extend: bool,
-    say: Progress,
-) -> Built:
-    fitted, diagnosis = _extended(dataset, work, options, say) if extend else (None, None)
+def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
+    earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
+    fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training)
     say("emitting C")
-    emission = emit(fitted.model, work, numerics=numerics)
+    emission = emit(fitted.model, work, numerics=order.numerics)
     verification = verify(work, progress=lambda name: say(f"verifying {name}"))
     _write(work / "verify.json", verification)
     evaluation = evaluate(
@@ -114,7 +128,14 @@ def _build_axis(
         progress=lambda file: say(f"replaying {file}"),
     )
     _write(work / "evaluate.json", evaluation)
-    _write(work / "manifest.json", _manifest(work, dataset, fitted.model, emission.refused))
+    held = held_against(order.limits, fitted.model, evaluation, verification) if order.limits else None
+    if held:
+        _write(work / "limits.json", held)
+    manifest = _manifest(work, dataset, fitted.model, emission.refused)
+    _write(work / "manifest.json", manifest)
+    changes = changes_since(earlier, fitted.model, evaluation, manifest) if earlier else None
+    if changes:
+        _write(work / "changes.json", changes)
     say("drawing the report")
     write_report(work)
     return Built(
@@ -122,8 +143,10 @@ def _build_axis(
         evaluation,
         verification,
         emission.refused,
-        tuple(_failures(evaluation, verification)),
+        tuple(_failures(evaluation, verification, held)),
         diagnosis,
+        held,
+        changes,
     )
 
 
@@ -143,13 +166,18 @@ def _of_axis(axis: str, say: Progress) -> Progress:
     return lambda text: say(f"{axis}: {text}")
 
 
-def _failures(evaluation: dict[str, Any], verification: dict[str, Any]) -> Iterator[str]:
+def _failures(
+    evaluation: dict[str, Any], verification: dict[str, Any], held: dict[str, Any] | None
+) -> Iterator[str]:
     for entry in verification["targets"]:
         if entry["status"] == "fail":
             reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
             yield f"{entry['name']} {entry['numeric']}: {reason}"
     if evaluation["mismatches"]:
         yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
+    for check in held["limits"] if held else ():
+        if not check["met"]:
+            yield f"limit {check['limit']} = {check['bound']} is not met: {check['measured']}"
 
 
 def _write(path: Path, result: dict[str, Any]) -> None:

@@ -39,7 +39,9 @@ def write_report(folder: Path) -> Path:
             training=training,
             verification=verification,
             manifest=manifest,
-        diagnosis=read_json(folder / "diagnosis" / "diagnose.json", optional=True),
+            diagnosis=read_json(folder / "diagnosis" / "diagnose.json", optional=True),
+            limits=read_json(folder / "limits.json", optional=True),
+            changes=read_json(folder / "changes.json", optional=True),
             judged=_judged(evaluation),
             pictures=_pictures(folder, model, evaluation, training),
         )
@@ -54,7 +56,7 @@ def page_environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
     )
-    environment.filters.update(sci=_sci, number=_number)
+    environment.filters.update(sci=_sci, number=_number, plain=_plain)
     return environment
 
 
@@ -134,3 +136,10 @@ def _sci(value: float | None, digits: int = 2) -> str:
 
 def _number(value: float | None, digits: int = 2) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
+
+
+def _plain(value: Any) -> str:
+    """A figure of any kind."""
+    if isinstance(value, (list, tuple)):
+        return " … ".join(_plain(v) for v in value) or "none"
+    return _sci(value) if isinstance(value, float) else "–" if value is None else str(value)

@@ -35,6 +35,8 @@ ORDER = [
     "verify",
     "findings",
     "evaluate",
+    "limits",
+    "changes",
     "compare",
     "check",
     "diagnose",

@@ -31,7 +31,7 @@ from .base import (
     write_json,
 )
 from .diagnosis_lines import diagnosis_lines, extension_lines
-from .results import evaluation_table, span_lines, summary, verify_table
+from .results import change_lines, evaluation_table, limit_lines, span_lines, summary, verify_table
 
 if TYPE_CHECKING:
     from ..build import Built
@@ -53,6 +53,12 @@ def build(
     extend: Annotated[
         bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
     ] = False,
+    limits: Annotated[
+        Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met.")
+    ] = None,
+    previous: Annotated[
+        Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -72,6 +78,8 @@ def build(
             numerics=numerics_of(numeric),
             applied=applied,
             extend=extend,
+            limits=limits,
+            previous=previous,
             progress=say,
         )
     if len(results) == 1:
@@ -94,6 +102,10 @@ def _print_built(result: Built) -> None:
     for name, reason in result.refused.items():
         tell(f"{name} left out: {reason}")
     for line in extension_lines(result.diagnosis) if result.diagnosis else ():
+        tell(line)
+    for line in limit_lines(result.limits) if result.limits else ():
+        tell(line)
+    for line in change_lines(result.changes) if result.changes else ():
         tell(line)
     for finding in result.evaluation["findings"]:
         tell(f"finding {finding['id']}: {finding['text']}")

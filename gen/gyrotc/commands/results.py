@@ -101,3 +101,50 @@ def summary(result: dict[str, Any]) -> str:
     if floor:
         text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result['noise_floor_source']})"
     return f"{text}; {result['model']['centers']} centers, {result['model']['table_bytes']} bytes of table"
+
+
+def limit_lines(limits: dict[str, Any]) -> Iterator[str]:
+    """Every limit with what was measured."""
+    product = f" of {limits['product']}" if limits["product"] else ""
+    yield f"limits{product}: {'met' if limits['met'] else 'NOT met'}"
+    for check in limits["limits"]:
+        mark = "" if check["met"] else ", NOT MET"
+        yield f"  {check['limit']} {_plain(check['bound'])}: {_plain(check['measured'])}{mark}"
+
+
+def change_lines(changes: dict[str, Any]) -> Iterator[str]:
+    """What is different from an earlier result."""
+    if changes["same_model"]:
+        yield "against the earlier result: the same model"
+    elif changes["map"] is None:
+        yield "against the earlier result: no temperatures and rates in common"
+    else:
+        apart, at = changes["map"], changes["map"]["at"]
+        share = f" = {apart['rms_over_floor']:.2g} x noise floor" if apart["rms_over_floor"] else ""
+        yield (
+            f"against the earlier result: maps {apart['rms_dph']:.3e} deg/h RMS apart{share}, at most "
+            f"{apart['max_abs_dph']:.3e} at {at['temperature_c']:.1f} C, {at['slope_c_per_min']:+.2f} C/min"
+        )
+    for name, figure in changes["figures"].items():
+        before, after = (
+            (_plain(figure[k]) for k in ("before", "after")) if isinstance(figure, dict) else ("", "")
+        )
+        if before != after:
+            yield f"  {name}: {before} -> {after}"
+    for kind in ("recordings", "findings", "files"):
+        for what, names in changes[kind].items():
+            if names:
+                yield f"  {kind}, {what.replace('_', ' ')}: {', '.join(names)}"
+    for name, version in changes["versions"].items():
+        yield f"  {name}: {version['before']} -> {version['after']}"
+
+
+def _plain(value: Any) -> str:
+    """A figure of any kind as text."""
+    if value is None:
+        return "not measured"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return " ... ".join(_plain(v) for v in value) if value else "none"
+    return str(value)

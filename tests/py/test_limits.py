@@ -1,0 +1,164 @@
+"""Limits of a product: every limit can be met and missed, what was not measured misses, typing errors are refused."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Command
+from gyrotc.errors import InputError
+from gyrotc.limits import AtLeast, AtMost, held_against, load_limits
+from gyrotc.model import Model
+from recordings import columns, described, write_csv
+
+EVALUATION = {
+    "noise_floor_dph": 0.001,
+    "runs": [
+        {
+            "role": "exam",
+            "after": {"rms_30min_dph": 0.0002, "angle_1h_arcsec": 0.5, "first_10min_rms_dph": 0.001},
+        },
+        {
+            "role": "exam",
+            "after": {"rms_30min_dph": 0.0003, "angle_1h_arcsec": None, "first_10min_rms_dph": 0.002},
+        },
+        {
+            "role": "train",
+            "after": {"rms_30min_dph": 9.0, "angle_1h_arcsec": 9.0, "first_10min_rms_dph": 9.0},
+        },
+    ],
+    "exam": {
+        "after": {"rms_dph": 0.0011, "std_dph": 0.001, "mean_dph": -0.0004, "max_abs_dph": 0.004},
+        "improvement": 10.0,
+    },
+    "findings": [{"id": "run_outlier"}],
+    "model": {"centers": 4, "table_bytes": 104, "rom_bytes": 4000, "ram_bytes": 236},
+}
+VERIFICATION = {
+    "targets": [
+        {"name": "host-gcc-O2", "status": "pass"},
+        {"name": "cortex-m4f", "status": "missing"},
+    ],
+    "errors": [{"numeric": "f32"}],
+    "error_bound_dph": 1e-8,
+}
+MEASURED = {
+    "rms_dph": 0.0011, "std_dph": 0.001, "mean_dph": 0.0004, "max_abs_dph": 0.004, "rms_over_floor": 1.1,
+    "rms_30min_dph": 0.0003, "angle_1h_arcsec": 0.5, "first_10min_rms_dph": 0.002, "error_bound_dph": 1e-8,
+    "centers": 4.0, "table_bytes": 104.0, "rom_bytes": 4000.0, "ram_bytes": 236.0, "uncertainty_dph": 0.0005,
+    "improvement": 10.0, "covered": 0.875,
+}  # fmt: skip
+
+
+@pytest.fixture
+def model(model_dict: dict[str, Any]) -> Model:
+    sigma = {"cells": [2, 1], "rows": [[0.0002, 0.0005]]}
+    return Model.from_dict(model_dict | {"uncertainty_dph": sigma})
+
+
+def met(folder: Path, model: Model, text: str, evaluation: Any = EVALUATION) -> list[bool]:
+    (folder / "product.toml").write_text("schema = 1\n" + text)
+    result = held_against(load_limits(folder / "product.toml"), model, evaluation, VERIFICATION)
+    assert result["met"] == all(check["met"] for check in result["limits"])
+    return [check["met"] for check in result["limits"]]
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_each_figure_has_its_limit(name: str, tmp_path: Path, model: Model) -> None:
+    value = MEASURED[name]
+    table, better = ("at_most", 1.0001) if name in AtMost.model_fields else ("at_least", 0.9999)
+    assert met(tmp_path, model, f"[{table}]\n{name} = {value * better!r}") == [True]
+    assert met(tmp_path, model, f"[{table}]\n{name} = {value / better!r}") == [False]
+
+
+def test_no_limit_is_left_out_of_the_test_above() -> None:
+    assert {*AtMost.model_fields, *AtLeast.model_fields} == set(MEASURED)
+
+
+def test_what_was_not_measured_does_not_keep_a_limit(tmp_path: Path, model: Model) -> None:
+    unknown = copy.deepcopy(EVALUATION)
+    unknown["model"]["rom_bytes"], unknown["noise_floor_dph"] = None, None  # type: ignore[index]
+    assert met(tmp_path, model, "[at_most]\nrms_over_floor = 1e9\nrom_bytes = 1e9", unknown) == [False, False]
+
+
+def test_ranges_and_needs(tmp_path: Path, model: Model) -> None:
+    assert (
+        met(tmp_path, model, "[covers]\ntemperature_c = [-40, 60]\nslope_c_per_min = [-1, 1]") == [True] * 2
+    )
+    assert met(tmp_path, model, "[covers]\ntemperature_c = [-40.5, 60]") == [False]
+    assert met(tmp_path, model, '[needs]\narithmetics = ["f32", "q31"]') == [True, False]
+    assert met(tmp_path, model, '[needs]\ntargets = ["host-gcc-O2", "cortex-m4f"]') == [True, False], (
+        "missing"
+    )
+    assert met(tmp_path, model, '[needs]\nno_findings = ["large_weights", "run_outlier", "any"]') == [
+        True,
+        False,
+        False,
+    ]
+
+
+REFUSED = {
+    "no schema": ("[at_most]\nrms_dph = 1.0", "schema"),
+    "typing error": ("schema = 1\n[at_most]\nrms_dhp = 1.0", "at_most.rms_dhp"),
+    "text": ('schema = 1\n[at_most]\nrms_dph = "low"', "at_most.rms_dph"),
+    "not a number": ("schema = 1\n[at_most]\nrms_dph = nan", "at_most.rms_dph"),
+    "one end": ("schema = 1\n[covers]\ntemperature_c = [1]", "covers.temperature_c"),
+    "unknown target": ('schema = 1\n[needs]\ntargets = ["m4"]', "needs.targets"),
+    "unknown finding": ('schema = 1\n[needs]\nno_findings = ["outlier"]', "needs.no_findings"),
+    "unknown arithmetic": ('schema = 1\n[needs]\narithmetics = ["f64"]', "needs.arithmetics"),
+    "broken": ("schema = ", "no TOML"),
+    "hash given": ('schema = 1\nsha256 = "x"', "sha256"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_wrong_limits_file_is_refused(case: str, tmp_path: Path) -> None:
+    text, told = REFUSED[case]
+    (tmp_path / "product.toml").write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_limits(tmp_path / "product.toml")
+    assert told in str(caught.value) and "\n" not in str(caught.value)
+
+
+def recording(folder: Path, serial: str, shift: float = 0.0) -> None:
+    """Six hours of a small gyro; `shift` moves its bias."""
+    described(folder, head=f'schema = 1\nserial = "{serial}"\nearth_rate = "none"')
+    rows = columns(720)
+    write_csv(folder / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0 + shift})
+
+
+def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc: Command) -> None:
+    """A build that misses a limit ends with 1 and is written all the same; the next one says what changed."""
+    recording(tmp_path / "first", "RLG-1")
+    product = tmp_path / "product.toml"
+    product.write_text('schema = 1\nproduct = "NAV"\n[at_most]\ntable_bytes = 30\nrms_dph = 1.0\n')
+    build = ("build", "--numeric", "f32", "--limits", product)
+    done = gyrotc(*build, tmp_path / "first", "--out", tmp_path / "one")
+    assert done.returncode == 1
+    assert "limit at_most.table_bytes = 30.0 is not met" in done.stderr and "rms_dph" not in done.stderr
+    limits = json.loads((tmp_path / "one" / "limits.json").read_text())
+    assert (limits["schema"], limits["met"], limits["product"]) == ("gyrotc.limits/1", False, "NAV")
+    assert "not met" in (tmp_path / "one" / "report.html").read_text()
+
+    product.write_text("schema = 1\n[at_most]\ntable_bytes = 300\n")
+    recording(tmp_path / "second", "RLG-1", shift=0.01)
+    done = gyrotc(*build, tmp_path / "second", "--out", tmp_path / "two", "--previous", tmp_path / "one")
+    assert done.returncode == 0, done.stderr
+    changes = json.loads((tmp_path / "two" / "changes.json").read_text())
+    assert changes["map"]["mean_dph"] == pytest.approx(0.01, rel=1e-3)
+    assert changes["recordings"]["other_bytes"] == ["run-01.csv"]
+    assert (
+        "c/gtc_rlg_1.c" in changes["files"]["other_bytes"]
+        and "c/gtc.c" not in changes["files"]["other_bytes"]
+    )
+    assert "maps 1.000e-02 deg/h RMS apart" in done.stdout
+    names = json.loads((tmp_path / "two" / "manifest.json").read_text())["files"]
+    assert "limits.json" in names
+
+    recording(tmp_path / "third", "RLG-2")
+    done = gyrotc(*build, tmp_path / "third", "--out", tmp_path / "three", "--previous", tmp_path / "two")
+    assert done.returncode == 2 and "is of gyro RLG-1" in done.stderr
+    assert not (tmp_path / "three").exists()
