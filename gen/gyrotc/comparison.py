@@ -81,7 +81,7 @@ def _table_1(result: dict[str, Any], title: str, unit: float) -> Table:
     table.add_column(no_wrap=True, min_width=len("improvement"))
     table.add_column("method", no_wrap=True, min_width=len("  in the paper"))
     for name in environments:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for label, key in (("RMS before", "before_rms_dph"), ("std before", "before_std_dph")):
         table.add_row(label, "", *_numbers((g[key] for g in methods[0]["groups"]), unit))
     table.add_section()
