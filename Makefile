@@ -4,6 +4,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 PYTHON := .venv/bin/python
 GYROTC := .venv/bin/gyrotc
+FUZZERS := map check open step restore
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -31,6 +32,9 @@ test:
 	@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
 	@ctest --test-dir build/ctest --output-on-failure
+	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
+	@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
+	@ctest --test-dir build/fuzz --output-on-failure
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
@@ -56,6 +60,16 @@ cov:
 	@tools/setup.sh test
 	@$(PYTHON) tools/coverage.py
 
+## a fuzzer for each function family and arithmetic, SECONDS=20 each; what they learn is kept in build/corpus
+fuzz:
+	@tools/setup.sh test
+	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
+	@for target in $(addsuffix _f32,$(FUZZERS)) $(addsuffix _q31,$(FUZZERS)); do \
+	  mkdir -p build/corpus/$$target && echo "fuzz_$$target" && \
+	  build/fuzz/fuzz_$$target -max_total_time=$(or $(SECONDS),20) -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
+	    -print_final_stats=1 build/corpus/$$target || exit 1; \
+	done
+
 ## the picture of a report in README.md, by a headless browser
 picture: demo
 	@tools/setup.sh picture
@@ -67,9 +81,10 @@ picture: demo
 paper: setup
 	@$(PYTHON) -m gyrotc.paper docs
 
-## measured recordings with their last span left out: docs/real.md (GYROTC_REAL_DATA names their folder)
+## measured recordings with their last span left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
 real: setup
 	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
+	@$(PYTHON) tools/real_diagnosis.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
 
 ## training beside its peers, in an environment of its own (build/bench): docs/results.md
 bench: setup
@@ -85,4 +100,4 @@ blind: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check picture paper real bench blind clean
+.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench blind clean

@@ -1,0 +1,129 @@
+"""Diagnosis of measured recordings: tables and pictures of docs/diagnosis-real.md (part of `make real`).
+
+usage: python tools/real_diagnosis.py FOLDER-OF-DATA-SETS DOCS WORK
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.paper.page import filled
+from real import with_exam
+
+CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
+CUT_S = {
+    CYCLE: 3130.0,
+    ISOTHERMAL: 524.0,
+}  # training before, scored after; the cycle: where the second cooling begins
+SIZES = (None, 2, 3, 4, 5, 6, 8, 10, 12)
+AVERAGE_S = 10.0
+Result = dict[str, Any]
+
+
+def diagnosed(data: Path, axis: str, out: Path, centers: int | None = None) -> Result:
+    """One run of the installed command."""
+    command = [Path(sys.executable).with_name("gyrotc"), "diagnose", data, "--axis", axis, "--out", out]
+    size = [] if centers is None else ["--centers", str(centers)]
+    done = subprocess.run(
+        [*command, "--average-s", str(AVERAGE_S), *size], check=True, capture_output=True, text=True
+    )
+    print(done.stdout.splitlines()[0])
+    return dict(json.loads((out / "diagnose.json").read_text("utf-8")))
+
+
+def after(result: Result) -> float:
+    """RMS on the unseen branch with everything that was named, shipped or not; without causes the plain map's."""
+    gains = [c["gain"] for c in result["causes"] if c["gain"]]
+    return float(gains[-1]["exam_rms_after_dph"] if gains else result["baseline"]["exam_rms_dph"])
+
+
+def gains(results: dict[str, list[Result]]) -> Iterator[str]:
+    """A row for each axis: unseen branch without and with what was named, over the sizes of the map."""
+    yield (
+        "| axis | verdict | map of (T, dT/dt) alone, default size | with what was named, default size | removed, 95 % "
+        "| median over map sizes | smallest … largest | shipped |"
+    )
+    yield "| --- " * 8 + "|"
+    for axis, of_sizes in results.items():
+        first = of_sizes[0]
+        spread = [after(r) for r in of_sizes]
+        found = [c["gain"] for c in first["causes"] if c["gain"]]
+        removed = found[-1]["rms_removed_dph"] if found else {"low": 0.0, "high": 0.0}
+        cells = [
+            axis, first["verdict"], f"{first['baseline']['exam_rms_dph']:.0f}", f"{spread[0]:.0f}",
+            f"{removed['low']:.0f} … {removed['high']:.0f}", f"{np.median(spread):.0f}",
+            f"{min(spread):.0f} … {max(spread):.0f}", "yes" if first["extended"] else "no",
+        ]  # fmt: skip
+        yield "| " + " | ".join(cells) + " |"
+
+
+def tried(results: dict[str, list[Result]]) -> Iterator[str]:
+    """What was tried beside a map of T on the first 3130 s."""
+    yield "| axis | beside a map of T | parameters (95 %) | RMS left in training, deg/h | criterion | resolved | |"
+    yield "| --- " * 7 + "|"
+    for axis, of_sizes in results.items():
+        named = sorted(c["id"] for c in of_sizes[0]["causes"] if c["family"] != "noise")
+        cycle = of_sizes[0]["single_cycle"]
+        yield f"| {axis} | nothing | | {cycle['map_rms_dph']:.0f} | 0 | | |"
+        for t in cycle["tried"]:
+            ids = [s["id"] for s in t["states"]]
+            cells = [
+                axis, " + ".join(f"`{i}`" for i in ids), "; ".join(map(_parameters, t["states"])),
+                f"{t['rms_dph']:.0f}", f"{t['criterion']:.1f}", "yes" if t["resolved"] else "no",
+                "**named**" if sorted(ids) == named else "",
+            ]  # fmt: skip
+            yield "| " + " | ".join(cells) + " |"
+
+
+def _parameters(state: Result) -> str:
+    return ", ".join(
+        f"{n} {p['value']:.3g} ({p['low']:.3g} … {p['high']:.3g})" for n, p in state.items() if n != "id"
+    )
+
+
+def isothermal(results: dict[str, Result]) -> Iterator[str]:
+    """What is said where nothing can be learnt."""
+    yield "| axis | verdict | in words |"
+    yield "| --- | --- | --- |"
+    for axis, result in results.items():
+        yield f"| {axis} | `{result['verdict']}` | {result['text']} |"
+
+
+def _data(source: Path, work: Path, name: str) -> Path:
+    folder = work / f"{name}-diagnosis-data"
+    with_exam(source / name, folder, CUT_S[name])
+    return folder
+
+
+def main(source: Path, docs: Path, work: Path) -> None:
+    """Runs everything and fills the page."""
+    absent = [name for name in CUT_S if not (source / name).is_dir()]
+    if absent:
+        print(f"{', '.join(absent)} absent in {source}: skipped")
+        return
+    data = _data(source, work, CYCLE)
+    cycles: dict[str, list[Result]] = {}
+    for axis in "xyz":
+        folders = [work / f"diagnosis-{axis}" / str(n or "default") for n in SIZES]
+        cycles[axis] = [diagnosed(data, axis, f, n) for f, n in zip(folders, SIZES, strict=True)]
+        for picture in ("residual", "before-and-after"):
+            svg = (folders[0] / "pictures" / f"{picture}.svg").read_text("utf-8")
+            (docs / "real" / f"diagnosis-{axis}-{picture}.svg").write_text(svg, "utf-8")
+    rest = _data(source, work, ISOTHERMAL)
+    still = {axis: diagnosed(rest, axis, work / f"diagnosis-still-{axis}") for axis in "xyz"}
+    page = docs / "diagnosis-real.md"
+    parts: dict[str, Sequence[str]] = {
+        "gains": list(gains(cycles)), "tried": list(tried(cycles)), "isothermal": list(isothermal(still))
+    }  # fmt: skip
+    text = filled(page.read_text("utf-8"), {name: "\n".join(lines) for name, lines in parts.items()})
+    page.write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main(*(Path(argument) for argument in sys.argv[1:4]))
