@@ -8,7 +8,8 @@ from typing import Any
 
 def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
     """The verdict in words: causes with their size and gain, rivals, what could still hide, what to do next."""
-    yield f"{result['serial']}: {result['verdict'].replace('_', ' ')}. {result['text']}"
+    axis = f" {result['axis']}" if result["axis"] else ""
+    yield f"{result['serial']}{axis}: {result['verdict'].replace('_', ' ')}. {result['text']}"
     yield result["meaning"]
     yield from result.get("missing", ())
     for d in result["discrepancies"]:

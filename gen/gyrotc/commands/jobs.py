@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import CheckFailed
+from ..errors import CheckFailed, InputError
 from ..model import write_atomically
 from .base import (
     OUT,
@@ -169,7 +169,7 @@ def diagnose(
     Example: gyrotc diagnose recordings --out diagnosis
     """
     from ..applied import applied_of
-    from ..dataset import load
+    from ..dataset import axes_of, load
     from ..diagnose import diagnose as run
     from ..diagnosis import diagnose_into
     from ..fitting import FitOptions
@@ -177,15 +177,22 @@ def diagnose(
 
     known = load_model(model) if model else None
     options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None
-    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
-    with progress() as say:
-        if out is None:
-            result = run(recordings, model=known, options=options, progress=say).result
-        else:
-            found = diagnose_into(out, recordings, model=known, options=options, progress=say)
-            result = found.result
-    write_json(json_file, result)
-    for line in diagnosis_lines(result):
-        tell(line)
-    if out is not None:
-        tell(f"report: {out / 'report.html'}")
+    subtracted = applied_of(applied) if applied else None
+    axes = axes_of(dataset) if axis == "all" else (axis,)
+    if not axes:
+        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    results: dict[str, dict[str, Any]] = {}
+    for name in axes:
+        recordings = load(dataset, axis=name, applied=subtracted)
+        folder = out / name if out is not None and name is not None and axis == "all" else out
+        with progress() as say:
+            if folder is None:
+                result = run(recordings, model=known, options=options, progress=say).result
+            else:
+                result = diagnose_into(folder, recordings, model=known, options=options, progress=say).result
+        for line in diagnosis_lines(result):
+            tell(line)
+        if folder is not None:
+            tell(f"report: {folder / 'report.html'}")
+        results[name or ""] = result
+    write_json(json_file, results if axis == "all" else results[axis or ""])
