@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,8 @@ from gyrotc.model import Model, load_model
 from gyrotc.verify.exhaustive import visit_all
 from results import Results
 from test_primitives import F32_GAUSS_ERROR, _run
+
+Progress = Callable[[str], None]
 
 
 def _golden() -> Model:
@@ -30,22 +32,29 @@ def _wide_envelope() -> Model:
 MODELS = {"every position reached": (_wide_envelope, 2**32), "golden": (_golden, None)}
 
 
+@pytest.fixture
+def bar() -> Iterator[Progress | None]:
+    """Shows progress on the terminal, past what captures output; None where there is no terminal."""
+    try:
+        number = os.open("/dev/tty", os.O_WRONLY)
+    except OSError:
+        yield None
+        return
+    with open(number, "w", encoding="utf-8") as terminal:
+        yield lambda text: print(f"\r{text}   ", end="", file=terminal, flush=True)
+        print(file=terminal)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_every_input_agrees_and_keeps_the_bound(
-    name: str, tmp_path: Path, results: Results, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, results: Results, bar: Progress | None
 ) -> None:
     make, inputs = MODELS[name]
     folder = emitted(tmp_path, make())
     model = load_model(folder / "model.json")
     table = emitted_tables(folder / "c", model)["q31"]
     start, before = time.monotonic(), os.times()
-
-    def progress(text: str) -> None:
-        with capsys.disabled():
-            print(f"\r{name}, {text}  ", end="", file=sys.stderr, flush=True)
-
-    shown = progress if sys.__stderr__ is not None and sys.__stderr__.isatty() else None
-    visited = visit_all(folder / "c", model, table, progress=shown)
+    visited = visit_all(folder / "c", model, table, progress=bar)
     after = os.times()
     results.add(
         "every_input",
