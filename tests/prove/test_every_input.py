@@ -40,7 +40,7 @@ def bar() -> Iterator[Progress | None]:
     except OSError:
         yield None
         return
-    with open(number, "w", encoding="utf-8") as terminal:
+    with os.fdopen(number, "w", encoding="utf-8") as terminal:
         yield lambda text: print(f"\r{text}   ", end="", file=terminal, flush=True)
         print(file=terminal)
 
