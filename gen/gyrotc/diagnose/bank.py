@@ -17,7 +17,7 @@ from .noise import COLOURS, Whitener
 from .others import shapes_of
 from .records import Records, centred_slope
 
-__all__ = ["Bank", "Group", "Other", "build", "replaced_map"]
+__all__ = ["Bank", "Group", "Other", "build", "proportional_map", "replaced_map"]
 
 Array = NDArray[np.float64]
 
@@ -230,17 +230,31 @@ def _inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], Array, 
 
 def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[Array, NDArray[np.bool_]]:
     """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
+    seen = _moved_inputs(records, candidate)
+    maps = [records.average_run(k, basis(t, slope)) for k, (t, slope, _) in enumerate(seen)]
+    return np.concatenate(maps), np.concatenate([known for _, _, known in seen])
+
+
+def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | None) -> Array:
+    """Block means of `MapBasis.proportional` of changed inputs (None: of the plain ones), shape (N, k)."""
+    if candidate is None:
+        seen = [(run.history.temperature_c, centred_slope(run.history)) for run in records.runs]
+    else:
+        seen = [(t, slope) for t, slope, _ in _moved_inputs(records, candidate)]
+    return records.average([basis.proportional(t, slope) for t, slope in seen])
+
+
+def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+    """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
     features = terms.CATALOGUE[candidate.id].features
     assert features is not None
-    maps, known = [], []
+    out = []
     for k, run in enumerate(records.runs):
         seen = features(run.history, candidate.values)
-        slope = seen.columns[:, 1]
+        temperature, slope = seen.columns[:, 0], seen.columns[:, 1]
+        known = np.ones(records.kept[k].size, dtype=bool)
         if candidate.id == "time_misalignment":
-            moved = replace(run.history, temperature_c=seen.columns[:, 0])
-            slope = centred_slope(moved)
-            known.append(records.average_run(k, seen.known.astype(float)) > 0.999)
-        else:
-            known.append(np.ones(records.kept[k].size, dtype=bool))
-        maps.append(records.average_run(k, basis(seen.columns[:, 0], slope)))
-    return np.concatenate(maps), np.concatenate(known)
+            slope = centred_slope(replace(run.history, temperature_c=temperature))
+            known = records.average_run(k, seen.known.astype(float)) > 0.999
+        out.append((temperature, slope, known))
+    return out

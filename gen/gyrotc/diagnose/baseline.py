@@ -54,6 +54,13 @@ class MapBasis:
         )
         return np.column_stack([np.ones_like(t), t, r, along, across])
 
+    def proportional(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+        """Functions of which dT/dt is a factor at most once, shape (n, 5 + a): no more of the rate than that."""
+        t = (temperature_c - self.middle[0]) / self.half[0]
+        r = (slope_c_per_min - self.middle[1]) / self.half[1]
+        along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
+        return np.column_stack([np.ones_like(t), t, r, t * r, t * t * r, along])
+
     def __call__(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
         """The basis at rows, shape (n, m)."""
         return np.asarray(self.raw(temperature_c, slope_c_per_min) @ self.mix)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .bank import Other
+from .bank import Other, proportional_map
 from .catalogue import PENALTY
 from .detect import ratio_of
 from .likelihood import Gains
@@ -19,6 +19,8 @@ __all__ = ["Contest", "contest"]
 
 Array = NDArray[np.float64]
 
+_BENT = "memory that does not act in proportion"
+_BEND, _BEND_SHARE = 15.0, 0.1  # energy, and share of the cause's gain, that a map may bend more than before
 _OWN = 1e-3  # share of a column's energy that must be its own beside the model
 
 
@@ -53,13 +55,42 @@ def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[s
         for kept in itertools.combinations(range(len(causes)), count):
             some = [causes[k] for k in kept]
             held = _held(gains, edges, some, [white[k] for k in kept])
-            base = _energy(held, gains.target) - price * sum(PENALTY[c.candidate.id] for c in some)
+            base = _criterion(gains, edges, some, [white[k] for k in kept], price)
             best = _strongest(held, gains, others, price, instead)
             found.append(Contest(best.name, base + best.lead - own))
     if local:  # a map that a switch changes imitates a finer map of part of the range, so it has to add to it
         held = _held(gains, edges, causes, white)
         found.append(_strongest(held, gains, others, price, [g for g in groups if g.common]))
+    found += [
+        _bent(gains, edges, causes, white, k) for k, c in enumerate(causes) if c.candidate.role == "input"
+    ]
     return max(found, key=lambda c: c.lead)
+
+
+def _bent(
+    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array], k: int
+) -> Contest:
+    """Whether a map of moved inputs needs more of the rate than a factor, more than the map of plain inputs does.
+
+    A late map imitates memories that act other than in proportion by bending over dT/dt. The map of a true lag
+    is less bent there than the one that stands in for it.
+    """
+    records, basis = gains.search.records, gains.search.bank.basis
+    rest = [c for i, c in enumerate(causes) if i != k]
+    beside = [w for i, w in enumerate(white) if i != k]
+    moved = gains.whiten(proportional_map(records, basis, causes[k].candidate))
+    plain = gains.whiten(proportional_map(records, basis, None))
+    full = _energy(_held(gains, edges, causes, white), gains.target)
+    bend = full - _energy(_orthonormal([gains.dropped, *edges, moved, *beside]), gains.target)
+    static = _energy(_held(gains, edges, rest, beside), gains.target)
+    usual = static - _energy(_orthonormal([gains.dropped, *edges, plain, *beside]), gains.target)
+    return Contest(_BENT, bend - usual - max(_BEND, _BEND_SHARE * (full - static)))
+
+
+def _orthonormal(blocks: Sequence[Array]) -> Array:
+    q, r = np.linalg.qr(np.column_stack(blocks))
+    size = np.abs(np.diag(r))
+    return np.asarray(q[:, size > 1e-9 * size.max()])
 
 
 def _instead(
@@ -72,8 +103,9 @@ def _instead(
     ids: Sequence[str],
 ) -> float:
     """Criterion with the k-th cause replaced by the best of some that add one column."""
-    kept = [i for i in range(len(causes)) if i != k]
-    held = _held(gains, edges, [causes[i] for i in kept], [white[i] for i in kept])
+    some = [c for i, c in enumerate(causes) if i != k]
+    beside = [w for i, w in enumerate(white) if i != k]
+    held = _held(gains, edges, some, beside)
     at = [s.start for c, s in gains.plain if c.id in ids and s.stop - s.start == 1]
     if not at:
         return -np.inf
@@ -82,16 +114,14 @@ def _instead(
     power = np.einsum("ij,ij->j", rest, rest)
     own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
     energy = np.where(own, (rest.T @ gains.target) ** 2 / np.where(own, power, 1.0), 0.0)
-    free = sum(PENALTY[causes[i].candidate.id] for i in kept) + max(PENALTY[i] for i in ids)
-    return _energy(held, gains.target) + float(energy.max()) - price * free
+    base = _criterion(gains, edges, some, beside, price)
+    return base + float(energy.max()) - price * max(PENALTY[i] for i in ids)
 
 
 def _held(gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array]) -> Array:
     """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
     swapped = any(c.candidate.role == "input" for c in causes)
-    q, r = np.linalg.qr(np.column_stack([gains.dropped, *edges, *([] if swapped else [gains.map]), *white]))
-    size = np.abs(np.diag(r))
-    return np.asarray(q[:, size > 1e-9 * size.max()])
+    return _orthonormal([gains.dropped, *edges, *([] if swapped else [gains.map]), *white])
 
 
 def _energy(held: Array, y: Array) -> float:
@@ -99,9 +129,9 @@ def _energy(held: Array, y: Array) -> float:
 
 
 def _criterion(
-    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: list[Array], price: float
+    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array], price: float
 ) -> float:
-    """Of the causes; one with a common variance of many weights is weighed as such."""
+    """Of a set of causes; one with a common variance of many weights is weighed as such."""
     random = [k for k, c in enumerate(causes) if c.candidate.role == "variance"][-1:]
     fixed = [k for k in range(len(causes)) if k not in random]
     held = _held(gains, edges, [causes[k] for k in fixed], [white[k] for k in fixed])
