@@ -12,7 +12,7 @@ import re
 import shutil
 import struct
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from .vectors import MISSING, make_vectors
 
 __all__ = [
     "Emission",
+    "answers_text",
     "emit",
     "emit_texts",
     "emitted_model",
@@ -224,15 +225,18 @@ def emit_texts(
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
         texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
-    texts[f"vectors_{model.id}.txt"] = _answers_text(emission, vectors)
+    texts[f"vectors_{model.id}.txt"] = answers_text(
+        {n: answers(t, vectors) for n, t in emission.tables.items()}
+    )
     return texts
 
 
-def _answers_text(emission: Emission, vectors: Any) -> bytes:
-    parts = []
-    for numeric, table in emission.tables.items():
-        rows = answers(table, vectors)
-        parts.append(f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows))
+def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
+    """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
+    parts = [
+        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows)
+        for numeric, rows in expected.items()
+    ]
     return b"".join(parts)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,13 +43,14 @@ _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensate
 class Replayed:
     """One run replayed, every row of the file.
 
-    Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps.
+    Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps (None: not
+    compared).
     """
 
     bias_dph: NDArray[np.float64]
     status: NDArray[np.int32]
     scored: NDArray[np.bool_]
-    mismatches: int
+    mismatches: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class _Part:
 
     run: Run
     averages: Averages
-    mismatches: int
+    mismatches: int | None
     facts: RunFacts
 
 
@@ -70,6 +71,7 @@ def evaluate(
     average_s: float | None = None,
     trace: Path | None = None,
     training: Mapping[str, Any] | None = None,
+    compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Evaluates `folder` (model and C) on a data set; the JSON object of `gyrotc evaluate`.
@@ -80,6 +82,7 @@ def evaluate(
         trace: Folder for one CSV per run.
         training: The object of `training.json`; default that of `folder`, where it was made from these
             recordings. Without an exam run its figures of spans left out count.
+        compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
 
     Raises:
         InputError: No emitted code of the model, or the data lack a channel it needs.
@@ -93,14 +96,14 @@ def evaluate(
     table = tables[chosen]
     window = average_s or model.average_s
     parts = []
-    with _program(folder / "c", model, table) as program:
+    with _program(folder / "c", model, table) if compiled else nullcontext() as program:
         for run in dataset.runs:
             if progress:
                 progress(run.file)
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
-    sizes = footprint(folder / "c", model, table)
+    sizes = footprint(folder / "c", model, table) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
     if result["exam"] is None and training:
@@ -132,9 +135,14 @@ def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Targe
         yield target, program
 
 
-def replay_run(rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path]) -> Replayed:
+def replay_run(
+    rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
+) -> Replayed:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
     history = history_of(rows, run.row_period_s, model, table)
+    if program is None:
+        known = history.reference
+        return Replayed(table.decode_bias(known.bits), known.status, known.block_valid, None)
     try:
         replayed = replay_on(*program, history)
     except CheckFailed as error:
@@ -151,7 +159,7 @@ def _one_run(
     run: Run,
     model: Model,
     table: Table,
-    program: tuple[Target, Path],
+    program: tuple[Target, Path] | None,
     *,
     average_s: float,
     trace: Path | None,
@@ -233,7 +241,9 @@ def _result(
         "average_s": average_s,
         "noise_floor_dph": floor if floor is not None else model.noise_floor_dph,
         "noise_floor_source": source,
-        "mismatches": sum(p.mismatches for p in parts),
+        "mismatches": None
+        if any(p.mismatches is None for p in parts)
+        else sum(p.mismatches or 0 for p in parts),
         "runs": [_run_entry(p, average_s) for p in parts],
         "train": pooled(train) if train else None,
         "exam": pooled(exam) if exam else None,

@@ -44,6 +44,7 @@ def verify(
     dataset: Dataset | None = None,
     log: Path | None = None,
     exhaustive: bool = False,
+    compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Verifies `folder/c` against `folder/model.json`; the JSON object of `gyrotc verify`.
@@ -55,6 +56,7 @@ def verify(
         log: Output of a board test that ran elsewhere. Its entries join those of an earlier
             `verify.json` of the same model and code; later calls keep them.
         exhaustive: Visit every input of the fixed-point table besides.
+        compiled: False: no target; images, answers and bounds are checked against the reference alone.
         progress: Called with the name of each target before it is tried.
 
     Raises:
@@ -63,7 +65,7 @@ def verify(
     """
     say = progress or (lambda _: None)
     model = load_model(folder / "model.json")
-    chosen = _choose(targets) if targets or log is None else []
+    chosen = _choose(targets) if compiled and (targets or log is None) else []
     tables = emitted_tables(folder / "c", model)
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..emit import answers_text
 from .board import Job
 
 __all__ = ["c_hash", "check_emitted"]
@@ -32,14 +33,13 @@ def check_emitted(job: Job) -> list[dict[str, Any]]:
 
 
 def _wrong_answers(job: Job) -> int:
-    expected: list[str] = []
-    for numeric, words in job.expected.items():
-        expected.append(f"begin {numeric} {len(words):08x}")
-        expected += [f"{status:08x} {bits:08x}" for status, bits in words.tolist()]
     path = job.c_folder / f"vectors_{job.model.id}.txt"
-    lines = path.read_text(encoding="ascii", errors="replace").splitlines() if path.is_file() else []
-    differing = sum(a != b for a, b in zip(lines, expected, strict=False))
-    return differing + abs(len(lines) - len(expected))
+    data, expected = path.read_bytes() if path.is_file() else b"", answers_text(job.expected)
+    if data == expected:
+        return 0
+    lines, right = data.splitlines(), expected.splitlines()
+    differing = sum(a != b for a, b in zip(lines, right, strict=False))
+    return max(1, differing + abs(len(lines) - len(right)))
 
 
 def _wrong_words(path: Path, words: list[int]) -> int:
