@@ -1,0 +1,85 @@
+"""Every verdict: when it is given, and in words."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.commands.diagnosis_lines import diagnosis_lines
+from gyrotc.diagnose.advice import VERDICTS, next_steps
+from gyrotc.diagnose.levels import NoiseFinding
+from gyrotc.diagnose.verdict import verdict_of
+
+NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]
+
+
+def attribution(**changes: Any) -> Any:
+    """What `verdict_of` reads: one cause that explains everything, without rivals."""
+    plain: dict[str, Any] = {
+        "detected": True,
+        "causes": ("a cause",),
+        "rivals": ((),),
+        "misfit_p": 0.5,
+        "share": 1.0,
+    }
+    plain["other"] = SimpleNamespace(lead=-np.inf)
+    return SimpleNamespace(**{**plain, **changes})
+
+
+@pytest.mark.parametrize(
+    ("verdict", "found", "noise"),
+    [
+        ("explained", attribution(), []),
+        ("explained", attribution(), NOISE),
+        ("ambiguous", attribution(rivals=(("hysteresis",),)), []),
+        ("partial", attribution(misfit_p=1e-4, share=0.95), []),
+        ("unexplained", attribution(misfit_p=1e-9, share=0.3), []),
+        ("unexplained", attribution(causes=(), rivals=()), []),
+        ("unexplained", attribution(other=SimpleNamespace(lead=1e6)), []),
+        ("noise_differs", attribution(detected=False, causes=(), rivals=()), NOISE),
+        ("consistent", attribution(detected=False, causes=(), rivals=()), []),
+    ],
+)
+def test_the_verdict_follows_from_what_was_found(verdict: str, found: Any, noise: list[NoiseFinding]) -> None:
+    assert verdict_of(found, noise, []) == verdict
+
+
+def test_what_cannot_be_tested_is_not_consistent() -> None:
+    nothing = attribution(detected=False, causes=(), rivals=())
+    assert verdict_of(nothing, [], ["warm_up"]) == "not_testable"
+
+
+def result(verdict: str) -> dict[str, Any]:
+    cause = {
+        "id": "hysteresis", "family": "hysteresis", "name": "A loop", "p_value": 0.001, "gain": None,
+        "parameters": {"width_c": {"value": 4.0, "low": 3.0, "high": 5.0}},
+        "equivalent": ["turn_on_offset"] if verdict == "ambiguous" else [],
+        "separate_by": "holds from both sides" if verdict == "ambiguous" else None,
+    }  # fmt: skip
+    named = verdict in ("explained", "ambiguous", "partial")
+    return {
+        "serial": "G1", "axis": None, "verdict": verdict, "text": "Finding.", "meaning": VERDICTS[verdict],
+        "discrepancies": [], "causes": [cause] if named else [], "extended": None,
+        "considered": [{"id": "warm_up", "detection_limit": {"value": 1e-3, "unit": "deg/h", "parameter": "tau_s"}},
+                       {"id": "cavity_lag", "detection_limit": {"value": None, "unit": "s", "parameter": "tau_s"}}],
+        "next": next_steps(verdict, [cause] if named else [], ["ageing"]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_words_and_a_next_step(verdict: str) -> None:
+    text = "\n".join(diagnosis_lines(result(verdict)))
+    assert text.startswith(f"G1: {verdict.replace('_', ' ')}. Finding.")
+    assert VERDICTS[verdict] in text and "next: " in text
+    assert "warm_up: 0.001 deg/h" in text and "cavity_lag: not visible" in text, "the detection limits"
+
+
+def test_an_ambiguous_verdict_names_the_experiment() -> None:
+    steps = next_steps("ambiguous", result("ambiguous")["causes"], [])
+    assert steps == ["To tell them apart: holds from both sides."]
+
+
+def test_causes_without_an_extension_are_told_so() -> None:
+    assert "no extension is shipped" in "\n".join(diagnosis_lines(result("explained")))
