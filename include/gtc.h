@@ -178,8 +178,8 @@ GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bia
  * angle in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t; in
  * f32, where angles reach 64 arcsec, within one unit or one last place of the largest. t is the sum
  * of the dt given: 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact.
- * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or, in
- * q31, an angle beyond 32 bits); then nothing is lost, the remainder is as it was. */
+ * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or an
+ * angle beyond the numbers of the arithmetic); then nothing is lost, the remainder is as it was. */
 GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);
 GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_state_t *state, int_least32_t dt, int_least32_t *angle);
 

@@ -74,7 +74,7 @@ int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle)
     float low;
     float out;
 
-    if ((state == NULL) || (angle == NULL) || (state->table == NULL) || FN(is_missing)(dt)) {
+    if ((state == NULL) || (angle == NULL) || (state->table == NULL) || (FN(is_missing)(dt) != 0)) {
         return GTC_E_ARG;
     }
     if ((dt < 0.0F) || (dt > 1000.0F)) {
@@ -86,6 +86,9 @@ int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle)
     low = low + error;
     FN(exact_sum)(sum, low, &sum, &low);
     out = FN(rounded)(sum);
+    if (FN(is_missing)(out) != 0) {
+        return GTC_E_ARG;
+    }
     sum = sum - out;
     FN(exact_sum)(sum, low, &state->angle[0], &state->angle[1]);
     *angle = out;

@@ -413,8 +413,10 @@ static inline int_least64_t FN(scaled)(uint_least32_t k, int_least64_t x)
 /* base + sum / n */
 static inline int_least32_t FN(mean)(int_least32_t base, int_least64_t sum, uint_least32_t n)
 {
-    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(base + FN(divided)(sum, n)));
-    return base + (int_least32_t)FN(divided)(sum, n);
+    const int_least64_t mean = base + FN(divided)(sum, n);
+
+    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(mean));
+    return (int_least32_t)mean;
 }
 
 /* num / den */

@@ -135,6 +135,20 @@ TEST(large_angles_carry_what_a_float_cannot_hold)
         CHECK(((double)state.angle[0] + (double)state.angle[1]) == rest);
     }
 }
+
+TEST(an_angle_that_is_no_number_is_refused_and_leaves_no_trace)
+{
+    num_t bias;
+    state_t state = in_force(&bias);
+    const state_t before = state;
+    num_t angle = 7.0F;
+
+    state.bias = 3.0e38F;
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, 1000.0F, &angle));
+    CHECK_INT(GTC_E_ARG, FN(angle)(&state, 0.001F, &angle));
+    CHECK(same(angle, 7.0F));
+    CHECK(same(state.angle[0], before.angle[0]) && same(state.angle[1], before.angle[1]));
+}
 #endif
 
 int main(void)
@@ -146,6 +160,7 @@ int main(void)
     RUN(an_angle_beyond_32_bits_is_refused);
 #else
     RUN(large_angles_carry_what_a_float_cannot_hold);
+    RUN(an_angle_that_is_no_number_is_refused_and_leaves_no_trace);
 #endif
     return test_end();
 }

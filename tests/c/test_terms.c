@@ -208,6 +208,18 @@ TEST(times_without_power_add_up)
 }
 
 #if TEST_Q31
+/* Differences within a block of up to 2^32. */
+TEST(an_auxiliary_channel_has_the_mean_of_its_extremes)
+{
+    state_t state = started_with(&TERMS);
+
+    (void)samples(&state, C(15.0), 0, (int)N);
+    (void)sample(&state, C(15.0), -0x7FFFFFFF);
+    (void)samples(&state, C(15.0), 0x7FFFFFFF, (int)N - 1);
+    (void)sample(&state, C(15.0), 0);
+    CHECK_INT(0x40000000, state.term[3][0]);
+}
+
 TEST(what_terms_add_saturates)
 {
     table_t table = TERMS;
@@ -262,6 +274,7 @@ int main(void)
     RUN(memories_and_plays_outlast_a_time_without_power);
     RUN(times_without_power_add_up);
 #if TEST_Q31
+    RUN(an_auxiliary_channel_has_the_mean_of_its_extremes);
     RUN(what_terms_add_saturates);
 #endif
     RUN(terms_without_their_code_or_channel_are_refused);

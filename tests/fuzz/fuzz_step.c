@@ -1,0 +1,75 @@
+/* fuzz_step.c - any sequence of init, sample, missed, bias, angle, save and restore, with any numbers.
+ *
+ * Every status is one of those that gtc.h names, every correction a number, and a state that was
+ * saved and restored is the state.
+ */
+#include "fuzz.h"
+
+static void check_status(int status)
+{
+    CLAIM((status >= 0) && ((status & ~REMARKS) == 0));
+}
+
+static void save_and_restore(state_t *state)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    gtc_word_t again[GTC_SAVE_WORDS];
+
+    CLAIM(FN(save)(state, words) == GTC_OK);
+    CLAIM(FN(restore)(state, state->table, state->samples_per_block, words, 0U) == GTC_OK);
+    CLAIM(FN(save)(state, again) == GTC_OK);
+    CLAIM(memcmp(words, again, sizeof words) == 0);
+}
+
+static void step(stream_t *in, state_t *state)
+{
+    num_t channels[3] = {0, 0, 0};
+    num_t result = C(77);
+    int status;
+
+    switch (next_byte(in) % 8U) {
+    case 0:
+        check_status(FN(missed)(state, next_word(in)));
+        break;
+    case 1:
+        status = FN(angle)(state, next_number(in), &result);
+        CLAIM((status == GTC_E_ARG) ? same(result, C(77)) : is_number(result));
+        break;
+    case 2:
+        save_and_restore(state);
+        break;
+    case 3: /* anything at all */
+        channels[0] = next_number(in);
+        channels[1] = next_number(in);
+        check_status(FN(sample)(state, channels));
+        break;
+    default: /* something plausible */
+        channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
+        channels[1] = channels[0];
+        check_status(FN(sample)(state, channels));
+        break;
+    }
+    check_status(FN(bias)(state, &result));
+    CLAIM(is_number(result));
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    stream_t in = {data, size};
+    const table_t *const table = next_table(&in);
+    const uint_least32_t n = next_byte(&in);
+    state_t state;
+
+    memset(&state, 0xA5, sizeof state);
+    if (n == 0U) {
+        const uint_least32_t any = next_word(&in);
+
+        CLAIM(FN(init)(&state, table, any) == (((any >= 1U) && (any <= 0x100000U)) ? GTC_OK : GTC_E_ARG));
+        return 0;
+    }
+    CLAIM(FN(init)(&state, table, n) == GTC_OK);
+    while (in.left > 0U) {
+        step(&in, &state);
+    }
+    return 0;
+}
