@@ -61,7 +61,7 @@ def ran_and_differed(entry: dict[str, Any]) -> bool:
     """The program ran to its end and its results differ: what a negative control must show."""
     caught = entry["status"] == "fail" and "error" not in entry and entry["mismatches"] > 0
     if caught:
-        control = os.environ.get("PYTEST_CURRENT_TEST", "").partition(" ")[0]
+        control = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" (")[0]
         CAUGHT.append({"control": control, **{k: entry[k] for k in _SHOWN}})
     return caught
 
