@@ -1,4 +1,4 @@
-"""Records of extension terms: kind, channel, six parameters (docs/numerics.md, section 7).
+"""Records of extension terms: kind, channel, six parameters (docs/numerics.md, section 8).
 
 Exponentials by decimal arithmetic, so that a record is the same on every machine.
 """
