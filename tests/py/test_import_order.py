@@ -52,6 +52,7 @@ ORDER = [
     "comparison",
     "triad",
     "build",
+    "fleet",
     "commands",
     "cli",
 ]

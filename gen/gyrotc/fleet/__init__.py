@@ -1,0 +1,11 @@
+"""Many serials: a manifest of data sets in, a verified table for each and one summary out.
+
+Each serial is a job of its own: one that fails does not stop the others, one that is done is not done again.
+"""
+
+from .manifest import Fleet, Unit, load_manifest
+from .outliers import Outlier, outliers
+from .page import write_summary
+from .run import run_fleet
+
+__all__ = ["Fleet", "Outlier", "Unit", "load_manifest", "outliers", "run_fleet", "write_summary"]

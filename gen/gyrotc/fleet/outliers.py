@@ -1,0 +1,66 @@
+"""Serials that differ from the rest of their fleet: robust distance of each figure from the fleet's median."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["FIGURES", "Outlier", "outliers", "spread"]
+
+#: Figures that are looked at, and whether they are compared by their ratio (logarithm).
+FIGURES = {
+    "before_rms_dph": True,
+    "after_rms_dph": True,
+    "rms_over_floor": True,
+    "noise_floor_dph": True,
+    "bias_dph": False,
+    "after_mean_dph": False,
+    "sum_abs_weights_dph": True,
+}
+_LEAST = 8  # fewer serials do not say what a usual one is
+_SIGMAS = 5.0
+_MAD_TO_SIGMA = 1.4826
+_LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A figure of a serial, the fleet's median of it, and the distance in robust standard deviations."""
+
+    name: str
+    figure: str
+    value: float
+    median: float
+    sigmas: float
+
+
+def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] | None:
+    """Median, least and largest value of a figure; None where no serial has it."""
+    values = [entry[figure] for entry in entries if entry.get(figure) is not None]
+    if not values:
+        return None
+    return {"median": float(np.median(values)), "least": float(min(values)), "largest": float(max(values))}
+
+
+def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
+    """Serials that stand apart, the farthest first; each serial with each of its figures that does."""
+    found = []
+    for figure, by_ratio in FIGURES.items():
+        known = [e for e in entries if e.get(figure) is not None and (e[figure] > 0.0 or not by_ratio)]
+        if len(known) < _LEAST:
+            continue
+        values = np.array([entry[figure] for entry in known])
+        scaled = np.log(values) if by_ratio else values
+        apart = np.abs(scaled - np.median(scaled))
+        sigma = max(_MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
+        if sigma == 0.0:
+            continue
+        found += [
+            Outlier(entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma))
+            for entry, value, distance in zip(known, values, apart, strict=True)
+            if distance > _SIGMAS * sigma
+        ]
+    return sorted(found, key=lambda o: (-o.sigmas, o.name))

@@ -1,0 +1,236 @@
+"""Many serials at once: one that fails does not stop the others, what is done stays done, the odd one is named."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Command
+from gyrotc.errors import InputError
+from gyrotc.fitting import FitOptions
+from gyrotc.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
+from gyrotc.fleet import run as running
+from recordings import columns, toml, write_csv
+
+HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
+
+
+def gyro(folder: Path, serial: str, *, seed: int = 1, factor: float = 1.0) -> None:
+    """Two hours of a small gyro; `factor` scales its rate."""
+    rows = columns(720, seed=seed)
+    write_csv(folder / "run-01.csv", rows | {"rate_dph": factor * (rows["rate_dph"] - 20.0)})
+    (folder / "dataset.toml").write_text(toml('file = "run-01.csv"', head=HEAD.format(serial)))
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Path:
+    """Two gyros and one whose recording is no recording."""
+    for k in (1, 2):
+        gyro(tmp_path / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    gyro(tmp_path / "data" / "RLG-3", "RLG-3")
+    (tmp_path / "data" / "RLG-3" / "run-01.csv").write_text("time_s,rate_dph\n")
+    return tmp_path / "data"
+
+
+def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Command) -> None:
+    out = tmp_path / "out"
+    done = gyrotc("fleet", three, "--out", out, "--json", tmp_path / "fleet.json")
+    assert done.returncode == 1
+    assert done.stderr == "gyrotc: 1 of 3 gyros failed\n"
+    lines = {line.split(":")[0]: line for line in done.stdout.splitlines()}
+    assert "done; RMS" in lines["RLG-1"] and "done; RMS" in lines["RLG-2"]
+    assert "failed; run-01.csv, line 1: no column temperature_c" in lines["RLG-3"]
+    summary = json.loads((out / "fleet.json").read_text())
+    assert json.loads((tmp_path / "fleet.json").read_text()) == summary
+    assert (summary["schema"], summary["done"], summary["failed"]) == ("gyrotc.fleet/1", 2, 1)
+    rows = list(csv.DictReader((out / "fleet.csv").open()))
+    assert [row["status"] for row in rows] == ["done", "done", "failed"]
+    assert "RLG-3" in (out / "fleet.html").read_text()
+
+    verified = gyrotc("verify", out / "RLG-1", "--target", "host-gcc-O2")
+    assert verified.returncode == 0, verified.stderr
+    before = {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")}
+    gyro(three / "RLG-3", "RLG-3", seed=3)
+    again = gyrotc("fleet", three, "--out", out)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.count("done (done before)") == 2 and "RLG-3: done; RMS" in again.stdout
+    assert {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")} == before
+
+
+def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyrotc: Command) -> None:
+    """What the reference says that the C code does is what the C code does."""
+    fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
+    [entry] = run_fleet(fleet, tmp_path / "quick", jobs=1)
+    [whole] = run_fleet(fleet, tmp_path / "full", jobs=1, full=True)
+    names = set(entry) - {"key"}
+    assert {name: entry[name] for name in names} == {name: whole[name] for name in names}
+    assert (tmp_path / "full" / "RLG-1" / "report.html").is_file()
+    for name in ("model.json", "c/gtc_rlg_1.c", "c/gtc_rlg_1.bin"):
+        assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (
+            tmp_path / "full" / "RLG-1" / name
+        ).read_bytes()
+
+
+def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
+    gyro(tmp_path / "a" / "RLG-1", "RLG-1")
+    rows = columns(360)
+    table = {name: rows[name] for name in ("time_s", "temperature_c")}
+    write_csv(tmp_path / "IMU" / "a.csv", table | {f"rate_{a}_dph": rows["rate_dph"] - 20.0 for a in "xy"})
+    (tmp_path / "product.toml").write_text("schema = 1\n[at_most]\ncenters = 0\n")
+    manifest = tmp_path / "fleet.toml"
+    manifest.write_text(
+        'schema = 1\ndatasets = ["a/*"]\nlimits = "product.toml"\nnumeric = ["f32"]\n'
+        '[options]\nblock_s = 20.0\n[[unit]]\ndataset = "IMU"\naxis = "all"\n'
+    )
+    fleet = load_manifest(manifest)
+    assert [unit.name for unit in fleet.units] == ["RLG-1", "IMU-x", "IMU-y"]
+    entries = run_fleet(fleet, tmp_path / "out", jobs=2)
+    assert [entry["status"] for entry in entries] == ["failed"] * 3
+    assert "at_most.centers 0.0 is not met" in entries[0]["reason"]
+    assert json.loads((tmp_path / "out" / "IMU-x" / "model.json").read_text())["block_s"] == 20.0
+    assert json.loads((tmp_path / "out" / "IMU-y" / "limits.json").read_text())["met"] is False
+
+
+REFUSED = {
+    "nothing": ("schema = 1", "0 data sets"),
+    "no schema": ('datasets = ["*"]', "schema"),
+    "typing error": ('schema = 1\ndataset = ["*"]', "field dataset"),
+    "no match": ('schema = 1\ndatasets = ["x-*"]', "matches no folder"),
+    "outside": ('schema = 1\ndatasets = ["../*"]', "below the manifest's folder"),
+    "twice": ('schema = 1\ndatasets = ["d/*", "d/RLG-1"]', "both RLG-1"),
+    "unknown axis": ('schema = 1\n[[unit]]\ndataset = "d/RLG-1"\naxis = "w"', "unit.0.axis"),
+    "unknown option": ('schema = 1\ndatasets = ["d/*"]\n[options]\nblocks = 1', "options.blocks"),
+    "no limits file": ('schema = 1\ndatasets = ["d/*"]\nlimits = "no.toml"', "no.toml"),
+    "broken": ("schema", "no TOML"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_wrong_manifest_is_refused(case: str, tmp_path: Path) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    text, told = REFUSED[case]
+    (tmp_path / "fleet.toml").write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_manifest(tmp_path / "fleet.toml")
+    assert told in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
+    done = gyrotc("fleet", tmp_path / "none.toml", "--out", tmp_path / "out")
+    assert done.returncode == 2 and "none.toml" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        gyro(tmp_path / "d" / name, "RLG-1")
+    entries = run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out")
+    assert [entry["status"] for entry in entries] == ["failed", "failed"]
+    assert "serial RLG-1 is also that of another" in entries[0]["reason"]
+
+
+def _dies(task: Any) -> dict[str, Any]:
+    """Stands in for a job whose process is killed (out of memory)."""
+    if task.unit.name == "RLG-2":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"name": task.unit.name, "axis": None, "status": "done"}
+
+
+def test_a_process_that_dies_takes_no_other_gyro_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, "do_unit", _dies)
+    units = tuple(Unit(tmp_path / f"RLG-{k}", None) for k in range(5))
+    entries = run_fleet(Fleet(units, FitOptions(), None, None), tmp_path / "out")
+    assert [entry["status"] for entry in entries] == ["done", "done", "failed", "done", "done"]
+    assert "its process died" in entries[2]["reason"]
+
+
+def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) -> None:
+    for k in range(6):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    out = tmp_path / "out"
+    program = Path(sys.executable).with_name("gyrotc")
+    job = subprocess.Popen(
+        [program, "fleet", tmp_path / "d", "--out", out, "--jobs", "1"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    while not (out / "RLG-1" / "entry.json").is_file():
+        assert job.poll() is None
+        time.sleep(0.01)
+    os.killpg(job.pid, signal.SIGKILL)
+    job.wait()
+    done = gyrotc("fleet", tmp_path / "d", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("done (done before)") >= 2
+    assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
+        *(f"RLG-{k}" for k in range(6)), "fleet.json", "fleet.csv", "fleet.html",
+    }  # fmt: skip
+
+
+def _entries(n: int, seed: int) -> list[dict[str, Any]]:
+    draw = np.random.default_rng(seed)
+    names = ("before_rms_dph", "after_rms_dph", "noise_floor_dph", "rms_over_floor", "sum_abs_weights_dph")
+    return [
+        {"name": f"RLG-{k}"} | {name: float(np.exp(0.1 * draw.normal())) for name in names}
+        | {"bias_dph": draw.normal(), "after_mean_dph": 1e-5 * draw.normal()} for k in range(n)
+    ]  # fmt: skip
+
+
+def test_the_odd_gyro_is_named_and_an_even_fleet_has_none() -> None:
+    seed = int(np.random.default_rng().integers(2**31))
+    print("seed", seed)
+    even = _entries(200, seed)
+    far = outliers(even)
+    assert len(far) <= 2, "5 robust standard deviations of 1400 normal figures"
+    even[7]["after_rms_dph"] *= 3.0
+    even[9]["bias_dph"] = 30.0
+    assert {(o.name, o.figure) for o in outliers(even)} - {(o.name, o.figure) for o in far} == {
+        ("RLG-7", "after_rms_dph"),
+        ("RLG-9", "bias_dph"),
+    }
+    assert outliers(even[:7]) == [], "a handful does not say what is usual"
+
+
+def test_alike_gyros_do_not_stand_apart_by_a_hair() -> None:
+    """Figures that all agree to the last digits have no scatter to stand out of."""
+    entries = [{"name": f"{k}", "noise_floor_dph": 1e-3, "bias_dph": 1.0} for k in range(20)]
+    entries[3]["noise_floor_dph"] = 1.01e-3
+    assert outliers(entries) == []
+    entries[3]["noise_floor_dph"] = 1.1e-3
+    assert [o.name for o in outliers(entries)] == ["3"]
+
+
+def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) -> None:
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+        done = gyrotc(
+            "fleet", tmp_path / "d", "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:8786"
+        )
+        assert done.returncode == 2 and "Dask is not installed" in done.stderr
+    else:
+        pytest.skip("Dask is installed")
+
+
+def test_on_dask(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    for k in range(3):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    shutil.rmtree(tmp_path / "out", ignore_errors=True)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        entries = run_fleet(
+            load_manifest(tmp_path / "d"), tmp_path / "out", scheduler=cluster.scheduler_address
+        )
+    assert [entry["status"] for entry in entries] == ["done"] * 3
