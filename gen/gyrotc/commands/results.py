@@ -45,6 +45,15 @@ def span_lines(training: dict[str, Any]) -> Iterator[str]:
             yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
 
 
+def prediction_line(training: dict[str, Any]) -> str:
+    """What training expects of recordings that it has not seen, or why it does not say."""
+    ratio = training["predicted_rms_ratio"]
+    floor = f"noise floor {training['noise_floor_dph']:.3g} deg/h"
+    if ratio is None:
+        return f"{floor}; no prediction of RMS over it: {training['prediction_withheld']}"
+    return f"{floor}; predicted RMS over it: {ratio:.4f}"
+
+
 def verify_table(result: dict[str, Any]) -> RichTable:
     table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("target", "", "status"):

@@ -33,7 +33,7 @@ from .base import (
     tell,
     write_json,
 )
-from .results import evaluation_table, span_lines, verify_notes, verify_table
+from .results import evaluation_table, prediction_line, span_lines, verify_notes, verify_table
 
 
 @app.command()
@@ -69,6 +69,7 @@ def fit(
         tell(line)
     for finding in fitted.training["findings"]:
         tell(f"finding {finding['id']}: {finding['text']}")
+    tell(prediction_line(fitted.training))
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
 
 
