@@ -80,7 +80,7 @@ def diagnose(
     if float(np.ptp(temperature)) < _LITTLE_C:
         return Diagnosis(_not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
-    cycle = cycle_of(records) if is_single_cycle(records) and analysis.attribution.detected else None
+    cycle = cycle_of(records) if is_single_cycle(records) else None
     if cycle is not None:
         analysis = replace(
             analysis,

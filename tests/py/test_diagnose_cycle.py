@@ -1,0 +1,98 @@
+"""A single chamber cycle: when it counts as one, what is chosen, and that the map beside it has no rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.dataset import load
+from gyrotc.diagnose import diagnose
+from gyrotc.diagnose.cycle import cycle_of, is_single_cycle
+from gyrotc.diagnose.recordings import records_of
+from gyrotc.diagnose.records import Records
+from gyrotc.fitting import FitOptions
+from gyrotc.terms.operators import first_order
+
+SEED = 20260321
+ROW_S = 5.0
+TAUS_S = (120.0, 450.0)
+CUT_S = 2850.0  # the end of the second branch
+
+
+def cycle(branches: int) -> tuple[np.ndarray, np.ndarray]:
+    """Time and temperature of ramps between -20 and 70 C, each at another rate."""
+    legs = [1500.0 - 150.0 * k for k in range(branches)]
+    corners = np.concatenate(([0.0], np.cumsum(legs)))
+    time = np.arange(0.0, corners[-1], ROW_S)
+    return time, np.interp(time, corners, np.resize([70.0, -20.0], corners.size))
+
+
+def recorded(folder: Path, temperature: np.ndarray, rate: np.ndarray, exam_from_s: float) -> Path:
+    """One recording, its last part for the exam."""
+    rows = [f"{ROW_S * k:g},{t:.4f},{y:.6g}" for k, (t, y) in enumerate(zip(temperature, rate, strict=True))]
+    (folder / "data.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
+    run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
+    (folder / "dataset.toml").write_text(
+        f'schema = 1\nserial = "C1"\nearth_rate = "none"\n{run}to_s = {exam_from_s}\n'
+        f'{run}from_s = {exam_from_s}\nrole = "exam"\n'
+    )
+    return folder
+
+
+def records(folder: Path) -> Records:
+    return records_of(load(folder), "train", block_s=10.0, average_s=10.0)
+
+
+def two_states(time: np.ndarray, temperature: np.ndarray) -> np.ndarray:
+    """A curved map of T and two first-order states, with noise."""
+    print("seed", SEED)
+    x = (temperature - 25.0) / 45.0
+    states = [first_order(tau, time, temperature) - temperature for tau in TAUS_S]
+    noise = np.random.default_rng(SEED).standard_normal(time.size)
+    return np.asarray(1000.0 * x + 400.0 * x**3 + 20.0 * states[0] - 15.0 * states[1] + 20.0 * noise)
+
+
+def test_a_cycle_is_known_by_its_temperatures(tmp_path: Path) -> None:
+    for branches, single in ((3, True), (8, False)):
+        time, temperature = cycle(branches)
+        folder = tmp_path / str(branches)
+        folder.mkdir()
+        recorded(folder, temperature, np.ones(time.size), float(time[-1]) * 0.99)
+        assert is_single_cycle(records(folder)) is single
+
+
+def test_two_states_are_found(tmp_path: Path) -> None:
+    time, temperature = cycle(3)
+    found = cycle_of(records(recorded(tmp_path, temperature, two_states(time, temperature), CUT_S)))
+    assert [c.candidate.id for c in found.causes] == ["thermal_gradient"] * 2
+    for cause, tau in zip(found.causes, TAUS_S, strict=True):
+        interval = cause.parameters["tau_s"]
+        assert interval.low <= tau <= interval.high
+    assert found.p_value < 1e-6
+
+
+def test_a_map_alone_needs_no_state(tmp_path: Path) -> None:
+    _, temperature = cycle(3)
+    x = (temperature - 25.0) / 45.0
+    noise = np.random.default_rng(SEED).standard_normal(x.size)
+    found = cycle_of(records(recorded(tmp_path, temperature, 1000.0 * x + 20.0 * noise, CUT_S)))
+    assert found.chosen is None and found.causes == ()
+    assert found.rms_dph == pytest.approx(20.0 / np.sqrt(2.0), rel=0.1), "two rows a block"
+
+
+def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> None:
+    """The map of (T, dT/dt) fails on the third branch, states beside a map of T do not."""
+    time, temperature = cycle(3)
+    folder = recorded(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    found = diagnose(load(folder), options=FitOptions(average_s=10.0))
+    assert found.result["verdict"] in ("ambiguous", "partial")
+    extended = found.result["extended"]
+    assert extended["terms"] == ["thermal_gradient", "thermal_gradient"]
+    gain = extended["gain"]
+    assert gain["exam_rms_after_dph"] < 0.5 * gain["exam_rms_before_dph"]
+    assert found.model is not None
+    low, high = found.model.envelope.slope_c_per_min
+    at = np.array([20.0, 20.0])
+    cold, hot = found.model.map_dph(at, np.array([low, high]))
+    assert cold == pytest.approx(hot, rel=1e-5), "no dT/dt in the map"
