@@ -1,18 +1,14 @@
-"""`python -m bench docs`: all measurements into docs/results/bench.json, and its section of docs/results.md."""
+"""`python -m bench docs [--only training|raw|runtime]`: figures into docs/results/, sections of docs/results.md."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import platform
 import sys
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-
-from .accuracy import accuracy
-from .invariance import invariance
-from .page import filled
-from .speed import speed
 
 _PACKAGES = ("gyrotc", "numpy", "scipy", "scikit-learn", "fastcan", "sysidentpy", "minisom")
 
@@ -36,8 +32,13 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def main(docs: Path) -> None:
-    result: dict[str, Any] = {
+def _training(docs: Path) -> None:
+    """Training beside its peers, which the environment of `make bench` has."""
+    from .accuracy import accuracy
+    from .invariance import invariance
+    from .speed import speed
+
+    result = {
         "schema": "gyrotc.bench/1",
         "machine": _machine(),
         "versions": {name: version(name) for name in _PACKAGES},
@@ -45,14 +46,51 @@ def main(docs: Path) -> None:
         "accuracy": accuracy(_say),
         "invariance": invariance(_say),
     }
+    _write_training(docs, result)
+
+
+def _raw(docs: Path) -> None:
+    """The job on raw recordings alone, which has no peer; the other figures of training stay."""
+    from .speed import raw
+
+    result = json.loads((docs / "results" / "bench.json").read_text("utf-8"))
+    result["speed"]["raw"] = raw(_say)
+    _write_training(docs, result)
+
+
+def _write_training(docs: Path, result: dict[str, Any]) -> None:
+    from .page import filled
+
     (docs / "results").mkdir(exist_ok=True)
     (docs / "results" / "bench.json").write_text(
         json.dumps(result, indent=1, ensure_ascii=False) + "\n", "utf-8"
     )
     page = docs / "results.md"
     page.write_text(filled(page.read_text("utf-8") if page.exists() else None, result), "utf-8")
-    print(page)
+
+
+def _runtime(docs: Path) -> None:
+    """The C runtime, in emulators."""
+    from .runtime import runtime
+    from .runtime_page import section, write
+
+    write(docs, "runtime", runtime(_say), section)
+
+
+_PARTS = {"training": _training, "runtime": _runtime}
+_ALONE = {"raw": _raw}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m bench")
+    parser.add_argument("docs", type=Path)
+    parser.add_argument("--only", choices=[*_PARTS, *_ALONE])
+    chosen = parser.parse_args()
+    parts = _PARTS if chosen.only is None else {chosen.only: (_PARTS | _ALONE)[chosen.only]}
+    for part in parts.values():
+        part(chosen.docs)
+    print(chosen.docs / "results.md")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -18,7 +18,7 @@ from typing import Any
 from . import learning, pieces, selection
 from .cell import LIMIT_S
 
-__all__ = ["speed"]
+__all__ = ["raw", "speed"]
 
 _SELECTIONS = (  # samples, grid, widths
     (1728, (25, 12), 7),
@@ -36,7 +36,7 @@ Say = Callable[[str], None]
 def speed(say: Say) -> dict[str, Any]:
     """All tables of the section on speed."""
     return {
-        "raw": _raw(say),
+        "raw": raw(say),
         "selection": [_selection(*cell, say) for cell in _SELECTIONS],
         "learning": [_learning(scenario, say) for scenario in ("paper", "paper-ripple-strong")],
         "kohonen": _each(pieces.KOHONEN, ["172800", "300"], "kohonen", say),
@@ -80,15 +80,15 @@ def _learning(scenario: str, say: Say) -> dict[str, Any]:
     return {"scenario": scenario, "rows": _each(learning.CONTESTANTS, [scenario, "1"], "learning", say)}
 
 
-def _raw(say: Say) -> dict[str, Any]:
+def raw(say: Say) -> dict[str, Any]:
     """Six runs of 2.88 million rows (100 Hz, Parquet) to a C file that is proven on this machine."""
     program = str(Path(sys.executable).with_name("gyrotc"))
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         say("raw recordings: simulating")
-        subprocess.run(
+        simulated = _child(
             [program, "simulate", "paper", "--seed", "1", "--raw-hz", "100", "--format", "parquet",
-             "--out", str(folder / "all")], check=True, capture_output=True,
+             "--out", str(folder / "all")]
         )  # fmt: skip
         (folder / "data").mkdir()
         for k in range(_RAW_RUNS):
@@ -103,6 +103,7 @@ def _raw(say: Say) -> dict[str, Any]:
             say(f"raw recordings: {step[0]}")
             steps.append({"step": step[0], **_child([program, *step])})
     return {
+        "simulated": simulated,
         "steps": steps,
         "seconds": sum(s["seconds"] for s in steps),
         "elapsed_s": sum(s["elapsed_s"] for s in steps),
