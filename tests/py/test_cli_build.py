@@ -103,7 +103,7 @@ def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:
 
 
 def test_ten_gyros_reach_the_floor(tmp_path: Path) -> None:
-    """Pooled exam RMS ÷ floor through compiled C: median ≤ 1.006, worst ≤ 1.015; tables ≤ 144 bytes."""
+    """Pooled exam RMS ÷ floor: median ≤ 1.006, worst ≤ 1.015; tables ≤ 144 bytes. One of them through compiled C."""
     ratios = []
     for seed in range(1, 11):
         data, out = tmp_path / f"d{seed}", tmp_path / f"r{seed}"
@@ -112,8 +112,8 @@ def test_ten_gyros_reach_the_floor(tmp_path: Path) -> None:
         model = fit_dataset(recordings, FitOptions()).model
         model.save(out / "model.json")
         emit(model, out, numerics=["f32"])
-        evaluation = evaluate(out, recordings)
-        assert evaluation["mismatches"] == 0
+        evaluation = evaluate(out, recordings, compiled=seed == 1)
+        assert evaluation["mismatches"] == (0 if seed == 1 else None)
         assert evaluation["model"]["table_bytes"] <= 144
         ratio = evaluation["exam"]["after"]["rms_dph"] / evaluation["noise_floor_dph"]
         needed = 0.97 * evaluation["exam"]["before"]["rms_dph"] / evaluation["noise_floor_dph"]
