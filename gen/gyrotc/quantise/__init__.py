@@ -8,6 +8,9 @@ is refused, with the reason; where the recordings show no noise at all, there is
 
 from __future__ import annotations
 
+import functools
+from dataclasses import dataclass, field
+
 from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..table import Numeric, Table
@@ -32,6 +35,21 @@ def quantise(model: Model, numeric: str) -> Table:
     """
     if numeric not in _MAKERS:
         raise InputError("--numeric", repr(numeric), " or ".join(NUMERICS))
+    return _quantised(_Known(model.hash, model), numeric)
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A model by its hash."""
+
+    hash: str
+    model: Model = field(compare=False)
+
+
+@functools.lru_cache(maxsize=4)
+def _quantised(known: _Known, numeric: str) -> Table:
+    """Kept for the next stages of the same job, which ask again."""
+    model = known.model
     table = with_probes(model, _MAKERS[numeric](model))
     floor = model.noise_floor_dph
     if floor and table.error_bound_dph > _SHARE_OF_FLOOR * floor:

@@ -100,6 +100,10 @@ def cleaned(data: TrainingData) -> TrainingData:
     for name in ("weight", "duration_s"):
         if columns[name].min() <= 0.0:
             raise InputError(f"training data, {name}", repr(float(columns[name].min())), "a number above 0")
+    run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
+    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
+        run_of = columns.pop("run").astype(np.int64)
+        return TrainingData(run=run_of, **columns)
     order = np.lexsort(
         (
             columns["bias_dph"],

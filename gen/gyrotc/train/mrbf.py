@@ -81,6 +81,7 @@ def fit_mrbf(
         curves=curves,
         predicted_rms_ratio=None if withheld else predicted,
         withheld=withheld,
+        process=process,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gyrotc.train.data import Scaling
+from gyrotc.train.process import Process
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict"]
 
@@ -27,6 +28,7 @@ class Outcome:
         predicted_rms_ratio: Predicted RMS over noise floor, None if withheld.
         withheld: Why, empty if it is not.
         polynomial: Further summands (power of z_T, power of z_r, deg/h), for comparison only.
+        process: The evidence model that the networks follow, where the method has one.
     """
 
     networks: Sequence[Network]
@@ -34,6 +36,7 @@ class Outcome:
     predicted_rms_ratio: float | None = None
     withheld: str = "the method predicts nothing"
     polynomial: Sequence[tuple[int, int, float]] = ()
+    process: Process | None = None
 
 
 @dataclass(frozen=True, slots=True)

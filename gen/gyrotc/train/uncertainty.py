@@ -50,7 +50,7 @@ def uncertainty(data: TrainingData, fit: Fit, cells: tuple[int, int] = (12, 8)) 
         cells: Number of cells of T and of dT/dt.
     """
     samples = cleaned(data)
-    process = fit_process(samples, fit.scaling)
+    process = fit.outcome.process or fit_process(samples, fit.scaling)
     t, r = _points(fit, cells)
     scale, between = _calibrated(samples, process, fit)
     departure = predict(fit, t, r) - process.mean_dph(*fit.scaling.normalise(t, r))
