@@ -32,12 +32,12 @@ typedef double exact_t;
 
 /* Asks `calls` times, with the steps in turn: the sum is never further than LIMIT from
  * bias * t. */
-static void sums_to_bias_times_time(const num_t *steps, int n_steps, int calls)
+static void sums_to_bias_times_time(const num_t *steps, int n_steps, long calls)
 {
     num_t bias;
     state_t state = in_force(&bias);
     exact_t rest = 0;
-    int i;
+    long i;
 
     for (i = 0; i < calls; i++) {
         const num_t dt = steps[i % n_steps];
@@ -59,6 +59,13 @@ TEST(the_sum_stays_within_a_unit)
         sums_to_bias_times_time(&steps[i], 1, 50000);
     }
     sums_to_bias_times_time(steps, 7, 100000);
+}
+
+TEST(over_24_hours_the_sum_is_bias_times_time)
+{
+    static const num_t step = 50 * MS;
+
+    sums_to_bias_times_time(&step, 1, 24L * 3600L * 20L);
 }
 
 TEST(it_returns_the_status_in_force)
@@ -154,6 +161,7 @@ TEST(an_angle_that_is_no_number_is_refused_and_leaves_no_trace)
 int main(void)
 {
     RUN(the_sum_stays_within_a_unit);
+    RUN(over_24_hours_the_sum_is_bias_times_time);
     RUN(it_returns_the_status_in_force);
     RUN(bad_arguments_write_nothing);
 #if TEST_Q31
