@@ -1,7 +1,7 @@
 """Hidden effects: fresh recordings of an independent generator, diagnosed by a process that is not told.
 
 The seed of the draws is new in every run and printed; `python -m tests.blind.run --seed N --records 40
---per-campaign 20 --weakest 1.7` makes the same recordings again. `make blind` measures the figures; here only
+--per-campaign 21 --weakest 1.7` makes the same recordings again. `make blind` measures the figures; here only
 what is far from them fails: with the rates below, which are above the measured ones, a test fails by chance
 with a probability below 1e-4.
 """
@@ -34,7 +34,7 @@ def most(total: int, rate: float) -> int:
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
     seed = secrets.randbits(32)
     print(f"seed {seed}")
-    found = run(Plan(seed, RECORDS, 20, 1.7), tmp_path_factory.mktemp("blind"))
+    found = run(Plan(seed, RECORDS, 21, 1.7), tmp_path_factory.mktemp("blind"))
     print(text(found))
     return found
 
@@ -51,7 +51,7 @@ def test_no_diagnosis_breaks_down(rows: list[dict]) -> None:
 
 def test_clean_recordings_and_noise_get_no_cause(rows: list[dict]) -> None:
     clean = [r for r in rows if not r["truth"]]
-    judged(clean, [r for r in clean if (alarmed if r["stratum"] == "clean" else wrong_family)(r)], 0.02)
+    judged(clean, [r for r in clean if (alarmed if r["stratum"] == "clean" else wrong_family)(r)], 0.03)
 
 
 def test_hidden_causes_are_found_with_the_right_family(rows: list[dict]) -> None:
@@ -69,6 +69,5 @@ def test_two_hidden_causes_do_not_become_three(rows: list[dict]) -> None:
     judged(two, [r for r in two if len(r["named"]) > 2], 0.02)
 
 
-def test_effects_that_no_cause_has_are_mostly_not_named(rows: list[dict]) -> None:
-    foreign = [r for r in rows if r["stratum"] == "foreign"]
-    judged(foreign, [r for r in foreign if r["named"]], 0.25)
+def test_names_that_are_not_hidden_are_rare_in_all_recordings(rows: list[dict]) -> None:
+    judged(rows, [r for r in rows if wrong_family(r)], 0.06)
