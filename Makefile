@@ -70,11 +70,15 @@ fuzz:
 	    -print_final_stats=1 build/corpus/$$target || exit 1; \
 	done
 
-## the picture of a report in README.md, by a headless browser
+## the pictures of a report and of a diagnosis in README.md, by a headless browser
 picture: demo
 	@tools/setup.sh picture
 	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1240 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/report.html" >/dev/null 2>&1
+	@$(GYROTC) simulate thermal-gradient --seed 3 --out build/picture-data
+	@$(GYROTC) diagnose build/picture-data --out build/picture >/dev/null
+	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1020 \
+	  --screenshot=docs/diagnosis.png "file://$(CURDIR)/build/picture/report.html" >/dev/null 2>&1
 	@rm -rf build/browser
 
 ## the paper's table and figures again: docs/paper.md

@@ -139,7 +139,7 @@ def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
 ) -> Replayed:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
-    history = history_of(rows, run.row_period_s, model, table)
+    history = history_of(rows, run, model, table)
     if program is None:
         known = history.reference
         return Replayed(table.decode_bias(known.bits), known.status, known.block_valid, None)

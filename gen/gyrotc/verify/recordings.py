@@ -75,7 +75,7 @@ def replay_dataset(
             progress(f"replaying {run.file}")
             rows = run.rows()
             for table in job.tables.values():
-                history = history_of(rows, run.row_period_s, job.model, table)
+                history = history_of(rows, run, job.model, table)
                 same = [lane for lane in lanes.values() if lane.table is table]
                 list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
     for entry in entries:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..applied import channels_of
-from ..dataset import Rows
+from ..dataset import Rows, Run
 from ..errors import CheckFailed
 from ..frontend import missed_before, samples_per_block
 from ..model import Model
@@ -57,15 +57,20 @@ class Replayed:
     first: tuple[str, ...]
 
 
-def history_of(rows: Rows, row_period_s: float, model: Model, table: Table) -> History:
+def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
     """Bits and answers of a recording.
+
+    Where a term counts from power-on and this was before the first row, the blocks between are missing samples.
 
     Raises:
         InputError: It lacks a channel that a term of the model needs.
     """
     channels = channels_of(rows, model, table)
-    missed = missed_before(rows.time_s, row_period_s)
-    per_block = samples_per_block(model.block_s, row_period_s)
+    missed = missed_before(rows.time_s, run.row_period_s)
+    per_block = samples_per_block(model.block_s, run.row_period_s)
+    if run.power_on_s is not None and any(term.id == "warm_up" for term in model.terms):
+        before_s = float(rows.time_s[0]) - run.power_on_s
+        missed[0] = per_block * max(round(before_s / model.block_s), 0)
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)
     return History(channels, missed, per_block, answers)
 
