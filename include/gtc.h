@@ -53,6 +53,20 @@ extern "C" {
 #define GTC_E_IMAGE (-4)     /* image or saved state corrupted, truncated or torn */
 #define GTC_E_ID (-5)        /* image or saved state of another table */
 
+/* What the firmware should do. Every correction with a positive status is to be subtracted:
+ *   GTC_WARMING    nothing more; the filter may take the bias as less certain
+ *   GTC_CLAMPED    log it: the unit works outside its calibration; the filter as above
+ *   GTC_UNCOVERED  log it; the filter as above
+ *   GTC_HELD       nothing, while it comes and goes; look for the sensor's cable if it stays
+ *   GTC_FALLBACK   report the temperature sensor as failed; the correction is a constant now
+ * With a negative one keep the last correction, or none:
+ *   GTC_E_ARG        a fault of the caller; at run time count it and go on
+ *   GTC_E_LAYOUT     table and runtime were not built together: do not compensate, report
+ *   GTC_E_SELF_TEST  wrong flags, library or memory: do not compensate, report
+ *   GTC_E_IMAGE      from check: memory fails, report; from open: use the table compiled in; from
+ *                    restore: start with gtc_<n>_init()
+ *   GTC_E_ID         of another unit: as GTC_E_IMAGE, and see how it came there */
+
 /* The q31 mark of a sample that did not arrive. (In f32 a NaN is one.) */
 #define GTC_TEMP_MISSING (-2147483647L - 1L)
 
