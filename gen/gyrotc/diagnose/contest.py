@@ -39,52 +39,91 @@ def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[s
     have their parameters at the optimum, the others on their grid. A cause may stand back for one of its
     `rivals` (ids, for each cause): what matters is whether any causes do as well as the other shape.
     """
-    edges = [gains.whiten(c.edges) for c in causes if c.edges is not None]
-    white = [gains.whiten(c.columns) for c in causes]
-    others = gains.whiten(gains.search.bank.others)
-    groups = gains.search.bank.other_groups
-    price = float(np.log(gains.size))
-    own = max(
-        _criterion(gains, edges, causes, white, price),
-        *(_instead(gains, edges, causes, white, price, k, ids) for k, ids in enumerate(rivals)),
-    )
+    ring = _Ring(gains, causes)
+    every = range(len(causes))
+    own = max(ring.criterion(every), *(ring.instead(k, ids) for k, ids in enumerate(rivals)))
     local = any(c.candidate.id == "map_too_coarse" for c in causes)
-    instead = [g for g in groups if not (local and g.common)]
+    shapes = gains.search.bank.other_groups
     found = []
-    for count in range(len(causes)):
-        for kept in itertools.combinations(range(len(causes)), count):
-            some = [causes[k] for k in kept]
-            held = _held(gains, edges, some, [white[k] for k in kept])
-            base = _criterion(gains, edges, some, [white[k] for k in kept], price)
-            best = _strongest(held, gains, others, price, instead)
-            found.append(Contest(best.name, base + best.lead - own))
+    for count in every:
+        for kept in itertools.combinations(every, count):
+            best = ring.strongest(kept, [s for s in shapes if not (local and s.common)])
+            found.append(Contest(best.name, ring.criterion(kept) + best.lead - own))
     if local:  # a map that a switch changes imitates a finer map of part of the range, so it has to add to it
-        held = _held(gains, edges, causes, white)
-        found.append(_strongest(held, gains, others, price, [g for g in groups if g.common]))
-    found += [
-        _bent(gains, edges, causes, white, k) for k, c in enumerate(causes) if c.candidate.role == "input"
-    ]
+        found.append(ring.strongest(every, [s for s in shapes if s.common]))
+    found += [ring.bent(k) for k in every if causes[k].candidate.role == "input"]
     return max(found, key=lambda c: c.lead)
 
 
-def _bent(
-    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array], k: int
-) -> Contest:
-    """Whether a map of moved inputs needs more of the rate than a factor, more than the map of plain inputs does.
+class _Ring:
+    """Models made of some of the causes, by number."""
 
-    A late map imitates memories that act other than in proportion by bending over dT/dt. The map of a true lag
-    is less bent there than the one that stands in for it.
-    """
-    records, basis = gains.search.records, gains.search.bank.basis
-    rest = [c for i, c in enumerate(causes) if i != k]
-    beside = [w for i, w in enumerate(white) if i != k]
-    moved = gains.whiten(proportional_map(records, basis, causes[k].candidate))
-    plain = gains.whiten(proportional_map(records, basis, None))
-    full = _energy(_held(gains, edges, causes, white), gains.target)
-    bend = full - _energy(_orthonormal([gains.dropped, *edges, moved, *beside]), gains.target)
-    static = _energy(_held(gains, edges, rest, beside), gains.target)
-    usual = static - _energy(_orthonormal([gains.dropped, *edges, plain, *beside]), gains.target)
-    return Contest(_BENT, bend - usual - max(_BEND, _BEND_SHARE * (full - static)))
+    def __init__(self, gains: Gains, causes: Sequence[Refined]) -> None:
+        self.gains, self.causes = gains, causes
+        self.y = gains.target
+        self.price = float(np.log(gains.size))
+        self.always = [gains.dropped, *(gains.whiten(c.edges) for c in causes if c.edges is not None)]
+        self.white = [gains.whiten(c.columns) for c in causes]
+        self.others = gains.whiten(gains.search.bank.others)
+
+    def held(self, kept: Sequence[int]) -> Array:
+        """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
+        swapped = any(self.causes[k].candidate.role == "input" for k in kept)
+        static = [] if swapped else [self.gains.map]
+        return _orthonormal([*self.always, *static, *(self.white[k] for k in kept)])
+
+    def criterion(self, kept: Sequence[int]) -> float:
+        """Of a set of causes; one with a common variance of many weights is weighed as such."""
+        random = [k for k in kept if self.causes[k].candidate.role == "variance"][-1:]
+        held = self.held([k for k in kept if k not in random])
+        total = _energy(held, self.y) - self.price * sum(PENALTY[self.causes[k].candidate.id] for k in kept)
+        return total + sum(_common(held, self.white[k], self.y) for k in random)
+
+    def instead(self, k: int, ids: Sequence[str]) -> float:
+        """Criterion with the k-th cause replaced by the best of some that add one column."""
+        at = [s.start for c, s in self.gains.plain if c.id in ids and s.stop - s.start == 1]
+        if not at:
+            return -np.inf
+        kept = self._without(k)
+        columns = self.gains.whole[:, at]
+        held = self.held(kept)
+        rest = columns - held @ (held.T @ columns)
+        power = np.einsum("ij,ij->j", rest, rest)
+        own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
+        energy = np.where(own, (rest.T @ self.y) ** 2 / np.where(own, power, 1.0), 0.0)
+        return self.criterion(kept) + float(energy.max()) - self.price * max(PENALTY[i] for i in ids)
+
+    def strongest(self, kept: Sequence[int], shapes: Sequence[Other]) -> Contest:
+        """The other shape that adds most to a model."""
+        held = self.held(kept)
+        before = np.einsum("ij,ij->j", self.others, self.others)
+        rest = self.others - held @ (held.T @ self.others)
+        a = rest.T @ (self.y - held @ (held.T @ self.y))
+        best = Contest("", -np.inf)
+        for shape in shapes:
+            value = _gain(shape, rest[:, shape.columns], a[shape.columns], before[shape.columns])
+            free = shape.parameters + (1 if shape.common else shape.columns.stop - shape.columns.start)
+            best = max(best, Contest(shape.name, value - free * self.price), key=lambda c: c.lead)
+        return best
+
+    def bent(self, k: int) -> Contest:
+        """Whether a map of moved inputs needs more of the rate than a factor, more than that of plain inputs does.
+
+        A late map imitates memories that act other than in proportion by bending over dT/dt. The map of a true
+        lag is less bent there than the one that stands in for it.
+        """
+        records, basis = self.gains.search.records, self.gains.search.bank.basis
+        beside = [self.white[i] for i in self._without(k)]
+        moved = self.gains.whiten(proportional_map(records, basis, self.causes[k].candidate))
+        plain = self.gains.whiten(proportional_map(records, basis, None))
+        full = _energy(self.held(range(len(self.causes))), self.y)
+        static = _energy(self.held(self._without(k)), self.y)
+        bend = full - _energy(_orthonormal([*self.always, moved, *beside]), self.y)
+        usual = static - _energy(_orthonormal([*self.always, plain, *beside]), self.y)
+        return Contest(_BENT, bend - usual - max(_BEND, _BEND_SHARE * (full - static)))
+
+    def _without(self, k: int) -> list[int]:
+        return [i for i in range(len(self.causes)) if i != k]
 
 
 def _orthonormal(blocks: Sequence[Array]) -> Array:
@@ -93,50 +132,8 @@ def _orthonormal(blocks: Sequence[Array]) -> Array:
     return np.asarray(q[:, size > 1e-9 * size.max()])
 
 
-def _instead(
-    gains: Gains,
-    edges: list[Array],
-    causes: Sequence[Refined],
-    white: list[Array],
-    price: float,
-    k: int,
-    ids: Sequence[str],
-) -> float:
-    """Criterion with the k-th cause replaced by the best of some that add one column."""
-    some = [c for i, c in enumerate(causes) if i != k]
-    beside = [w for i, w in enumerate(white) if i != k]
-    held = _held(gains, edges, some, beside)
-    at = [s.start for c, s in gains.plain if c.id in ids and s.stop - s.start == 1]
-    if not at:
-        return -np.inf
-    columns = gains.whole[:, at]
-    rest = columns - held @ (held.T @ columns)
-    power = np.einsum("ij,ij->j", rest, rest)
-    own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
-    energy = np.where(own, (rest.T @ gains.target) ** 2 / np.where(own, power, 1.0), 0.0)
-    base = _criterion(gains, edges, some, beside, price)
-    return base + float(energy.max()) - price * max(PENALTY[i] for i in ids)
-
-
-def _held(gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array]) -> Array:
-    """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
-    swapped = any(c.candidate.role == "input" for c in causes)
-    return _orthonormal([gains.dropped, *edges, *([] if swapped else [gains.map]), *white])
-
-
 def _energy(held: Array, y: Array) -> float:
     return float(((held.T @ y) ** 2).sum())
-
-
-def _criterion(
-    gains: Gains, edges: list[Array], causes: Sequence[Refined], white: Sequence[Array], price: float
-) -> float:
-    """Of a set of causes; one with a common variance of many weights is weighed as such."""
-    random = [k for k, c in enumerate(causes) if c.candidate.role == "variance"][-1:]
-    fixed = [k for k in range(len(causes)) if k not in random]
-    held = _held(gains, edges, [causes[k] for k in fixed], [white[k] for k in fixed])
-    total = _energy(held, gains.target) - price * sum(PENALTY[c.candidate.id] for c in causes)
-    return total + sum(_common(held, white[k], gains.target) for k in random)
 
 
 def _common(held: Array, columns: Array, y: Array) -> float:
@@ -147,20 +144,6 @@ def _common(held: Array, columns: Array, y: Array) -> float:
     if not keep.any():
         return 0.0
     return float(ratio_of((left[:, keep].T @ y) ** 2, size[keep] ** 2)[0])
-
-
-def _strongest(held: Array, gains: Gains, others: Array, price: float, groups: Sequence[Other]) -> Contest:
-    """The other shape that adds most to a model."""
-    before = np.einsum("ij,ij->j", others, others)
-    rest = others - held @ (held.T @ others)
-    y = gains.target - held @ (held.T @ gains.target)
-    a = rest.T @ y
-    best = Contest("", -np.inf)
-    for other in groups:
-        value = _gain(other, rest[:, other.columns], a[other.columns], before[other.columns])
-        free = other.parameters + (1 if other.common else other.columns.stop - other.columns.start)
-        best = max(best, Contest(other.name, value - free * price), key=lambda c: c.lead)
-    return best
 
 
 def _gain(other: Other, columns: Array, a: Array, before: Array) -> float:
