@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from .effects import FAMILY
-from .grade import Row, markdown, table
+from .grade import Row
+from .table import markdown, table
 
 __all__ = ["write_page"]
 

@@ -30,8 +30,9 @@ import numpy as np
 
 from . import campaign as campaigns
 from .draw import Order, campaign_of, orders, recording_of
-from .grade import Row, grade, text
+from .grade import Row, grade
 from .page import write_page
+from .table import text
 
 PER_CAMPAIGN = 32
 ROOT = Path(__file__).resolve().parents[2]

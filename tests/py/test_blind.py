@@ -18,8 +18,9 @@ from scipy.stats import binom
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.blind.grade import alarmed, family_right, text, wrong_family  # noqa: E402
+from tests.blind.grade import alarmed, family_right, wrong_family  # noqa: E402
 from tests.blind.run import Plan, run  # noqa: E402
+from tests.blind.table import text  # noqa: E402
 
 RECORDS = 40
 CHANCE = 2e-5  # of one of five checks
