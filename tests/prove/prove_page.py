@@ -19,8 +19,8 @@ the rounding of the inputs (most of it is the rounding of the parameters).
 _PRIMITIVES = """Primitives over their arguments, against formulas written apart. The error of a Gaussian times Σ|w| is
 what the arithmetic adds to the surface that the rounded parameters make:
 """
-_EVA = """Frama-C Eva over the emitted C (map, mean, slope, every step function): any input, any state that the
-invariant allows; alarms: what could not be shown free of run-time errors.
+_EVA = """Frama-C Eva over the emitted C (map, mean, slope, every step function, every term): any input, any state that
+the invariant allows. Alarms: what it could not show free of run-time errors; [proof.md](proof.md) has the argument.
 """
 _BUDGET = """Error budget of the golden model (proof.md, section 3): blocks of 1000 samples that spread by 0.1 C, at
 80 C and 0.4 C a block; found: in random histories of any steepness, blocks of 1 to 1000 samples.
