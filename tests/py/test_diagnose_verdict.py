@@ -55,6 +55,7 @@ def result(verdict: str) -> dict[str, Any]:
     cause = {
         "id": "hysteresis", "family": "hysteresis", "name": "A loop", "p_value": 0.001, "gain": None,
         "parameters": {"width_c": {"value": 4.0, "low": 3.0, "high": 5.0}},
+        "remedy": "one play operator",
         "equivalent": ["turn_on_offset"] if verdict == "ambiguous" else [],
         "separate_by": "holds from both sides" if verdict == "ambiguous" else None,
     }  # fmt: skip
@@ -64,7 +65,7 @@ def result(verdict: str) -> dict[str, Any]:
         "discrepancies": [], "causes": [cause] if named else [], "extended": None,
         "considered": [{"id": "warm_up", "detection_limit": {"value": 1e-3, "unit": "deg/h", "parameter": "tau_s"}},
                        {"id": "cavity_lag", "detection_limit": {"value": None, "unit": "s", "parameter": "tau_s"}}],
-        "next": next_steps(verdict, [cause] if named else [], ["ageing"]),
+        "next": next_steps(verdict, [cause] if named else [], ["ageing"], shipped=False),
     }  # fmt: skip
 
 
@@ -77,8 +78,25 @@ def test_every_verdict_has_words_and_a_next_step(verdict: str) -> None:
 
 
 def test_an_ambiguous_verdict_names_the_experiment() -> None:
-    steps = next_steps("ambiguous", result("ambiguous")["causes"], [])
+    steps = next_steps("ambiguous", result("ambiguous")["causes"], [], shipped=True)
     assert steps == ["To tell them apart: holds from both sides."]
+
+
+def test_what_no_table_holds_has_its_own_remedy() -> None:
+    causes = result("explained")["causes"]
+    assert next_steps("explained", causes, [], shipped=False) == ["Against it: one play operator."]
+    assert "build --extend" in next_steps("explained", causes, [], shipped=True)[0]
+
+
+def test_structure_without_a_name_is_described() -> None:
+    left = {
+        "p_value": 1e-6,
+        "share_explained": 0.4,
+        "best_partial_match": ["hysteresis"],
+        "looks_like": "a switch",
+    }
+    text = "\n".join(diagnosis_lines({**result("unexplained"), "unexplained": left}))
+    assert "40%" in text and "it looks more like a switch" in text
 
 
 def test_causes_without_an_extension_are_told_so() -> None:

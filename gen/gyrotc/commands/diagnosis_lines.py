@@ -20,13 +20,27 @@ def diagnosis_lines(result: dict[str, Any]) -> Iterator[str]:
             )
     for cause in result["causes"]:
         yield from _cause_lines(cause)
-    if result["causes"] and result["extended"] is None:
+    left = result.get("unexplained")
+    if left:
+        yield f"unexplained: {unexplained_text(left)}"
+    if any(c["family"] != "noise" for c in result["causes"]) and result["extended"] is None:
         yield "no extension is shipped: none has a gain on runs it was not fitted to"
     limits = [c for c in result["considered"] if c.get("detection_limit")]
     if limits:
         yield "what could still hide below its detection limit:"
         yield from (f"  {_limit_text(c)}" for c in limits)
     yield from (f"next: {step}" for step in result["next"])
+
+
+def unexplained_text(left: dict[str, Any]) -> str:
+    """What is known of structure that has no name."""
+    parts = [f"p = {left['p_value']:.2g}"]
+    if left["best_partial_match"]:
+        names = " and ".join(left["best_partial_match"]).replace("_", " ")
+        parts.append(f"{names} would account for {left['share_explained']:.0%} of the structure")
+    if left["looks_like"]:
+        parts.append(f"it looks more like {left['looks_like']}")
+    return "; ".join(parts)
 
 
 def extension_lines(diagnosis: dict[str, Any]) -> Iterator[str]:

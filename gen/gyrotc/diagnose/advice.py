@@ -37,16 +37,22 @@ _RECORDING = {
 }
 
 
-def next_steps(verdict: str, causes: Sequence[Mapping[str, Any]], untestable: Sequence[str]) -> list[str]:
+def next_steps(
+    verdict: str, causes: Sequence[Mapping[str, Any]], untestable: Sequence[str], *, shipped: bool
+) -> list[str]:
     """Sentences, the most telling first.
 
     Args:
         verdict: Of the interface.
         causes: As in the result.
         untestable: Ids of the causes that these recordings cannot test.
+        shipped: Whether an extension is.
     """
     steps = [f"To tell them apart: {c['separate_by']}." for c in causes if c["separate_by"]]
-    if verdict != "ambiguous":
+    if verdict == "explained" and not shipped:
+        remedies = dict.fromkeys(c["remedy"] for c in causes if c["family"] != "noise")
+        steps.append(f"Against it: {'; '.join(remedies)}.")
+    elif verdict != "ambiguous":
         steps.append(_STEPS[verdict])
     if any(c["id"] == "time_misalignment" for c in causes):
         steps.append("Mend the clocks or filters of the recording; no term on the target stands for them.")

@@ -133,7 +133,7 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
         "missing": [text],
         "text": text,
         "meaning": VERDICTS["not_testable"],
-        "next": next_steps("not_testable", [], []),
+        "next": next_steps("not_testable", [], [], shipped=False),
     }
 
 
@@ -167,7 +167,9 @@ def _result(
     }
     result["text"] = _sentence(result)
     result["meaning"] = VERDICTS[verdict]
-    result["next"] = next_steps(verdict, result["causes"], list(analysis.search.bank.untestable))
+    untestable = list(analysis.search.bank.untestable)
+    shipped = result["extended"] is not None
+    result["next"] = next_steps(verdict, result["causes"], untestable, shipped=shipped)
     return result
 
 
@@ -327,6 +329,7 @@ def _unexplained(analysis: Analysis) -> dict[str, Any]:
         "share_explained": attribution.share,
         "p_value": attribution.misfit_p,
         "best_partial_match": [c.candidate.id for c in attribution.causes],
+        "looks_like": attribution.other.name if attribution.other.lead > 0.0 else None,
     }
 
 
