@@ -90,8 +90,9 @@ real: setup
 	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
 	@$(PYTHON) tools/real_diagnosis.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
 
-## training beside its peers, in an environment of its own (build/bench): docs/results.md
-bench: setup
+## training beside its peers (in build/bench), cost of the runtime in emulators: docs/results.md
+bench:
+	@tools/setup.sh test
 	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
