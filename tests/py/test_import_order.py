@@ -30,6 +30,7 @@ ORDER = [
     "applied",
     "amalgamate",
     "vectors",
+    "tabletext",
     "emit",
     "toolchain",
     "verify",
