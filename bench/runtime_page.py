@@ -26,9 +26,9 @@ _MADE_OF = """### Instructions of one evaluation of the map
 *Each center* and *once* are what the means of 6 and 64 centers say: count = once + centers × each. *Once* is the call,
 checking, clamping and scaling two inputs, the linear part and the last rounding; *coverage*: what a coverage map adds.
 A center in fixed point is, on the M3 and above, 18 instructions (two multiply-adds for its arguments, two products for
-the square, one saturation, four for the fraction and the index, two products and a sum for the Gaussian, its word of
+the square, one saturation, three for the fraction and the index, two products and a sum for the Gaussian, its word of
 the table and two shifts, three loads, one multiply-accumulate) and half a turn of the loop; on the M0, whose products
-have 32 bits, there are 19 products of halves in it. float32 on the M0 and M3 is software.
+have 32 bits, there are 20 products in it. float32 on the M0 and M3 is software.
 """
 _BYTES = """### Bytes
 
