@@ -6,26 +6,45 @@ import json
 from pathlib import Path
 from typing import Any
 
+from .errors import InputError
 from .model import write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
-from .report import page_environment
+from .report import page_environment, read_json
 
-__all__ = ["write_plan"]
+__all__ = ["is_plan", "write_plan", "write_plan_page"]
+
+
+def is_plan(folder: Path) -> bool:
+    """Whether a folder holds a plan (and not a build)."""
+    return (folder / "plan.json").is_file() and not (folder / "evaluate.json").exists()
 
 
 def write_plan(folder: Path, result: dict[str, Any]) -> Path:
     """Writes `folder/plan.json` and `folder/report.html`; returns the page's path."""
     write_atomically(folder / "plan.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
-    text = (
-        page_environment()
-        .get_template("plan.html.j2")
-        .render(
-            p=result,
-            temperatures=temperatures(result),
-            matrix=separability_matrix(result),
-            accuracy=accuracy_by_hours(result),
+    return write_plan_page(folder)
+
+
+def write_plan_page(folder: Path) -> Path:
+    """Writes `folder/report.html` from `folder/plan.json`; returns its path.
+
+    Raises:
+        InputError: `plan.json` is missing or broken.
+    """
+    result = read_json(folder / "plan.json")
+    try:
+        text = (
+            page_environment()
+            .get_template("plan.html.j2")
+            .render(
+                p=result,
+                temperatures=temperatures(result),
+                matrix=separability_matrix(result),
+                accuracy=accuracy_by_hours(result),
+            )
         )
-    )
+    except (KeyError, TypeError) as error:
+        raise InputError(str(folder / "plan.json"), f"lacks {error}", "a result of plan") from error
     path = folder / "report.html"
     write_atomically(path, text)
     return path

@@ -36,10 +36,10 @@ def temperatures(result: dict[str, Any]) -> str:
 def separability_matrix(result: dict[str, Any]) -> str:
     """d from which the row's cause can be told from the column's, on a logarithmic scale of grey."""
     rows = result["separability"]
-    others = list(dict.fromkeys(o for row in rows for o in row["d"]))
+    others = list(dict.fromkeys([*(row["id"] for row in rows), *(o for row in rows for o in row["d"])]))
     d = np.array([[row["d"].get(o, np.nan) for o in others] for row in rows])
     names = [
-        row["id"].replace("_", " ") + ("" if row["value"] is None else f" {row['value']:.3g}") for row in rows
+        row["id"].replace("_", " ") + ("" if row["value"] is None else f" {row['value']:.4g}") for row in rows
     ]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.4 + 0.33 * len(rows)), layout="constrained")

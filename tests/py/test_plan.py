@@ -100,7 +100,11 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
         assert text in done.stdout
     result = json.loads((tmp_path / "p").read_text())
     assert result["schema"] == "gyrotc.plan/1"
-    assert (tmp_path / "report.html").read_text("utf-8").count("<svg") == 3
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert page.count("<svg") == 3
+    (tmp_path / "report.html").unlink()
+    assert gyrotc("report", tmp_path).returncode == 0
+    assert (tmp_path / "report.html").read_text("utf-8") == page
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ _SHORT = {
     "path_length_periodicity": "period",
     "map_too_coarse": "map",
 }
+_NEVER = 90.0
 _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next to nothing
 
 
@@ -71,7 +72,8 @@ def plan_parts(result: dict[str, Any]) -> Iterator[str | Table]:
     yield _separability(result)
     for hard in result["hard_to_separate"]:
         a, b = hard["pair"]
-        yield f"{a} and {b} are told apart only from d = {hard['d']:.0f}; add {hard['add']}"
+        never = " or never" if hard["d"] > _NEVER else ""
+        yield f"{a} and {b} are told apart only from d = {hard['d']:.0f}{never}; add {hard['add']}"
     yield _accuracy(result)
     if result["shortest"]:
         yield from _shortest(result["shortest"])
@@ -92,7 +94,7 @@ def _limits(result: dict[str, Any]) -> Table:
     )
     for entry in result["limits"]:
         limit = entry["detection_limit"]
-        value = "never" if limit["value"] is None else f"{limit['value']:.2g}"
+        value = "never" if limit["value"] is None else f"{limit['value']:.3g}"
         table.add_row(entry["id"], value, limit["unit"], _over(entry["id"], limit))
     return table
 
@@ -104,7 +106,7 @@ def _over(id: str, limit: dict[str, Any]) -> str:
     if not points:
         return ""
     shown = (points[0], points[len(points) // 2], points[-1])
-    return f"{limit['parameter']}: " + ", ".join(f"{v:.2g} at {p:.3g}" for p, v in shown)
+    return f"{limit['parameter']}: " + ", ".join(f"{v:.2g} at {p:.4g}" for p, v in shown)
 
 
 def _separability(result: dict[str, Any]) -> Table:
@@ -113,7 +115,7 @@ def _separability(result: dict[str, Any]) -> Table:
     title = "d at which a cause (row) is told from another (column); detection itself takes d = 6"
     table = _table(title, "cause", *(_SHORT[o] for o in others))
     for row in rows:
-        at = "" if row["value"] is None else f" {row['value']:.3g}"
+        at = "" if row["value"] is None else f" {row['value']:.4g}"
         cells = []
         for o in others:
             d = row["d"].get(o)

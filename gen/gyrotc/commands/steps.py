@@ -185,14 +185,18 @@ def evaluate(
 
 @app.command()
 def report(folder: DirArg) -> None:
-    """Write DIR/report.html from what build or diagnose left in DIR.
+    """Write DIR/report.html from what build, diagnose or plan left in DIR.
 
     Example: gyrotc report result
     """
     from ..diagnosis_page import is_diagnosis, write_page
+    from ..plan_page import is_plan, write_plan_page
     from ..report import write_report
 
     with progress() as say:
         say("drawing")
-        path = write_page(folder) if is_diagnosis(folder) else write_report(folder)
+        if is_diagnosis(folder):
+            path = write_page(folder)
+        else:
+            path = write_plan_page(folder) if is_plan(folder) else write_report(folder)
     tell(f"report: {path}")

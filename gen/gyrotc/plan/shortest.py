@@ -47,9 +47,14 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
         best = max(range(len(hours)), key=lambda k: ((now - after[k]) / hours[k], -chosen.count(k)))
         chosen.append(best)
         now = after[best]
-    reached = _values(sensitivity, chosen, required)
     if now > 0.0:
-        return Shortest(None, None, reached)
+        return Shortest(None, None, _values(sensitivity, chosen, required))
+    for k in sorted(chosen, key=lambda k: -hours[k]):
+        rest = [*chosen]
+        rest.remove(k)
+        if _distance(sensitivity, rest, required) == 0.0:  # what a later run has made needless
+            chosen = rest
+    reached = _values(sensitivity, chosen, required)
     names = [run.name for run in sensitivity.programme.records.runs]
     return Shortest(tuple(names[k] for k in chosen), sum(hours[k] for k in chosen), reached)
 
