@@ -78,7 +78,7 @@ class Vectors:
 
     def map_inputs(self, numeric: str) -> NDArray[np.uint32]:
         """Bits of (temperature, slope) of all map vectors, shape (n, 2)."""
-        draws = _draws(self.seed, 2 * self.n_random).reshape(-1, 2)
+        draws = self._draws()[: 2 * self.n_random].reshape(-1, 2)
         t = _scaled(draws[:, 0], self.t_low, self.t_span)
         slope = _scaled(draws[:, 1], self.s_low, self.s_span)
         drawn = np.stack([_bits(numeric, t, 12), _bits(numeric, slope, 16)], axis=1)
@@ -86,9 +86,7 @@ class Vectors:
 
     def calls(self, numeric: str) -> Calls:
         """The calls of the step functions (the draws go on after those of the map)."""
-        start = 2 * self.n_random
-        length = sum(s.count for s in self.segments if s.kind != "MISSED") * self.n_channels
-        draws = _draws(self.seed, start + length)[start:]
+        draws = self._draws()[2 * self.n_random :]
         channels, missed = [], []
         for segment in self.segments:
             if segment.kind == "MISSED":
@@ -99,6 +97,11 @@ class Vectors:
             channels.append(_samples(segment, numeric, used.reshape(-1, self.n_channels)))
             missed.append(np.zeros(segment.count, dtype=np.int64))
         return Calls(np.concatenate(channels), np.concatenate(missed))
+
+    def _draws(self) -> NDArray[np.uint32]:
+        """All random numbers, those of the map vectors first."""
+        samples = sum(s.count for s in self.segments if s.kind != "MISSED")
+        return _draws(self.seed, 2 * self.n_random + samples * self.n_channels)
 
 
 def _samples(segment: Segment, numeric: str, draws: NDArray[np.uint32]) -> NDArray[np.uint32]:
