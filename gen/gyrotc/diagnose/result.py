@@ -100,7 +100,7 @@ def diagnose(
 def _options_of(model: Model | None) -> FitOptions:
     if model is None:
         return FitOptions()
-    return FitOptions(method=model.method, seed=model.seed, block_s=model.block_s, average_s=model.average_s)
+    return FitOptions(model.method, model.seed, model.n_centers, None, model.block_s, model.average_s)
 
 
 def _head(dataset: Dataset, verdict: str, options: FitOptions) -> dict[str, Any]:
