@@ -29,7 +29,8 @@ _EQUIVALENT = 8.0  # difference of the criterion within which two explanations c
 _PAIR = 10.0  # what a pair must gain over the best single cause
 _MEMBER = 15.0  # what each of a pair must gain beside the other
 _SMALLEST = 0.03  # ... and of the pair's gain: what is less may be the imperfection of the other
-_WELL = 0.08  # p-value of what is left that a pair must reach
+_WELL = 0.08  # p-value of what is left that a pair must reach,
+_NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
 _LEADING = 0.35  # share of a pair's gain that its best single cause must have
 _MISFIT = 0.01
 
@@ -88,6 +89,11 @@ class _Stage:
     def remains(self) -> bool:
         return self.misfit_p < _MISFIT or self.found[0].p_value <= _LEVEL
 
+    @property
+    def well(self) -> bool:
+        """Whether next to nothing is left."""
+        return self.misfit_p >= _WELL or (self.misfit_p >= _NEARLY and self.share >= _MOST)
+
 
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
@@ -135,7 +141,7 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
         three = _stage(search, gains, (*pair, third))
         if three.misfit_p >= _WELL > two.misfit_p:
             return three
-    return two if two.misfit_p >= _WELL else one
+    return two if two.well else one
 
 
 def choose(search: Search, count: int) -> tuple[Refined, ...]:
