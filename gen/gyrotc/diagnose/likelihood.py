@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .catalogue import PENALTY, Candidate
 from .detect import variance_ratio_of
 from .noise import Whitener
+from .records import singled_out
 from .search import Search
 
 __all__ = ["Gains", "Model", "Point"]
@@ -103,7 +104,7 @@ class Gains:
         known = self.search.bank.known[i]
         design = self.whiten(self.search.bank.replaced[i])
         if not known.all():
-            design = np.column_stack([design, self.whiten(np.eye(self.size)[:, ~known])])
+            design = np.column_stack([design, self.whiten(singled_out(~known))])
         q, r = np.linalg.qr(design)
         q = q[:, np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max()]
         return float(white @ white - ((q.T @ white) ** 2).sum())
@@ -120,7 +121,7 @@ class Gains:
     def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
         blocks = [self.dropped]
         if known is not None and not known.all():
-            blocks.append(self.whiten(np.eye(self.size)[:, ~known]))
+            blocks.append(self.whiten(singled_out(~known)))
         q, r = np.linalg.qr(np.column_stack([*blocks, design]))
         size = np.abs(np.diag(r))
         q = q[:, size > 1e-9 * size.max()]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..terms.base import History
 
-__all__ = ["Record", "Records", "centred_slope"]
+__all__ = ["Record", "Records", "centred_slope", "singled_out"]
 
 Array = NDArray[np.float64]
 _SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could stand for
@@ -133,6 +133,14 @@ class Records:
                 digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
             digest.update(repr((h.run, h.runs, h.day)).encode())
         return digest.hexdigest()
+
+
+def singled_out(where: NDArray[np.bool_]) -> Array:
+    """One column for every block that is marked, 1 there and 0 elsewhere, shape (N, marked)."""
+    at = np.flatnonzero(where)
+    out = np.zeros((where.size, at.size))
+    out[at, np.arange(at.size)] = 1.0
+    return out
 
 
 def centred_slope(history: History) -> Array:

@@ -13,6 +13,7 @@ from .bank import replaced_map
 from .baseline import fine_columns
 from .catalogue import Candidate, columns_of, shape_parameter
 from .likelihood import Gains
+from .records import singled_out
 from .search import Search
 
 __all__ = ["Interval", "Refined", "refine", "taken"]
@@ -87,7 +88,7 @@ class _Fit:
         self.search, self.gains = search, gains
         shift = max((abs(m.values["shift_s"]) for m in members if m.id == "time_misalignment"), default=0.0)
         known = np.concatenate([_inside(search, k, shift + 150.0) for k in range(len(search.records.runs))])
-        edges = np.eye(search.y.size)[:, ~known] if shift else np.zeros((search.y.size, 0))
+        edges = singled_out(~known) if shift else np.zeros((search.y.size, 0))
         self.edges = edges
         held = [gains.whiten(edges)] + (
             [] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)]
