@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jinja2
+
 from .errors import InputError
 from .model import write_atomically
 from .report import page_environment, read_json
@@ -42,7 +44,7 @@ def write_page(folder: Path) -> Path:
                 pictures=_pictures(folder, result),
             )
         )
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, jinja2.UndefinedError) as error:
         raise InputError(str(folder / "diagnose.json"), f"lacks {error}", "a result of diagnose") from error
     path = folder / "report.html"
     write_atomically(path, text)

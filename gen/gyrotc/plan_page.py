@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import jinja2
+
 from .errors import InputError
 from .model import write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
@@ -43,7 +45,7 @@ def write_plan_page(folder: Path) -> Path:
                 accuracy=accuracy_by_hours(result),
             )
         )
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, jinja2.UndefinedError) as error:
         raise InputError(str(folder / "plan.json"), f"lacks {error}", "a result of plan") from error
     path = folder / "report.html"
     write_atomically(path, text)

@@ -131,6 +131,9 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
             if i in WORDS
         ],
         "missing": [text],
+        "measured_on": None,
+        "single_cycle": None,
+        "unexplained": None,
         "text": text,
         "meaning": VERDICTS["not_testable"],
         "next": next_steps("not_testable", [], [], shipped=False),
