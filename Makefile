@@ -97,6 +97,10 @@ bench:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
+## a thousand gyros through gyrotc fleet: docs/results.md
+fleet: setup
+	@$(PYTHON) -m bench.fleet docs
+
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup
 	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $(if $(SEED),--seed $(SEED))
@@ -105,4 +109,4 @@ blind: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench blind clean
+.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench fleet blind clean
