@@ -31,8 +31,12 @@ and judged on its exam runs. The load is that of the machine before the job: wha
 
 | elapsed | CPU | CPU ÷ processes | CPU a serial | failed | RMS ÷ estimated noise floor, median / worst | load |
 | --- | --- | --- | --- | --- | --- | --- |
-| {elapsed_s:.1f} s | {cpu_s:.1f} s | {per_process_s:.1f} s | {each_ms:.0f} ms | {failed} | {median:.4f} / {worst:.4f} | {load:.1f} |
+{row}
 """
+_ROW = (
+    "| {elapsed_s:.1f} s | {cpu_s:.1f} s | {per_process_s:.1f} s | {each_ms:.0f} ms | {failed} "
+    "| {median:.4f} / {worst:.4f} | {load:.1f} |"
+)
 _MARKS = re.compile(r"(<!-- fleet -->\n).*?(<!-- /fleet -->)", re.DOTALL)
 
 
@@ -92,13 +96,14 @@ def _machine() -> str:
 
 def section(figures: dict[str, Any]) -> str:
     """The section of docs/results.md as text."""
-    return _SECTION.format(
+    row = _ROW.format(
         **figures,
         per_process_s=figures["cpu_s"] / figures["jobs"],
         each_ms=1e3 * figures["cpu_s"] / figures["serials"],
         median=figures["rms_over_floor"]["median"],
         worst=figures["rms_over_floor"]["worst"],
     )
+    return _SECTION.format(**figures, row=row)
 
 
 def filled(page: str, figures: dict[str, Any]) -> str:
