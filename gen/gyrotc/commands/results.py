@@ -8,6 +8,8 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
+from ..paper.published import ENVIRONMENTS
+
 
 def _e(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}e}"
@@ -101,11 +103,11 @@ def summary(result: dict[str, Any]) -> str:
     part = result.get("exam") or result.get("left_out") or result.get("train")
     if not part or not part["improvement"]:
         return "no sample to judge by"
-    text = (
-        f"improvement {part['improvement']:.2f} (paper: 9.8-10.4)"
-        if result.get("exam")
-        else (f"improvement on spans left out {part['improvement']:.2f}")
-    )
+    if result.get("exam"):
+        published = {run["environment"] for run in result["runs"]} == set(ENVIRONMENTS)
+        text = f"improvement {part['improvement']:.2f}" + (" (paper: 9.8-10.4)" if published else "")
+    else:
+        text = f"improvement on spans left out {part['improvement']:.2f}"
     floor, rms = result["noise_floor_dph"], part["after"]["rms_dph"]
     if floor:
         text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result['noise_floor_source']})"
