@@ -52,9 +52,9 @@ def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
 
 
 def _section(run: dict[str, Any]) -> str:
-    ended = "complete" if run["done"] == run["records"] else "stopped"
+    ended = "complete" if run["done"] >= run["records"] else f"stopped of {run['records']}"
     lines = [
-        f"### Seed {run['seed']}: {run['done']} of {run['records']} recordings, {ended}",
+        f"### Seed {run['seed']}: {run['done']} recordings, {ended}",
         "",
         f"Started {run['started']}, written {run['written']}, commit {run['commit']}, code {run['code']}.",
         "",
