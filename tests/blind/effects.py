@@ -310,6 +310,45 @@ def room_cycle(scene: Scene, rng: np.random.Generator) -> Effect:
     ], {}
 
 
+def stick_slip(scene: Scene, rng: np.random.Generator) -> Effect:
+    """A stress that grows with the temperature and is released in a jump: a sawtooth without a fixed place."""
+    hold = rng.uniform(6, 16)
+    out = []
+    for run in scene.runs:
+        free, trace = float(run.block_c[0]), np.empty_like(run.block_c)
+        for k, x in enumerate(run.block_c.tolist()):
+            free = x if abs(x - free) > hold else free
+            trace[k] = x - free
+        out.append(trace)
+    return out, {}
+
+
+def saturating_memory(scene: Scene, rng: np.random.Generator) -> Effect:
+    """A gradient whose effect saturates: the sign of a ramp, hardly its size."""
+    tau, edge = log_uniform(rng, 900, 3000), rng.uniform(1.0, 4.0)
+    return [np.tanh((follow(r.block_c, tau) - r.block_c) / edge) for r in scene.runs], {}
+
+
+def ringing(scene: Scene, rng: np.random.Generator) -> Effect:
+    """A badly damped second-order answer to dT/dt: it rings after every corner of the profile."""
+    omega, damping = 2 * np.pi / log_uniform(rng, 1200, 3600), rng.uniform(0.08, 0.25)
+    out = []
+    for run, rate in zip(scene.runs, scene.rates(), strict=True):
+        y, v, trace = float(rate[0]), 0.0, np.empty_like(run.block_c)
+        for k, x in enumerate(rate.tolist()):
+            v += omega * omega * (x - y) - 2 * damping * omega * v
+            y += v
+            trace[k] = y - x
+        out.append(trace)
+    return out, {}
+
+
+def dose(scene: Scene, rng: np.random.Generator) -> Effect:
+    """What heat has done since power-on: the integral of an activated rate, which never goes back."""
+    per_c = rng.uniform(0.05, 0.1)
+    return [np.cumsum(np.exp(per_c * (r.block_c - 60.0))) / 3600.0 for r in scene.runs], {}
+
+
 FOREIGN: dict[str, Mechanism] = {
     "relay_texture": relay_texture,
     "creep": creep,
@@ -319,5 +358,9 @@ FOREIGN: dict[str, Mechanism] = {
     "peak_memory": peak_memory,
     "rate_heating": rate_heating,
     "thermometer_drift": thermometer_drift,
+    "stick_slip": stick_slip,
+    "saturating_memory": saturating_memory,
+    "ringing": ringing,
+    "dose": dose,
 }
 FOREIGN_RANDOM: dict[str, Mechanism] = {"telegraph": telegraph, "pulses": pulses, "room_cycle": room_cycle}
