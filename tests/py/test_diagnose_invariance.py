@@ -53,22 +53,36 @@ class Case:
     answer: Answer
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """Temperatures, and what is hidden in the rates."""
+
+    campaign: blind.Campaign
+    yardstick: blind.Yardstick
+
+    def hidden(self, cause: str, k: float = 3.5) -> blind.Hidden:
+        """The same gyro and noise for any size of a cause."""
+        rng = np.random.default_rng([SEED, len(cause)])
+        return blind.draw_recording(self.campaign, self.yardstick, [(cause, k)] if cause else [], LEVEL, rng)
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Case]:
+def drawing() -> Drawing:
+    campaign = blind.draw_campaign(np.random.default_rng(SEED), "separating", hours=5.0, exam=1)
+    return Drawing(campaign, blind.Yardstick(campaign))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, drawing: Drawing) -> Callable[[str], Case]:
     """A recording with one cause hidden at k = 3.5 ("" for none)."""
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-    campaign = blind.draw_campaign(np.random.default_rng(SEED), "separating", hours=5.0, exam=1)
-    yardstick = blind.Yardstick(campaign)
     known: dict[str, Case] = {}
 
     def make(cause: str) -> Case:
         if cause not in known:
-            rng = np.random.default_rng([SEED, len(cause)])
-            wanted = [(cause, 3.5)] if cause else []
-            hidden = blind.draw_recording(campaign, yardstick, wanted, LEVEL, rng)
             folder = tmp_path_factory.mktemp("recordings")
-            blind.write(campaign, hidden, folder, declare=True, serial="U-0001")
+            blind.write(drawing.campaign, drawing.hidden(cause), folder, declare=True, serial="U-0001")
             dataset = load(folder)
             records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
             declared = declared_noise(dataset)
@@ -154,6 +168,34 @@ def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Ca
         return replace(run, channels={k: np.roll(v, half) for k, v in run.channels.items()})
 
     assert "auxiliary" not in answer(changed(case.records, shifted), case.declared).causes
+
+
+def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str], Case]) -> None:
+    """Nothing in the recordings can say which of the two acts."""
+    case = made("auxiliary")
+    (name,) = case.records.runs[0].channels
+    twice = changed(case.records, lambda r: replace(r, channels={**r.channels, "copy_v": r.channels[name]}))
+    found = answer(twice, case.declared)
+    (cause,), ((rival,),) = found.analysis.attribution.causes, found.analysis.attribution.rivals
+    assert found.verdict == "ambiguous"
+    assert (cause.candidate.id, rival.id) == ("auxiliary", "auxiliary")
+    assert {cause.candidate.channel, rival.channel} == {name, "copy_v"}
+    assert rival.distance == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_effect_of_the_training_runs_alone_is_not_shipped(
+    made: Callable[[str], Case], drawing: Drawing, tmp_path: Path
+) -> None:
+    """The same gyro and noise, with the cause in training and without it in the exam."""
+    assert made("hysteresis").answer.causes == ["hysteresis"]
+    hidden, plain = drawing.hidden("hysteresis"), drawing.hidden("hysteresis", 1e-9)
+    roles = drawing.campaign.roles
+    rows = [a if role == "train" else b for a, b, role in zip(hidden.rows, plain.rows, roles, strict=True)]
+    blind.write(drawing.campaign, replace(hidden, rows=rows), tmp_path / "r", declare=True, serial="U-0001")
+    result = diagnose(load(tmp_path / "r")).result
+    assert [c["id"] for c in result["causes"]] == ["hysteresis"]
+    assert result["causes"][0]["gain"]["low"] < 0.0
+    assert result["extended"] is None
 
 
 def test_noise_declared_twice_too_high_or_low_is_told(made: Callable[[str], Case]) -> None:

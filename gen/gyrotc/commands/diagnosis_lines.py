@@ -69,7 +69,8 @@ def _cause_lines(cause: dict[str, Any]) -> Iterator[str]:
         interval = "" if p.get("low") is None else f", 95 % {p['low']:.4g} ... {p['high']:.4g}"
         yield f"  {name} = {p['value']:.4g}{interval}"
     if cause["equivalent"]:
-        yield f"  as likely on these runs: {', '.join(cause['equivalent'])}"
+        channels = f" ({', '.join(cause['equivalent_channels'])})" if "equivalent_channels" in cause else ""
+        yield f"  as likely on these runs: {', '.join(cause['equivalent'])}{channels}"
     if cause.get("separate_by"):
         yield f"  to tell them apart: {cause['separate_by']}"
     if cause.get("gain"):

@@ -23,6 +23,7 @@ __all__ = ["Attribution", "Rival", "attribute", "choose"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+_Kind = tuple[str, str]  # cause and channel ("" for none)
 
 _LEVEL = 0.01
 _EQUIVALENT = 8.0  # difference of the criterion within which two explanations count as equal
@@ -37,10 +38,11 @@ _MISFIT = 0.01
 
 @dataclass(frozen=True)
 class Rival:
-    """Another cause in place of a chosen one: its criterion's distance, 0 is equal."""
+    """Another cause, or channel, in place of a chosen one: its criterion's distance, 0 is equal."""
 
     id: str
     distance: float
+    channel: str | None = None
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,11 @@ def attribute(search: Search) -> Attribution:
         misfit_p=stage.misfit_p,
         share=stage.share,
         last=stage.found,
-        other=contest(gains, refined, [[r.id for r in near] for near in rivals]),
+        other=contest(
+            gains,
+            refined,
+            [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(refined, rivals, strict=True)],
+        ),
     )
 
 
@@ -230,29 +236,37 @@ def _rivals(
     singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
 ) -> tuple[tuple[Rival, ...], ...]:
     """Other causes in the place of each chosen one, everything else kept in kind."""
-    ids = [c.id for c in chosen]
+    kinds = [_kind(c) for c in chosen]
     pool = singles if len(chosen) == 1 else pairs
     if len(chosen) > 2:
         return tuple(() for _ in chosen)
-    best: dict[tuple[str, ...], float] = {}
+    best: dict[tuple[_Kind, ...], float] = {}
     for p in pool:
-        key = tuple(sorted(m.id for m in p.members))
+        key = tuple(sorted(_kind(m) for m in p.members))
         value = p.criterion(size)
         if value > best.get(key, -np.inf):
             best[key] = value
-    own = best[tuple(sorted(ids))]
+    own = best[tuple(sorted(kinds))]
     out = []
-    for k in range(len(ids)):
-        others = ids[:k] + ids[k + 1 :]
-        near: dict[str, float] = {}
+    for k in range(len(kinds)):
+        others = kinds[:k] + kinds[k + 1 :]
+        near: dict[_Kind, float] = {}
         for key, value in best.items():
             rest = list(key)
             if any(o not in rest for o in others):
                 continue
             for o in others:
                 rest.remove(o)
-            if rest != [ids[k]]:
+            if rest != [kinds[k]]:
                 near[rest[0]] = max(near.get(rest[0], -np.inf), value)
         ranked = sorted(near.items(), key=lambda item: -item[1])
-        out.append(tuple(Rival(id, own - v) for id, v in ranked if own - v <= _EQUIVALENT))
+        out.append(
+            tuple(
+                Rival(id, own - v, channel or None) for (id, channel), v in ranked if own - v <= _EQUIVALENT
+            )
+        )
     return tuple(out)
+
+
+def _kind(candidate: Candidate) -> _Kind:
+    return candidate.id, candidate.channel or ""

@@ -206,7 +206,9 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> dict[str, Any]:
     attribution = analysis.attribution
     cause = attribution.causes[k]
     id = cause.candidate.id
-    rivals = [r.id for r in attribution.rivals[k]][:_MOST_EQUIVALENT]
+    near = attribution.rivals[k]
+    rivals = list(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
+    channels = [r.channel for r in near if r.channel is not None]
     entry: dict[str, Any] = {
         "id": id,
         "family": terms.CATALOGUE[id].family,
@@ -222,6 +224,8 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> dict[str, Any]:
     }
     if cause.candidate.channel is not None:
         entry["channel"] = cause.candidate.channel
+    if channels:
+        entry["equivalent_channels"] = channels
     return entry
 
 
@@ -348,7 +352,11 @@ def _sentence(result: dict[str, Any]) -> str:
         "consistent": "Nothing was found beyond the static map and the declared noise.",
         "explained": f"{names}.",
         "ambiguous": f"{names}, or equally well: "
-        + ", ".join(WORDS[i].name for c in causes for i in c["equivalent"])
+        + ", ".join(
+            WORDS[i].name + (f" ({', '.join(c['equivalent_channels'])})" if i == "auxiliary" else "")
+            for c in causes
+            for i in c["equivalent"]
+        )
         + ".",
         "partial": f"{names}, and structure remains that no cause explains.",
         "noise_differs": f"{noise}.",
