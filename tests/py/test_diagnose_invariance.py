@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose import diagnose
+from gyrotc.diagnose.detect import _root
 from gyrotc.diagnose.noise import Declared
 from gyrotc.diagnose.pipeline import Analysis, analyse
 from gyrotc.diagnose.recordings import declared_noise, records_of
@@ -213,3 +214,12 @@ def test_truth_beside_the_recordings_is_not_looked_at(made: Callable[[str], Case
     (folder / "truth.json").write_text('{"causes": [{"id": "warm_up"}]}', encoding="utf-8")
     assert diagnose(load(folder)).result == before
     (folder / "truth.json").unlink()
+
+
+def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
+    """Rounding leaves the matrix of their products with a negative eigenvalue; it was an error."""
+    vectors = np.linalg.qr(np.random.default_rng(5).normal(size=(6, 6)))[0]
+    gram = (vectors * [3.0, 2.0, 1.0, 0.5, 0.0, -1e-9]) @ vectors.T
+    root = _root(gram)
+    assert np.abs(root @ root.T - gram).max() < 1e-8
+    assert np.isfinite(root).all()

@@ -167,8 +167,17 @@ def draw_null(projection: Projection, columns: Columns, seed: int, draws: int = 
     used = np.flatnonzero(projection.alive)
     gram = projection.gram[np.ix_(used, used)]
     gram = gram + np.diag(1e-7 * projection.before[used] + 1e-12)
-    factor = np.linalg.cholesky(gram)
+    factor = _root(gram)
     normal = np.random.default_rng(seed).standard_normal((draws, used.size))
     a = np.zeros((draws, projection.a.size))
     a[:, used] = normal @ factor.T
     return np.asarray(score(projection, columns, a).joined().max(axis=-1))
+
+
+def _root(gram: Array) -> Array:
+    """A factor F with F F' = gram; what rounding made negative in it, of columns that hardly differ, counts as 0."""
+    try:
+        return np.asarray(np.linalg.cholesky(gram))
+    except np.linalg.LinAlgError:
+        size, vectors = np.linalg.eigh(gram)
+        return np.asarray(vectors * np.sqrt(np.maximum(size, 0.0)))
