@@ -29,7 +29,7 @@ def _one(low: float, high: float = 1e9, *, offset: bool = False) -> Callable[[Ro
 
 
 RANDOM = ("thermometer_drift", "telegraph", "pulses", "room_cycle")
-# Written after the tool was last changed, by somebody who had not read its shapes.
+# Written after the shapes of `diagnose/others.py`, by somebody who had not read them.
 UNFORESEEN = ("stick_slip", "saturating_memory", "ringing", "dose")
 
 CHECKS: list[Check] = [
@@ -119,7 +119,7 @@ CHECKS: list[Check] = [
         "max",
     ),
     (
-        "... of these, k ≥ 2.5, of a kind that is newer than the tool",
+        "... of these, k ≥ 2.5, of a kind that is newer than the shapes",
         "≤ 10 %",
         lambda r: r["stratum"] == "foreign" and _k(r) >= 2.5 and r["truth"][0] in UNFORESEEN,
         lambda r: bool(r["named"]),
