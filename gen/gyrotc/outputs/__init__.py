@@ -1,0 +1,33 @@
+"""Where results go: the one place that writes what a user asked for.
+
+A folder is written beside its place and put there in one step (`result_folder`), a file likewise
+(`write_atomically`, `write_result`). A marker in each folder says what gyrotc wrote; nothing else is ever removed.
+"""
+
+from __future__ import annotations
+
+from .files import check_replaceable, write_atomically, write_result
+from .folder import Stage, result_folder
+from .interrupts import Interrupted, deferred, die_of, raise_on_signals
+from .lock import Lock
+from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
+
+__all__ = [
+    "KINDS",
+    "MARKER",
+    "SCHEMA",
+    "Interrupted",
+    "Lock",
+    "Marker",
+    "Stage",
+    "check_replaceable",
+    "deferred",
+    "die_of",
+    "faults",
+    "raise_on_signals",
+    "read_marker",
+    "result_folder",
+    "sha256",
+    "write_atomically",
+    "write_result",
+]

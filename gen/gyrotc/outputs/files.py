@@ -1,0 +1,100 @@
+"""A single file that is there as it was, or whole and new."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from pathlib import Path
+
+from ..errors import InputError
+from .interrupts import deferred
+from .lock import Lock
+
+__all__ = ["check_replaceable", "sync_folder", "write_atomically", "write_result"]
+
+_MOST_BYTES = 2**30
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Writes a file under a temporary name beside it and renames it into place, on disk when this returns.
+
+    A device or a pipe is written as it is.
+
+    Raises:
+        InputError: Another job of gyrotc is writing this file.
+        OSError: It cannot be written; then what was there still is.
+    """
+    content = data.encode("utf-8") if isinstance(data, str) else data
+    if _is_device(path):
+        with path.open("wb", buffering=0) as stream:
+            stream.write(content)
+        return
+    path = path.resolve()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with deferred():
+        lock = Lock(path, "output")
+        part = path.with_name(f".{path.name}.gyrotc-part")
+        try:
+            part.unlink(missing_ok=True)  # of a job that was killed
+            with part.open("xb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            part.replace(path)
+            sync_folder(path.parent)
+        finally:
+            part.unlink(missing_ok=True)
+            lock.release()
+
+
+def write_result(path: Path, text: str) -> None:
+    """Writes a JSON result where the user asked for it, as `write_atomically`.
+
+    Raises:
+        InputError: As `check_replaceable`.
+    """
+    check_replaceable(path)
+    write_atomically(path, text)
+
+
+def check_replaceable(path: Path) -> None:
+    """A file that `--json` names must not be one that gyrotc did not write: it would be lost.
+
+    Raises:
+        InputError: There is such a file, or a folder.
+    """
+    if _is_device(path):
+        return
+    try:
+        if path.stat().st_size == 0:
+            return
+        if not path.is_file():
+            raise InputError(str(path), "is a folder", "the name of a file")
+        content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
+    except FileNotFoundError:
+        return
+    except (ValueError, RecursionError):
+        content = None
+    parts = [content, *(content.values() if isinstance(content, dict) else ())]
+    if not any(isinstance(p, dict) and str(p.get("schema", "")).startswith("gyrotc.") for p in parts):
+        raise InputError(
+            str(path), "exists and was not written by gyrotc", "a new name, or an earlier result"
+        )
+
+
+def _is_device(path: Path) -> bool:
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
+
+
+def sync_folder(folder: Path) -> None:
+    """Names in a folder are on disk when this returns, where the file system can do that."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,272 @@
+"""`.gyrotc-result.json`: what gyrotc wrote into a folder, so that it removes that and nothing else.
+
+Names that stand in a marker are compared with names found in the folder; none is ever opened or removed because
+a marker names it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import InputError
+
+__all__ = [
+    "KINDS",
+    "MARKER",
+    "SCHEMA",
+    "Marker",
+    "faults",
+    "read_marker",
+    "remove_listed",
+    "sha256",
+    "survey",
+]
+
+MARKER = ".gyrotc-result.json"
+SCHEMA = "gyrotc.result/1"
+KINDS = {
+    "build": "result",
+    "fit": "result",
+    "emit": "result",
+    "verify": "result",
+    "evaluate": "result",
+    "diagnose": "diagnosis",
+    "plan": "plan",
+    "compare": "comparison",
+    "simulate": "data set",
+    "fleet": "fleet",
+}
+"""Kind of folder that a command writes."""
+
+_MOST_BYTES = 2**26
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """The content of a marker file.
+
+    Attributes:
+        kind: What the folder holds, see `KINDS`.
+        command: That wrote it last.
+        serial, axis: Whose it is, where that is known.
+        files: SHA-256 of each file, by its path in the folder. Files of parts stand in the parts' own markers.
+        parts: Folders inside that are results with a marker of their own.
+        pending: While entries of the folder change places one by one: for each the files it will have.
+        unfinished: A folder that is being written and has not got its name yet; all in it is gyrotc's.
+    """
+
+    kind: str
+    command: str
+    serial: str | None = None
+    axis: str | None = None
+    files: dict[str, str] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
+    pending: dict[str, dict[str, str]] = field(default_factory=dict)
+    unfinished: bool = False
+
+    def text(self) -> str:
+        """As JSON."""
+        content: dict[str, Any] = {
+            "schema": SCHEMA,
+            "gyrotc_version": __version__,
+            "kind": self.kind,
+            "command": self.command,
+            "serial": self.serial,
+            "axis": self.axis,
+            "files": dict(sorted(self.files.items())),
+            "parts": sorted(self.parts),
+        }
+        for name in ("pending", "unfinished"):
+            if getattr(self, name):
+                content[name] = getattr(self, name)
+        return json.dumps(content, indent=1) + "\n"
+
+    def known(self, name: str) -> set[str]:
+        """SHA-256 that a file of this path may have."""
+        later = self.pending.get(name.split("/", 1)[0], {})
+        return {table[name] for table in (self.files, later) if name in table}
+
+    def entries(self) -> set[str]:
+        """Names in the folder itself that are gyrotc's."""
+        names = {name.split("/", 1)[0] for name in (*self.files, *self.parts)}
+        return names | {entry for entry, files in self.pending.items() if files}
+
+
+def read_marker(folder: Path) -> Marker | None:
+    """The marker of a folder; None if it has none.
+
+    Raises:
+        InputError: It is damaged.
+    """
+    path = folder / MARKER
+    try:
+        facts = path.lstat()
+        if not stat.S_ISREG(facts.st_mode) or facts.st_size > _MOST_BYTES:
+            raise ValueError("no regular file of a likely size")
+        raw = json.loads(path.read_text(encoding="utf-8"))
+        if raw["schema"] != SCHEMA:
+            raise ValueError(f"schema {raw['schema']!r}")
+        return Marker(
+            str(raw["kind"]),
+            str(raw["command"]),
+            raw["serial"],
+            raw["axis"],
+            {str(k): str(v) for k, v in raw["files"].items()},
+            tuple(str(part) for part in raw["parts"]),
+            {str(k): {str(n): str(v) for n, v in f.items()} for k, f in raw.get("pending", {}).items()},
+            bool(raw.get("unfinished", False)),
+        )
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {SCHEMA}") from error
+
+
+def sha256(path: Path, *, sync: bool = False) -> str:
+    """SHA-256 of a file; with `sync` the file is on disk when this returns."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(2**20):
+            digest.update(block)
+        if sync:
+            os.fsync(file.fileno())
+    return digest.hexdigest()
+
+
+def walk(folder: Path, parts: tuple[str, ...] = ()) -> Iterator[str]:
+    """Paths of all that is in a folder but its marker and its parts; an empty folder ends with a slash."""
+    skipped = {*parts, *(Path(p).parent.joinpath(_target(folder / p)).as_posix() for p in parts)}
+
+    def fails(error: OSError) -> None:
+        raise error
+
+    for place, folders, files in os.walk(folder, onerror=fails):
+        inside = Path(place).relative_to(folder)
+        if not folders and not files and inside.parts:
+            yield f"{inside.as_posix()}/"
+        for name in files:
+            if inside.parts or name != MARKER:
+                yield (inside / name).as_posix()
+        for name in list(folders):
+            path = (inside / name).as_posix()
+            if (folder / path).is_symlink() and path not in skipped:
+                yield path
+            if path in skipped or (folder / path).is_symlink():
+                folders.remove(name)
+
+
+def _target(part: Path) -> str:
+    """Name of the folder beside a part that the part is a link to (see `folder._Job._point`), or its own."""
+    target = str(part.readlink()) if part.is_symlink() else part.name
+    return target if target.startswith(f".{part.name}.gyrotc-part-") and "/" not in target else part.name
+
+
+def survey(
+    folder: Path, marker: Marker, entries: frozenset[str] | None = None
+) -> tuple[list[str], list[str]]:
+    """What is in a folder and not of gyrotc, and what gyrotc wrote and somebody changed: two lists of paths.
+
+    Args:
+        entries: Look at these names in the folder only.
+    """
+    foreign: list[str] = []
+    edited: list[str] = []
+    for name in walk(folder, marker.parts):
+        if entries is not None and name.split("/", 1)[0] not in entries:
+            continue
+        known = marker.known(name)
+        if not known:
+            foreign.append(name)
+        elif not _is(folder / name, known):
+            edited.append(name)
+    for part in marker.parts:
+        if not (folder / part).is_dir() or (entries is not None and part.split("/", 1)[0] not in entries):
+            continue
+        own = read_marker(folder / part) or Marker("", "")
+        for found, more in zip((foreign, edited), survey(folder / part, own), strict=True):
+            found.extend(f"{part}/{name}" for name in more)
+    return sorted(foreign), sorted(edited)
+
+
+def faults(folder: Path) -> list[str]:
+    """What keeps a folder from being a complete result as it was written: a line for each; empty if it is one.
+
+    Files that gyrotc did not write are no fault. A file is whole also where a killed job has replaced some of
+    the folder's entries: each entry is then as before or as after.
+    """
+    marker = read_marker(folder)
+    if marker is None or marker.unfinished:
+        return ["no marker" if marker is None else "unfinished"]
+    found = []
+    here = set(walk(folder, marker.parts))
+    for entry in sorted(marker.entries() | set(marker.pending)):
+        versions = [{n: h for n, h in marker.files.items() if n.split("/", 1)[0] == entry}]
+        versions += [marker.pending[entry]] if entry in marker.pending else []
+        listed = here & {name for version in versions for name in version}
+        if not any(
+            listed == set(version) and all(_is(folder / name, {h}) for name, h in version.items())
+            for version in versions
+        ):
+            found.append(f"{entry}: missing or changed")
+    for part in marker.parts:
+        found += [f"{part}/{fault}" for fault in faults(folder / part)]
+    return found
+
+
+def _is(path: Path, known: set[str]) -> bool:
+    return path.is_file() and not path.is_symlink() and sha256(path) in known
+
+
+def remove_listed(folder: Path) -> list[str]:
+    """Removes what gyrotc wrote into a folder, and the folder if nothing else is in it.
+
+    Returns:
+        Paths that are left because gyrotc did not write them, or not like this.
+    """
+    try:
+        marker = read_marker(folder) or Marker("", "")
+    except InputError:
+        marker = Marker("", "")
+    if marker.unfinished:
+        for path in folder.iterdir():
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            elif path.name != MARKER:
+                path.unlink()
+        _remove_empty(folder)
+        return []
+    left = []
+    for part in marker.parts:
+        path = folder / part
+        target = path.with_name(_target(path))
+        if target.is_dir() and not target.is_symlink():
+            left += [f"{part}/{name}" for name in remove_listed(target)]
+        if path.is_symlink() and not target.exists():
+            path.unlink()
+    for name in list(walk(folder, marker.parts)):
+        known = marker.known(name)
+        if known and _is(folder / name, known):
+            (folder / name).unlink()
+        elif not name.endswith("/"):
+            left.append(name)
+    if not left:
+        _remove_empty(folder)
+    return left
+
+
+def _remove_empty(folder: Path) -> None:
+    """The folders inside, then the marker, then the folder: a kill between leaves what can be told to be gyrotc's."""
+    for place, _, _ in os.walk(folder, topdown=False):
+        if Path(place) != folder:
+            Path(place).rmdir()
+    (folder / MARKER).unlink(missing_ok=True)
+    folder.rmdir()

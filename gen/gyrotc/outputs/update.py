@@ -1,0 +1,134 @@
+"""Some entries of a result folder are replaced, the others stay: in one step where that can be."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from .exchange import can_exchange, exchange
+from .files import sync_folder
+from .marker import MARKER, Marker, sha256, walk
+
+__all__ = ["Update", "write_marker"]
+
+_NEW = ".gyrotc-new"
+
+
+def write_marker(work: Path, folder: Path, marker: Marker) -> None:
+    """Writes a folder's marker, on disk; `work` is a folder of the job's own on the same file system."""
+    new = work / _NEW
+    with new.open("w", encoding="utf-8") as stream:
+        stream.write(marker.text())
+        stream.flush()
+        os.fsync(stream.fileno())
+    new.replace(folder / MARKER)
+    sync_folder(folder)
+
+
+class Update:
+    """New entries of the folder `place`, which lie in `work`.
+
+    One entry is exchanged by itself, between a marker that allows for both its versions and one with the new.
+    More than one are exchanged with the whole folder, to whose new version the other files are linked; where
+    the folder holds what is not gyrotc's, one after another.
+
+    Args:
+        earlier: The marker of `place`, if it has one.
+        marker: Of what lies in `work`.
+        entries: Names in `place` that belong to this job: those that were not written again are removed.
+    """
+
+    def __init__(
+        self, place: Path, work: Path, earlier: Marker | None, marker: Marker, entries: frozenset[str]
+    ) -> None:
+        self._place, self._work = place, work
+        self._before = _settled(place, earlier or replace(marker, files={}, parts=()))
+        self._marked = earlier is not None
+        self._new = marker
+        written = {path.name for path in work.iterdir()} - {MARKER}
+        self._changed = sorted(written | (entries & self._before.entries()))
+        kept = {n: h for n, h in self._before.files.items() if _top(n) not in self._changed}
+        parts = {part for part in self._before.parts if _top(part) not in self._changed}
+        self._after = replace(
+            marker, files=kept | marker.files, parts=tuple(sorted(parts | set(marker.parts)))
+        )
+        if marker.serial is None:
+            self._after = replace(self._after, serial=self._before.serial, axis=self._before.axis)
+
+    def commit(self, put: Callable[[], None]) -> None:
+        """Args: put: Puts `work` into the place as a whole."""
+        several = len(self._changed) > 1 or not can_exchange(self._work)
+        if self._marked and several and self._all_listed():
+            self._link_others()
+            write_marker(self._work, self._work, self._after)
+            put()
+        else:
+            self._one_by_one()
+
+    def _all_listed(self) -> bool:
+        return all(self._before.known(name) for name in walk(self._place, self._before.parts))
+
+    def _link_others(self) -> None:
+        """The files that stay, under their names in the new folder too."""
+        for name in walk(self._place):
+            if _top(name) in self._changed:
+                continue
+            target = self._work / name
+            if name.endswith("/"):
+                target.mkdir(parents=True)
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                os.link(self._place / name, target, follow_symlinks=False)
+            except OSError:  # a file system without hard links
+                shutil.copy2(self._place / name, target, follow_symlinks=False)
+        for folder, _, _ in os.walk(self._work):
+            sync_folder(Path(folder))
+
+    def _one_by_one(self) -> None:
+        old, new = self._before, self._new
+        later = {entry: _of(new, entry) for entry in self._changed}
+        parts = tuple(sorted({*old.parts, *new.parts}))
+        write_marker(
+            self._work, self._work, replace(new, pending={e: _of(old, e) for e in later}, parts=parts)
+        )
+        write_marker(self._work, self._place, replace(old, pending=later, parts=parts))
+        for entry in self._changed:
+            _swap(self._work / entry, self._place / entry)
+        write_marker(self._work, self._place, self._after)
+
+
+def _swap(new: Path, old: Path) -> None:
+    """Afterwards each lies where the other was, or neither there."""
+    if not os.path.lexists(new):
+        old.rename(new)
+    elif not os.path.lexists(old):
+        new.rename(old)
+    elif not exchange(new, old):
+        if new.is_dir():
+            old.rename(new.with_name(f"{new.name}.old"))
+        new.replace(old)
+
+
+def _settled(place: Path, marker: Marker) -> Marker:
+    """The marker of a folder in which a killed job replaced some entries: what is there now."""
+    if not marker.pending:
+        return marker
+    files = {n: h for n, h in marker.files.items() if _top(n) not in marker.pending}
+    for name in walk(place, marker.parts):
+        if _top(name) in marker.pending and (place / name).is_file():
+            found = sha256(place / name)
+            if found in marker.known(name):
+                files[name] = found
+    return replace(marker, files=files, pending={})
+
+
+def _of(marker: Marker, entry: str) -> dict[str, str]:
+    return {name: digest for name, digest in marker.files.items() if _top(name) == entry}
+
+
+def _top(name: str) -> str:
+    return name.split("/", 1)[0]
