@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -23,12 +19,13 @@ from .errors import InputError
 from .evaluate import evaluate
 from .fitting import FitOptions, Fitted, fit_dataset
 from .limits import Limits, held_against, load_limits
-from .model import Model, write_atomically
+from .model import Model
+from .outputs import MARKER, result_folder, sha256, write_atomically
 from .report import write_report
 from .triad import join_axes
 from .verify import verify
 
-__all__ = ["Built", "build", "folder_in_place"]
+__all__ = ["Built", "build"]
 
 Progress = Callable[[str], None]
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
@@ -72,6 +69,7 @@ def build(
     extend: bool = False,
     limits: Path | None = None,
     previous: Path | None = None,
+    any_serial: bool = False,
     progress: Progress | None = None,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
@@ -85,9 +83,10 @@ def build(
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
         limits: A limits file that the result is held against.
         previous: An earlier result of the same gyro, to say what changed.
+        any_serial: An earlier result in `out` may be of another gyro.
 
     Raises:
-        InputError: Bad recordings or arguments; `out` is untouched.
+        InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
         CheckFailed: Every arithmetic is refused; `out` is untouched.
     """
     say = progress or (lambda _: None)
@@ -97,15 +96,19 @@ def build(
     axes = axes_of(source) if axis == "all" else ()
     if axis == "all" and not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
-    with folder_in_place(out) as work:
+    with result_folder(out, "build", inputs=[source]) as stage:
         if not axes:
             dataset = load(source, axis=axis, applied=known)
-            return [_build_axis(dataset, work, options, order, say)]
+            stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
+            return [_build_axis(dataset, stage.folder, options, order, say)]
         built = []
         for name in axes:
             dataset = load(source, axis=name, applied=known)
-            built.append(_build_axis(dataset, work / name, options, order, _of_axis(name, say)))
-        join_axes(work, axes)
+            stage.of(dataset.serial, any_serial=any_serial)
+            with result_folder(stage.folder / name, "build") as part:
+                part.of(dataset.serial, name)
+                built.append(_build_axis(dataset, part.folder, options, order, _of_axis(name, say)))
+        join_axes(stage.folder, axes)
         return built
 
 
@@ -186,7 +189,7 @@ def _write(path: Path, result: dict[str, Any]) -> None:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> dict[str, Any]:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file())
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return {
         "schema": "gyrotc.manifest/1",
         "gyrotc_version": __version__,
@@ -196,46 +199,5 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         "refused": refused,
         "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
         "meta": dict(dataset.meta),
-        "files": {p.relative_to(folder).as_posix(): _sha256(p) for p in files},
+        "files": {p.relative_to(folder).as_posix(): sha256(p) for p in files},
     }
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(2**20):
-            digest.update(block)
-    return digest.hexdigest()
-
-
-@contextmanager
-def folder_in_place(out: Path) -> Iterator[Path]:
-    """A folder under a temporary name beside `out`; renamed into its place when the block ends well.
-
-    Raises:
-        InputError: `out` exists and is not a result of gyrotc (it would be lost).
-    """
-    if out.exists() and not _replaceable(out):
-        raise InputError(
-            str(out), "exists and was not written by gyrotc", "a new or an earlier result folder"
-        )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(prefix=f".{out.name}.part-", dir=out.parent))
-    try:
-        yield work
-        work.chmod(0o755)
-        if out.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{out.name}.old-", dir=out.parent))
-            out.replace(old / "old")
-            work.replace(out)
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            work.replace(out)
-    except BaseException:
-        shutil.rmtree(work, ignore_errors=True)
-        raise
-
-
-def _replaceable(out: Path) -> bool:
-    known = {"model.json", "manifest.json", "c"}
-    return out.is_dir() and (not any(out.iterdir()) or any((out / name).exists() for name in known))

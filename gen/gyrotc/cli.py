@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
 from .errors import GyrotcError
+from .outputs import Interrupted, die_of, raise_on_signals
+
+_CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
 
 
 def main() -> None:
@@ -15,10 +19,33 @@ def main() -> None:
     code, which aborts the process after its work is done.
     """
     _single_threaded()
-    status = _status()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    raise_on_signals()
+    try:
+        status = _status()
+        status = _flushed() or status
+    except Interrupted as end:
+        die_of(end.number)
     os._exit(status)
+
+
+def _flushed() -> int:
+    """What is still to be printed is; else the status of what went wrong."""
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError as error:
+        return _failed(error)
+    return 0
+
+
+def _failed(error: OSError) -> int:
+    """One line of a file that cannot be read or written; none where the reader of stdout has gone."""
+    if isinstance(error, BrokenPipeError):
+        return _CLOSED
+    where = error.filename or "standard output"
+    with contextlib.suppress(OSError):
+        print(f"gyrotc: {where}: {error.strerror or error}", file=sys.stderr, flush=True)
+    return GyrotcError.exit_status
 
 
 def _single_threaded() -> None:
@@ -39,9 +66,10 @@ def _status() -> int:
     except GyrotcError as error:
         print(f"gyrotc: {error}", file=sys.stderr)
         return error.exit_status
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except OSError as error:
+        return _failed(error)
     except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # typer's own way of ending then
+            return _CLOSED
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     return 0

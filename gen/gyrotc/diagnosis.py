@@ -15,11 +15,11 @@ from typing import Any
 
 from .dataset import Dataset
 from .diagnose import Diagnosis, diagnose
-from .diagnosis_page import PICTURES, write_page
+from .diagnosis_page import PICTURES, write_diagnosis_page
 from .diagnosis_plots import draw
-from .errors import InputError
 from .fitting import FitOptions
-from .model import Model, write_atomically
+from .model import Model
+from .outputs import result_folder, write_atomically
 
 __all__ = ["diagnose_into", "extended_scenario", "save"]
 
@@ -40,12 +40,12 @@ def diagnose_into(
     """Diagnoses a data set and fills `out`: `diagnose.json`, `report.html`, pictures, the extended model.
 
     Raises:
-        InputError: As `diagnose`; or `out` holds the result of a build.
+        InputError: As `diagnose` and `result_folder`.
     """
-    if (out / "evaluate.json").exists():
-        raise InputError(str(out), "holds the result of gyrotc build", "a folder of its own")
-    found = diagnose(dataset, model=model, options=options, progress=progress)
-    return save(out, found, progress)
+    with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        found = diagnose(dataset, model=model, options=options, progress=progress)
+        return save(stage.folder, found, progress)
 
 
 def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
@@ -65,7 +65,7 @@ def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagn
         write_atomically(out / PICTURES / f"{name}.svg", svg)
         result["pictures"].append(f"{PICTURES}/{name}.svg")
     write_atomically(out / "diagnose.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
-    write_page(out)
+    write_diagnosis_page(out)
     return replace(found, result=result)
 
 

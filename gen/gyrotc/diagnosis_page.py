@@ -8,10 +8,9 @@ from typing import Any
 import jinja2
 
 from .errors import InputError
-from .model import write_atomically
-from .report import page_environment, read_json
+from .report import page_environment, read_json, write_page
 
-__all__ = ["PICTURES", "is_diagnosis", "write_page"]
+__all__ = ["PICTURES", "is_diagnosis", "write_diagnosis_page"]
 
 PICTURES = "pictures"
 
@@ -21,7 +20,7 @@ def is_diagnosis(folder: Path) -> bool:
     return (folder / "diagnose.json").is_file() and not (folder / "evaluate.json").exists()
 
 
-def write_page(folder: Path) -> Path:
+def write_diagnosis_page(folder: Path) -> Path:
     """Writes `folder/report.html` from what stands in the folder; returns its path.
 
     Raises:
@@ -46,9 +45,7 @@ def write_page(folder: Path) -> Path:
         )
     except (KeyError, TypeError, jinja2.UndefinedError) as error:
         raise InputError(str(folder / "diagnose.json"), f"lacks {error}", "a result of diagnose") from error
-    path = folder / "report.html"
-    write_atomically(path, text)
-    return path
+    return write_page(folder, text)
 
 
 def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, str]:

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import functools
 import re
-import shutil
 import struct
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 from .amalgamate import amalgamate, runtime_folders
 from .errors import CheckFailed, InputError
 from .model import Model
+from .outputs import result_folder
 from .quantise import NUMERICS, Table, quantise
 from .reference import answers
 from .table import LAYOUT
@@ -38,7 +37,7 @@ __all__ = [
     "emitted_model",
     "emitted_tables",
     "quantise_all",
-    "replace_folder",
+    "write_texts",
 ]
 
 
@@ -81,10 +80,10 @@ def quantise_all(model: Model, numerics: Sequence[str] | None) -> Emission:
 def emit(
     model: Model, out: Path, *, numerics: Sequence[str] | None = None, zero_at: float | None = None
 ) -> Emission:
-    """Writes `out/c/`. The folder appears whole or not at all; an older one is replaced."""
+    """Writes `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced."""
     emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics)
     texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at)
-    replace_folder(out / "c", texts)
+    write_texts(out, texts, model)
     return emission
 
 
@@ -119,24 +118,17 @@ def _emitted_header(folder: Path, model: Model) -> str:
         ) from error
 
 
-def replace_folder(folder: Path, files: dict[str, bytes]) -> None:
-    """Puts a folder with exactly these files in place of `folder`, by renaming."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    new = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    try:
-        for name, data in files.items():
-            (new / name).write_bytes(data)
-        new.chmod(0o755)
-        if folder.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
-            folder.replace(old / folder.name)
-            new.replace(folder)
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            new.replace(folder)
-    except BaseException:
-        shutil.rmtree(new, ignore_errors=True)
-        raise
+def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
+    """Puts a folder with exactly these files in place of `out/c`.
+
+    Raises:
+        InputError: Something in `out/c` was not written by gyrotc, or was changed since.
+    """
+    with result_folder(out, "emit", entries=("c",)) as stage:
+        stage.of(model.serial, model.axis)
+        (stage.folder / "c").mkdir()
+        for name, data in texts.items():
+            (stage.folder / "c" / name).write_bytes(data)
 
 
 def emit_texts(

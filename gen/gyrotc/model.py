@@ -15,9 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import re
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -27,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .errors import InputError
+from .outputs import write_atomically
 
 __all__ = [
     "SCHEMA",
@@ -40,7 +39,6 @@ __all__ = [
     "Uncertainty",
     "load_model",
     "table_id",
-    "write_atomically",
 ]
 
 SCHEMA = "gyrotc.model/1"
@@ -362,17 +360,3 @@ def load_model(path: Path) -> Model:
 
 def _refuse_constant(text: str) -> float:
     raise ValueError(f"{text} is not a finite number")
-
-
-def write_atomically(path: Path, data: str | bytes) -> None:
-    """Writes a file under a temporary name in the same folder, then renames it into place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data.encode("utf-8") if isinstance(data, str) else data)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

@@ -9,9 +9,9 @@ from typing import Any
 import jinja2
 
 from .errors import InputError
-from .model import write_atomically
+from .outputs import result_folder, write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
-from .report import page_environment, read_json
+from .report import page_environment, read_json, write_page
 
 __all__ = ["is_plan", "write_plan", "write_plan_page"]
 
@@ -23,8 +23,10 @@ def is_plan(folder: Path) -> bool:
 
 def write_plan(folder: Path, result: dict[str, Any]) -> Path:
     """Writes `folder/plan.json` and `folder/report.html`; returns the page's path."""
-    write_atomically(folder / "plan.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
-    return write_plan_page(folder)
+    with result_folder(folder, "plan") as stage:
+        write_atomically(stage.folder / "plan.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+        write_plan_page(stage.folder)
+    return folder / "report.html"
 
 
 def write_plan_page(folder: Path) -> Path:
@@ -47,6 +49,4 @@ def write_plan_page(folder: Path) -> Path:
         )
     except (KeyError, TypeError, jinja2.UndefinedError) as error:
         raise InputError(str(folder / "plan.json"), f"lacks {error}", "a result of plan") from error
-    path = folder / "report.html"
-    write_atomically(path, text)
-    return path
+    return write_page(folder, text)

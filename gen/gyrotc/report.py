@@ -13,10 +13,11 @@ import pyarrow.csv as pacsv
 
 from .errors import InputError
 from .metrics import Averages, average
-from .model import Model, load_model, write_atomically
+from .model import Model, load_model
+from .outputs import result_folder, write_atomically
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 
-__all__ = ["page_environment", "read_json", "write_report"]
+__all__ = ["page_environment", "read_json", "write_page", "write_report"]
 
 
 def write_report(folder: Path) -> Path:
@@ -46,9 +47,18 @@ def write_report(folder: Path) -> Path:
             pictures=_pictures(folder, model, evaluation, training),
         )
     )
-    path = folder / "report.html"
-    write_atomically(path, text)
-    return path
+    return write_page(folder, text)
+
+
+def write_page(folder: Path, text: str) -> Path:
+    """Writes `folder/report.html`; returns its path.
+
+    Raises:
+        InputError: There is one that gyrotc did not write, or that was changed since.
+    """
+    with result_folder(folder, "report", kind="", entries=("report.html",)) as stage:
+        write_atomically(stage.folder / "report.html", text)
+    return folder / "report.html"
 
 
 def page_environment() -> jinja2.Environment:

@@ -13,7 +13,8 @@ import jinja2
 
 from .emit import emitted_tables
 from .errors import CheckFailed
-from .model import load_model, write_atomically
+from .model import load_model
+from .outputs import write_atomically
 from .toolchain import all_targets, compile_c, run_program
 
 __all__ = ["join_axes"]

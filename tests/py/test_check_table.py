@@ -18,7 +18,7 @@ import pytest
 from conftest import ROOT
 from emitted import GOLDEN, emitted, flip
 from gyrotc import vectors
-from gyrotc.emit import Emission, emit, emit_texts, quantise_all, replace_folder
+from gyrotc.emit import Emission, emit, emit_texts, quantise_all, write_texts
 from gyrotc.model import Model, load_model
 from gyrotc.table import Table
 from models import bank_of, random_model, random_terms
@@ -190,7 +190,7 @@ def test_seeded_fault_of_quantisation_is_seen(
 ) -> None:
     table = quantise_all(model, [numeric]).tables[numeric]
     emission = Emission({numeric: FAULTS[name](table)}, {})
-    replace_folder(tmp_path / "c", emit_texts(model, emission, asked=True))
+    write_texts(tmp_path, emit_texts(model, emission, asked=True), model)
     model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1, (name, done.stdout, done.stderr)
@@ -203,7 +203,7 @@ def test_seeded_fault_in_terms_or_bank_is_seen(
 ) -> None:
     model = _extended(3)
     table = EXTENDED_FAULTS[name](quantise_all(model, [numeric]).tables[numeric])
-    replace_folder(tmp_path / "c", emit_texts(model, Emission({numeric: table}, {}), asked=True))
+    write_texts(tmp_path, emit_texts(model, Emission({numeric: table}, {}), asked=True), model)
     model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1, (name, done.stdout, done.stderr)

@@ -44,7 +44,7 @@ def test_build_leaves_every_promised_file(demo: Path) -> None:
     names = {p.name for p in result.iterdir()}
     assert names == {
         "model.json", "training.json", "c", "verify.json", "evaluate.json", "trace", "report.html",
-        "manifest.json",
+        "manifest.json", ".gyrotc-result.json",
     }  # fmt: skip
     assert len(list((result / "trace").glob("run-*.csv"))) == 12
     assert not [p for p in demo.iterdir() if p.name.startswith(".")]
@@ -184,7 +184,9 @@ def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: P
     _three_axes(demo / "data", tmp_path / "triad")
     done = gyrotc("build", tmp_path / "triad", "--axis", "all", "--numeric", "f32", "--out", tmp_path / "r")
     assert done.returncode == 0, done.stderr
-    assert {p.name for p in (tmp_path / "r").iterdir()} == {"x", "y", "z", "c", "report.html"}
+    assert {p.name for p in (tmp_path / "r").iterdir()} == {
+        "x", "y", "z", "c", "report.html", ".gyrotc-result.json",
+    }  # fmt: skip
     c = tmp_path / "r" / "c"
     assert {f"gtc_triad_{axis}.c" for axis in "xyz"} <= {p.name for p in c.iterdir()}
     w0 = [load_model(tmp_path / "r" / axis / "model.json").map_dph(10.0, 0.0) for axis in "xyz"]

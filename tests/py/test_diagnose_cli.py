@@ -130,10 +130,12 @@ def test_nothing_is_found_in_a_plain_gyro(tmp_path: Path, gyrotc: Command) -> No
 
 
 def test_a_constant_temperature_is_not_testable(tmp_path: Path, gyrotc: Command) -> None:
+    data = tmp_path / "RLG-1"
+    data.mkdir()
     for number in range(3):
         rows = [f"{10 * k},{25 + 0.01 * (k % 3)},{7e-3 + 1e-4 * ((7 * k) % 5)}" for k in range(400)]
-        (tmp_path / f"{number}.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
-    done = gyrotc("diagnose", tmp_path, "--out", tmp_path / "out")
+        (data / f"{number}.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
+    done = gyrotc("diagnose", data, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "not testable" in done.stdout and "nothing can be learnt about temperature" in done.stdout
     assert read_json(tmp_path / "out" / "diagnose.json")["verdict"] == "not_testable"

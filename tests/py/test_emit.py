@@ -47,10 +47,18 @@ def test_emitted_text_names_no_time_path_or_version(tmp_path: Path) -> None:
 def test_emit_replaces_the_folder_whole(tmp_path: Path) -> None:
     model = load_model(EXAMPLE / "model.json")
     emit(model, tmp_path)
-    (tmp_path / "c" / "stale.c").write_text("old")
-    emit(model, tmp_path)
-    assert not (tmp_path / "c" / "stale.c").exists()
-    assert [p.name for p in tmp_path.iterdir()] == ["c"]
+    assert list((tmp_path / "c").glob("*_q31.bin"))
+    emit(model, tmp_path, numerics=["f32"])
+    assert not list((tmp_path / "c").glob("*_q31.bin"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".gyrotc-result.json", "c"]
+
+
+def test_emit_deletes_no_folder_of_somebody_else(tmp_path: Path) -> None:
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "firmware.c").write_text("years of work")
+    with pytest.raises(InputError, match="was not written by gyrotc"):
+        emit(load_model(EXAMPLE / "model.json"), tmp_path)
+    assert [p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")] == ["c", "c/firmware.c"]
 
 
 def test_methods_for_comparison_are_refused(model_dict: dict[str, Any], tmp_path: Path) -> None:

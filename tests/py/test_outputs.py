@@ -131,7 +131,7 @@ def test_folders_of_others_are_refused(out: Path) -> None:
 
 def test_another_kind_and_another_serial_are_refused(out: Path) -> None:
     write(out, "one")
-    with pytest.raises(InputError, match=r"holds a result \(gyrotc build\)"), result_folder(out, "plan"):
+    with pytest.raises(InputError, match=r"holds the result of gyrotc build"), result_folder(out, "plan"):
         pytest.fail("began")
     with pytest.raises(InputError, match="serial A, and this is of B"):
         write(out, "two", serial="B")

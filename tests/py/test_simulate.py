@@ -265,7 +265,7 @@ def test_a_folder_of_recordings_has_no_truth_and_is_never_overwritten(short: Pat
     folder.mkdir()
     (folder / "run.csv").write_text("time_s,temperature_c,rate_dph\n", "utf-8")
     assert read_truth(folder) is None
-    with pytest.raises(InputError, match="no simulated data set"):
+    with pytest.raises(InputError, match="was not written by gyrotc"):
         made(short, folder)
     assert [path.name for path in folder.iterdir()] == ["run.csv"]
 
@@ -274,9 +274,12 @@ def test_a_simulated_folder_is_replaced_and_an_interrupted_run_leaves_no_trace(
     short: Path, tmp_path: Path
 ) -> None:
     folder = made(short, tmp_path / "data")
-    (folder / "old.txt").write_text("old", "utf-8")
+    (folder / "notes.txt").write_text("years of work", "utf-8")
+    with pytest.raises(InputError, match=r"notes\.txt"):
+        made(short, folder, format="parquet")
+    (folder / "notes.txt").rename(tmp_path / "notes.txt")
     made(short, folder, format="parquet")
-    assert not (folder / "old.txt").exists() and not (folder / "run-01.csv").exists()
+    assert (folder / "run-01.parquet").exists() and not (folder / "run-01.csv").exists()
 
     def stop(share: float) -> None:
         if share > 0.4:

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 
 from .. import __version__
-from ..model import write_atomically
+from ..outputs import check_replaceable, write_result
 
 app = typer.Typer(
     name="gyrotc",
@@ -28,7 +28,19 @@ ERR = Console(stderr=True)
 
 DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
-JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the machine-readable result here.")]
+
+
+def _json_place(path: Path | None) -> Path | None:
+    """Before the work: what stands there was written by gyrotc."""
+    if path is not None:
+        check_replaceable(path)
+    return path
+
+
+JsonOption = Annotated[
+    Path | None,
+    typer.Option("--json", callback=_json_place, help="Write the machine-readable result here."),
+]
 AxisOption = Annotated[
     str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
 ]
@@ -70,7 +82,7 @@ def tell(text: str) -> None:
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
     if path is not None:
-        write_atomically(path, json_text(result))
+        write_result(path, json_text(result))
 
 
 def json_text(result: dict[str, Any]) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import CheckFailed, InputError
-from ..model import write_atomically
+from ..outputs import result_folder, write_atomically
 from .base import (
     OUT,
     AppliedOption,
@@ -59,6 +60,9 @@ def build(
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
     ] = None,
+    any_serial: Annotated[
+        bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -80,6 +84,7 @@ def build(
             extend=extend,
             limits=limits,
             previous=previous,
+            any_serial=any_serial,
             progress=say,
         )
     if len(results) == 1:
@@ -135,14 +140,19 @@ def compare(
     from ..comparison import comparison_picture, comparison_tables, with_published
     from ..dataset import load
 
-    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
     options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
-    with progress() as say:
+    with (
+        result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
+        progress() as say,
+    ):
+        recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+        if stage:
+            stage.of(recordings.serial, axis)
         result = with_published(run(recordings, options, progress=say))
+        if stage:
+            write_atomically(stage.folder / "compare.json", json_text(result))
+            write_atomically(stage.folder / "compare.svg", comparison_picture(result))
     write_json(json_file, result)
-    if out is not None:
-        write_atomically(out / "compare.json", json_text(result))
-        write_atomically(out / "compare.svg", comparison_picture(result))
     for table in comparison_tables(result):
         OUT.print(table)
 
@@ -169,7 +179,7 @@ def diagnose(
     Example: gyrotc diagnose recordings --out diagnosis
     """
     from ..applied import applied_of
-    from ..dataset import axes_of, load
+    from ..dataset import Dataset, axes_of, load
     from ..diagnose import diagnose as run
     from ..diagnosis import diagnose_into
     from ..fitting import FitOptions
@@ -182,17 +192,26 @@ def diagnose(
     if not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
     results: dict[str, dict[str, Any]] = {}
-    for name in axes:
-        recordings = load(dataset, axis=name, applied=subtracted)
-        folder = out / name if out is not None and name is not None and axis == "all" else out
+
+    def one(name: str | None, into: Path | None) -> None:
+        recordings: Dataset = load(dataset, axis=name, applied=subtracted)
         with progress() as say:
-            if folder is None:
-                result = run(recordings, model=known, options=options, progress=say).result
+            if into is None:
+                found = run(recordings, model=known, options=options, progress=say)
             else:
-                result = diagnose_into(folder, recordings, model=known, options=options, progress=say).result
+                found = diagnose_into(into, recordings, model=known, options=options, progress=say)
+        results[name or ""] = found.result
+
+    if axis != "all" or out is None:
+        for name in axes:
+            one(name, out)
+    else:
+        with result_folder(out, "diagnose", inputs=[dataset]) as stage:
+            for name in axes:
+                one(name, stage.folder / str(name))
+    write_json(json_file, results if axis == "all" else results[axis or ""])
+    for name, result in results.items():
         for line in diagnosis_lines(result):
             tell(line)
-        if folder is not None:
-            tell(f"report: {folder / 'report.html'}")
-        results[name or ""] = result
-    write_json(json_file, results if axis == "all" else results[axis or ""])
+        if out is not None:
+            tell(f"report: {(out / name if axis == 'all' else out) / 'report.html'}")

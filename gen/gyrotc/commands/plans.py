@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..outputs import result_folder
 from .base import OUT, JsonOption, SeedOption, app, progress, tell, write_json
 from .plan_lines import limits_of, pair_of, plan_parts
 
@@ -41,7 +43,7 @@ def plan(
     from ..plan import plan as run
     from ..plan_page import write_plan
 
-    with progress() as say:
+    with result_folder(out, "plan") if out else nullcontext() as stage, progress() as say:
         result = run(
             profile,
             noise=noise,  # type: ignore[arg-type]
@@ -50,9 +52,9 @@ def plan(
             pair=pair_of(separate),
             progress=say,
         )
+        if stage:
+            write_plan(stage.folder, result)
     write_json(json_file, result)
-    if out is not None:
-        write_plan(out, result)
     for part in plan_parts(result):
         if isinstance(part, str):
             tell(part)

@@ -9,7 +9,7 @@ import typer
 
 from .. import __version__
 from ..errors import CheckFailed
-from ..model import write_atomically
+from ..outputs import result_folder, write_atomically
 from .base import (
     ERR,
     OUT,
@@ -34,6 +34,7 @@ from .base import (
     write_json,
 )
 from .results import evaluation_table, prediction_line, span_lines, verify_notes, verify_table
+from .traces import evaluation_folders
 
 
 @app.command()
@@ -50,7 +51,7 @@ def fit(
     applied: AppliedOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Train a model: DIR/model.json and DIR/training.json.
+    """Train a model: DIR/model.json and DIR/training.json; what followed from an earlier model there goes.
 
     Example: gyrotc fit recordings --out result
     """
@@ -60,10 +61,12 @@ def fit(
 
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     known = applied_of(applied) if applied else None
-    with progress() as say:
-        fitted = fit_dataset(load(dataset, axis=axis, applied=known), options, progress=say)
-    write_atomically(out / "model.json", fitted.model.to_json())
-    write_atomically(out / "training.json", json_text(fitted.training))
+    with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
+        recordings = load(dataset, axis=axis, applied=known)
+        stage.of(recordings.serial, recordings.axis)
+        fitted = fit_dataset(recordings, options, progress=say)
+        fitted.model.save(stage.folder / "model.json")
+        write_atomically(stage.folder / "training.json", json_text(fitted.training))
     write_json(json_file, fitted.training)
     for line in span_lines(fitted.training):
         tell(line)
@@ -92,10 +95,15 @@ def emit(
     from ..model import load_model
 
     loaded = load_model(model)
-    emission = run(loaded, out, numerics=numerics_of(numeric), zero_at=zero_at)
-    target = out / "model.json"
-    if target.resolve() != (model / "model.json" if model.is_dir() else model).resolve():
-        loaded.save(target)
+    source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
+    apart = target.resolve() != source.resolve()
+    with result_folder(out, "emit", entries=("c", "model.json") if apart else ("c",)) as stage:
+        stage.of(loaded.serial, loaded.axis)
+        if apart and target.is_file() and target.read_text("utf-8") != loaded.to_json():
+            stage.stale()  # evaluated, verified, drawn: all of another model
+        emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at)
+        if apart:
+            loaded.save(stage.folder / "model.json")
     result = {
         "schema": "gyrotc.emit/1",
         "gyrotc_version": __version__,
@@ -140,11 +148,11 @@ def verify(
     from ..verify import verify as run
 
     recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
-    with progress() as say:
+    with result_folder(folder, "verify", entries=("verify.json",)) as stage, progress() as say:
         result = run(
             folder, targets=target or (), dataset=recordings, log=log, exhaustive=exhaustive, progress=say
         )
-    write_atomically(folder / "verify.json", json_text(result))
+        write_atomically(stage.folder / "verify.json", json_text(result))
     write_json(json_file, result)
     OUT.print(verify_table(result))
     for line in verify_notes(result):
@@ -174,9 +182,9 @@ def evaluate(
 
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
-    with progress() as say:
-        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=trace, progress=say)
-    write_atomically(folder / "evaluate.json", json_text(result))
+    with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
+        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=traces, progress=say)
+        write_atomically(stage / "evaluate.json", json_text(result))
     write_json(json_file, result)
     OUT.print(evaluation_table(result))
     if result["mismatches"]:
@@ -189,14 +197,14 @@ def report(folder: DirArg) -> None:
 
     Example: gyrotc report result
     """
-    from ..diagnosis_page import is_diagnosis, write_page
+    from ..diagnosis_page import is_diagnosis, write_diagnosis_page
     from ..plan_page import is_plan, write_plan_page
     from ..report import write_report
 
     with progress() as say:
         say("drawing")
         if is_diagnosis(folder):
-            path = write_page(folder)
+            path = write_diagnosis_page(folder)
         else:
             path = write_plan_page(folder) if is_plan(folder) else write_report(folder)
     tell(f"report: {path}")

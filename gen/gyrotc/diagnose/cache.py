@@ -9,7 +9,7 @@ import pickle
 from collections.abc import Callable
 from pathlib import Path
 
-from ..model import write_atomically
+from ..outputs import write_atomically
 from .bank import Bank, build
 from .records import Records
 

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .. import __version__
-from ..model import write_atomically
+from ..outputs import write_atomically
 from ..plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from .outliers import FIGURES, outliers, spread
 

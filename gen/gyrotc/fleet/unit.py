@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..build import build, folder_in_place
+from ..build import build
 from ..dataset import load
 from ..emit import emit
 from ..errors import GyrotcError
 from ..evaluate import evaluate
 from ..fitting import fit_dataset
 from ..limits import held_against
-from ..model import Model, load_model, write_atomically
+from ..model import Model, load_model
+from ..outputs import result_folder, write_atomically
 from ..verify import verify
 from .manifest import Fleet, Unit
 
@@ -70,8 +71,14 @@ def do_unit(task: Task) -> Entry:
         return name | {"status": "failed", "reason": str(error)}
     except Exception as error:  # a fault of the program itself must not stop the other serials either
         return name | {"status": "failed", "reason": f"{type(error).__name__}: {error}"}
-    write_atomically(task.out / ENTRY, json.dumps(entry, indent=1, allow_nan=False) + "\n")
+    _add(task, ENTRY, entry)
     return entry
+
+
+def _add(task: Task, name: str, content: Entry) -> None:
+    """One more file of the unit's result."""
+    with result_folder(task.out, "fleet", kind="", entries=(name,)) as stage:
+        write_atomically(stage.folder / name, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def _built(task: Task) -> Entry:
@@ -88,7 +95,7 @@ def _built(task: Task) -> Entry:
         faults.append(f"{evaluation['mismatches']} steps differ from the reference")
     if task.fleet.limits:
         held = held_against(task.fleet.limits, model, evaluation, verification)
-        write_atomically(task.out / "limits.json", json.dumps(held, indent=1, allow_nan=False) + "\n")
+        _add(task, "limits.json", held)
         faults += [
             f"{c['limit']} {c['bound']} is not met: {c['measured']}" for c in held["limits"] if not c["met"]
         ]
@@ -99,7 +106,8 @@ def _built(task: Task) -> Entry:
 def _quick(task: Task) -> tuple[Model, Entry, Entry]:
     """Without a compiler: what the C code gives is taken from the reference."""
     fleet = task.fleet
-    with folder_in_place(task.out) as work:
+    with result_folder(task.out, "build", inputs=[task.unit.dataset]) as stage:
+        work = stage.folder
         dataset = load(task.unit.dataset, axis=task.unit.axis)
         fitted = fit_dataset(dataset, fleet.options)
         fitted.model.save(work / "model.json")

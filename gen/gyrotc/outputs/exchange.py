@@ -47,7 +47,7 @@ def _call() -> Callable[[bytes, bytes], int] | None:
 
 def can_exchange(folder: Path) -> bool:
     """Whether two names in `folder`, one of gyrotc's own, can be swapped: tried."""
-    names = [folder / ".gyrotc-try-1", folder / ".gyrotc-try-2"]
+    names = [folder / ".gyrotc-try-1", folder / ".gyrotc-try-2"]  # see marker.OWN
     try:
         for name in names:
             name.touch()

@@ -11,9 +11,12 @@ from ..errors import InputError
 from .interrupts import deferred
 from .lock import Lock
 
-__all__ = ["check_replaceable", "sync_folder", "write_atomically", "write_result"]
+__all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
 _MOST_BYTES = 2**30
+
+unfinished: list[Path] = []
+"""Folders that this process is writing; they are put on disk and into their places as a whole."""
 
 
 def write_atomically(path: Path, data: str | bytes) -> None:
@@ -22,18 +25,28 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     A device or a pipe is written as it is.
 
     Raises:
-        InputError: Another job of gyrotc is writing this file.
         OSError: It cannot be written; then what was there still is.
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
-    if _is_device(path):
-        with path.open("wb", buffering=0) as stream:
-            stream.write(content)
-        return
-    path = path.resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        if _is_device(path):
+            with path.open("wb", buffering=0) as stream:
+                stream.write(content)
+            return
+        path = path.resolve()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if any(folder in path.parents for folder in unfinished):
+            path.write_bytes(content)
+        else:
+            _replace(path, content)
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
+
+
+def _replace(path: Path, content: bytes) -> None:
     with deferred():
-        lock = Lock(path, "output")
+        lock = Lock(path, "output", wait=True)
         part = path.with_name(f".{path.name}.gyrotc-part")
         try:
             part.unlink(missing_ok=True)  # of a job that was killed
@@ -44,18 +57,10 @@ def write_atomically(path: Path, data: str | bytes) -> None:
             part.replace(path)
             sync_folder(path.parent)
         finally:
-            part.unlink(missing_ok=True)
-            lock.release()
-
-
-def write_result(path: Path, text: str) -> None:
-    """Writes a JSON result where the user asked for it, as `write_atomically`.
-
-    Raises:
-        InputError: As `check_replaceable`.
-    """
-    check_replaceable(path)
-    write_atomically(path, text)
+            try:
+                part.unlink(missing_ok=True)
+            finally:
+                lock.release()
 
 
 def check_replaceable(path: Path) -> None:

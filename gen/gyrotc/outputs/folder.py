@@ -12,14 +12,14 @@ from pathlib import Path
 
 from ..errors import GyrotcError, InputError
 from .exchange import can_exchange, exchange
-from .files import sync_folder
+from .files import check_replaceable, sync_folder, unfinished, write_atomically
 from .interrupts import deferred
 from .lock import Lock
-from .marker import KINDS, MARKER, Marker, faults, read_marker, remove_listed, sha256, walk
+from .marker import KINDS, MARKER, OWN, Marker, faults, read_marker, remove_listed, sha256, walk
 from .places import check_apart, check_contents, check_serial, final_place, prefix_of
 from .update import Update, write_marker
 
-__all__ = ["Stage", "result_folder"]
+__all__ = ["Stage", "result_folder", "write_result"]
 
 _open: list[_Job] = []
 _ASIDE = ".old"
@@ -46,7 +46,8 @@ class Stage:
         Raises:
             InputError: An earlier result there is another gyro's.
         """
-        if not any_serial and not self._part:
+        self._job.any_serial |= any_serial
+        if not self._job.any_serial and not self._part:
             check_serial(self._job.out, self._job.earlier, serial)
         parts = self._job.parts
         parts[self._part] = replace(parts[self._part], serial=serial, axis=axis)
@@ -111,6 +112,20 @@ def result_folder(
                 job.end()
 
 
+def write_result(path: Path, text: str) -> None:
+    """Writes a JSON result where the user asked for it; in a result folder it becomes one of its files.
+
+    Raises:
+        InputError: As `check_replaceable`.
+    """
+    check_replaceable(path)
+    if not path.is_symlink() and read_marker(path.parent) is not None:
+        with result_folder(path.parent, "json", kind="", entries=(path.name,)) as stage:
+            write_atomically(stage.folder / path.name, text)
+    else:
+        write_atomically(path, text)
+
+
 def _within(path: Path, folder: Path) -> bool:
     resolved = path.resolve()
     return resolved == folder or folder in resolved.parents
@@ -135,11 +150,13 @@ class _Job:
             self._clean_parts()
             self.earlier = check_contents(out, self.place, kind or None, entries)
             self.parts = {"": Marker(kind or (self.earlier.kind if self.earlier else "result"), command)}
-            self.work = self._begin()
+            self.work = self._begun = self._begin()
         except BaseException:
             self._lock.release()
             raise
         _open.append(self)
+        unfinished.append(self.work)
+        self.any_serial = False
 
     def _begin(self) -> Path:
         work = self.place.parent / f"{self._prefix}{secrets.token_hex(4)}"
@@ -172,7 +189,7 @@ class _Job:
 
     def prepare(self) -> None:
         """What was written gets its markers, and is on disk."""
-        tops = {path.name for path in self.work.iterdir()} - {MARKER}
+        tops = {path.name for path in self.work.iterdir()} - OWN
         if self._entries is not None and tops - self._entries:
             raise ValueError(f"{sorted(tops - self._entries)} is not among the entries of this job")
         for name in sorted(self.parts, reverse=True):
@@ -218,6 +235,7 @@ class _Job:
     def end(self) -> None:
         """Removes what is left of the work, or of the earlier result; lets the place go."""
         _open.remove(self)
+        unfinished.remove(self._begun)
         try:
             self._clean()
         finally:
@@ -267,7 +285,7 @@ def _of_gyrotc(path: Path) -> bool:
     try:
         return read_marker(path) is not None or not any(path.iterdir())
     except InputError:
-        return [p.name for p in path.iterdir()] == [MARKER]
+        return {p.name for p in path.iterdir()} <= OWN
 
 
 def _carry(old: Path, place: Path, name: str) -> None:

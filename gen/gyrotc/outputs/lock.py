@@ -17,17 +17,20 @@ __all__ = ["Lock"]
 class Lock:
     """`.<name>.lock` beside a place, held by `flock` from construction until `release`.
 
+    A second job is refused, for it would replace what the first has just made; `wait` is for a single file, which
+    is written in a moment.
+
     Raises:
         InputError: Another job holds it.
         OSError: The folder that the place lies in cannot be written.
     """
 
-    def __init__(self, place: Path, command: str) -> None:
+    def __init__(self, place: Path, command: str, *, wait: bool = False) -> None:
         self._path = place.parent / f".{place.name}.lock"
         while True:
             self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
             try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
                 if self._still_there():
                     break
             except BlockingIOError:

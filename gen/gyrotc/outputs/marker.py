@@ -20,16 +20,9 @@ from .. import __version__
 from ..errors import InputError
 
 __all__ = [
-    "KINDS",
-    "MARKER",
-    "SCHEMA",
-    "Marker",
-    "faults",
-    "read_marker",
-    "remove_listed",
-    "sha256",
-    "survey",
-]
+    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "read_marker", "remove_listed", "sha256", "survey",
+    "walk",
+]  # fmt: skip
 
 MARKER = ".gyrotc-result.json"
 SCHEMA = "gyrotc.result/1"
@@ -46,6 +39,10 @@ KINDS = {
     "fleet": "fleet",
 }
 """Kind of folder that a command writes."""
+
+NEW = ".gyrotc-new"
+OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
+"""Names by which gyrotc keeps its books in a folder: the marker, one being written, what exchanges are tried on."""
 
 _MOST_BYTES = 2**26
 
@@ -154,7 +151,7 @@ def walk(folder: Path, parts: tuple[str, ...] = ()) -> Iterator[str]:
         if not folders and not files and inside.parts:
             yield f"{inside.as_posix()}/"
         for name in files:
-            if inside.parts or name != MARKER:
+            if inside.parts or name not in OWN:
                 yield (inside / name).as_posix()
         for name in list(folders):
             path = (inside / name).as_posix()
@@ -240,7 +237,7 @@ def remove_listed(folder: Path) -> list[str]:
         for path in folder.iterdir():
             if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path)
-            elif path.name != MARKER:
+            elif path.name not in OWN:
                 path.unlink()
         _remove_empty(folder)
         return []
@@ -268,5 +265,6 @@ def _remove_empty(folder: Path) -> None:
     for place, _, _ in os.walk(folder, topdown=False):
         if Path(place) != folder:
             Path(place).rmdir()
-    (folder / MARKER).unlink(missing_ok=True)
+    for name in (*sorted(OWN - {MARKER}), MARKER):
+        (folder / name).unlink(missing_ok=True)
     folder.rmdir()

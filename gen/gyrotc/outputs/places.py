@@ -73,7 +73,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
             )
         return None
     if kind is not None and marker.kind != kind:
-        found = f"holds a {marker.kind} (gyrotc {marker.command})"
+        found = f"holds the {marker.kind} of gyrotc {marker.command}"
         raise InputError(str(out), found, f"a new folder, or a {kind}")
     foreign, edited = survey(place, marker, entries)
     if foreign:

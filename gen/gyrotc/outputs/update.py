@@ -10,16 +10,14 @@ from pathlib import Path
 
 from .exchange import can_exchange, exchange
 from .files import sync_folder
-from .marker import MARKER, Marker, sha256, walk
+from .marker import MARKER, NEW, OWN, Marker, sha256, walk
 
 __all__ = ["Update", "write_marker"]
-
-_NEW = ".gyrotc-new"
 
 
 def write_marker(work: Path, folder: Path, marker: Marker) -> None:
     """Writes a folder's marker, on disk; `work` is a folder of the job's own on the same file system."""
-    new = work / _NEW
+    new = work / NEW
     with new.open("w", encoding="utf-8") as stream:
         stream.write(marker.text())
         stream.flush()
@@ -48,13 +46,15 @@ class Update:
         self._before = _settled(place, earlier or replace(marker, files={}, parts=()))
         self._marked = earlier is not None
         self._new = marker
-        written = {path.name for path in work.iterdir()} - {MARKER}
+        written = {path.name for path in work.iterdir()} - OWN
         self._changed = sorted(written | (entries & self._before.entries()))
         kept = {n: h for n, h in self._before.files.items() if _top(n) not in self._changed}
         parts = {part for part in self._before.parts if _top(part) not in self._changed}
         self._after = replace(
             marker, files=kept | marker.files, parts=tuple(sorted(parts | set(marker.parts)))
         )
+        if earlier is not None:  # who made the folder, and of what gyro, unless this job says it anew
+            self._after = replace(self._after, kind=earlier.kind, command=earlier.command)
         if marker.serial is None:
             self._after = replace(self._after, serial=self._before.serial, axis=self._before.axis)
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..outputs import result_folder
 from .biasmap import BiasMap, draw
 from .instrument import Record, record
 from .noise import CELL_S
@@ -20,7 +21,7 @@ from .recording import RowLength, rows
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
 from .truth import SCHEMA
-from .write import Format, RunFile, complete_folder, dataset_toml
+from .write import Format, RunFile, dataset_toml
 
 __all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
 
@@ -86,7 +87,9 @@ def simulate(
     runs = _planned(plan)
     report = progress or (lambda share: None)
     truths = []
-    with complete_folder(Path(out)) as folder:
+    with result_folder(Path(out), "simulate") as stage:
+        folder = stage.folder
+        stage.of(_serial(plan, seed))
         (folder / "truth").mkdir()
         for index, made in enumerate(campaign(plan, seed)):
             file = f"run-{index + 1:02d}.{format}"
@@ -189,7 +192,7 @@ def _write_texts(
 ) -> None:
     head: dict[str, Any] = {
         "schema": 1,
-        "serial": plan.gyro.serial.replace("{seed}", f"{seed:04d}"),
+        "serial": _serial(plan, seed),
         "description": f"{plan.title} (simulated)",
         "earth_rate": "none",
     }
@@ -214,6 +217,10 @@ def _write_texts(
         "runs": truths,
     }
     (folder / TRUTH_FILE).write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
+
+
+def _serial(plan: Scenario, seed: int) -> str:
+    return plan.gyro.serial.replace("{seed}", f"{seed:04d}")
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:

@@ -1,12 +1,9 @@
-"""Writes simulated runs in chunks and `dataset.toml`, into a folder that appears complete or not at all."""
+"""Writes simulated runs in chunks, and the text of `dataset.toml`."""
 
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -17,11 +14,9 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from .recording import Chunk
-from .truth import FILE as TRUTH_FILE
 
-__all__ = ["Format", "RunFile", "complete_folder", "dataset_toml"]
+__all__ = ["Format", "RunFile", "dataset_toml"]
 
 Format = Literal["csv", "parquet"]
 _RATE_DECIMALS = 9
@@ -31,30 +26,6 @@ _DECIMALS = 6
 class _Writer(Protocol):
     def write_table(self, table: pa.Table) -> None: ...
     def close(self) -> None: ...
-
-
-@contextmanager
-def complete_folder(out: Path) -> Iterator[Path]:
-    """A temporary folder beside `out` that takes its name at the end; after an error `out` is as before.
-
-    Raises:
-        InputError: `out` holds something that `simulate` did not make.
-    """
-    if out.exists() and not (out.is_dir() and ((out / TRUTH_FILE).is_file() or not any(out.iterdir()))):
-        raise InputError(
-            str(out), "exists and is no simulated data set", "a new folder, or one to make again"
-        )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    fresh.chmod(0o755)
-    try:
-        yield fresh
-        if out.exists():
-            shutil.rmtree(out)
-        fresh.rename(out)
-    except BaseException:
-        shutil.rmtree(fresh, ignore_errors=True)
-        raise
 
 
 class RunFile:
