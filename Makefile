@@ -19,10 +19,10 @@ setup:
 ## the main job: data -> verified C and a report in build/demo (DATA=folder [AXIS=x] for your own recordings)
 demo: setup
 ifdef DATA
-	@$(GYROTC) build "$(DATA)" --out build/demo $(if $(AXIS),--axis $(AXIS))
+	@$(GYROTC) build "$(DATA)" --out build/demo --any-serial $(if $(AXIS),--axis $(AXIS))
 else
 	@$(GYROTC) simulate paper --seed 1 --out build/demo-data
-	@$(GYROTC) build build/demo-data --out build/demo
+	@$(GYROTC) build build/demo-data --out build/demo --any-serial
 endif
 
 ## all tests (CTest for the C library, pytest for the generator); installs its own tools
@@ -101,6 +101,10 @@ bench:
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
 
+## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results/kills.json
+kills: setup
+	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $(if $(SEED),--seed $(SEED))
+
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup
 	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $(if $(SEED),--seed $(SEED))
@@ -109,4 +113,4 @@ blind: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench fleet blind clean
+.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench fleet kills blind clean

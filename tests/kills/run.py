@@ -69,7 +69,8 @@ def between_calls(root: Path, every: int) -> Campaign:
         calls = run(case.job, root).calls
         campaign.counts["calls"] += calls
         for number, action in enumerate(ACTIONS):
-            for at in range(1 + number % every, calls + 1, every):
+            first = 1 + (17 * number) % min(every, calls)  # so that few kills meet different calls
+            for at in range(first, calls + 1, every):
                 campaign.kill(case, action, at)
     return campaign
 

@@ -1,0 +1,172 @@
+"""What `--out` does to what is there, as users type it: nothing of theirs is ever lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import Command
+from gyrotc.outputs import MARKER, Lock, faults
+from recordings import columns, toml, write_csv
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> Path:
+    """Two small gyros in `A` and `B`, and a result of the first in `result`."""
+    folder = tmp_path_factory.mktemp("outputs")
+    table = columns(360)
+    for serial in ("A", "B"):
+        write_csv(folder / serial / "run-01.csv", table | {"rate_dph": table["rate_dph"] - 20.0})
+        head = f'schema = 1\nserial = "{serial}"\nearth_rate = "removed"'
+        (folder / serial / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
+    assert gyrotc("fit", folder / "A", "--out", folder / "result").returncode == 0
+    return folder
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {
+        p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()
+    }
+
+
+def refused(gyrotc: Command, folder: Path, *arguments: object, told: str) -> None:
+    """The command ends with 2 and one line, and nothing in the folder has changed."""
+    before = tree(folder)
+    done = gyrotc(*arguments)
+    assert done.returncode == 2 and told in done.stderr, done.stdout + done.stderr
+    assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
+    assert tree(folder) == before
+
+
+@pytest.mark.parametrize("decoy", ["model.json", "manifest.json", "c"])
+def test_a_firmware_project_is_not_taken_for_a_result(
+    decoy: str, made: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    project = tmp_path / "firmware"
+    (project / ".git").mkdir(parents=True)
+    (project / ".git" / "HEAD").write_text("ref")
+    (project / decoy).mkdir() if decoy == "c" else (project / decoy).write_text("{}")
+    (project / "thesis.tex").write_text("years of work")
+    for command in ("build", "fit", "compare", "diagnose"):
+        refused(gyrotc, tmp_path, command, made / "A", "--out", project, told="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "simulate", "paper", "--out", project, told="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", project, told="was not written by gyrotc")
+
+
+def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> None:
+    data = made / "A"
+    for command in ("build", "fit", "compare", "diagnose"):
+        refused(gyrotc, made, command, data, "--out", data, told="is the data set")
+        refused(gyrotc, made, command, data, "--out", data / "x", told="inside the data set")
+        refused(gyrotc, made, command, data, "--out", made, told="above the data set")
+    refused(
+        gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", told="run-01.csv"
+    )
+    refused(
+        gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", told="is a file"
+    )
+
+
+def test_emit_puts_code_beside_the_users_own_and_deletes_none(
+    made: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    (tmp_path / "src.c").write_text("mine")
+    for _ in range(2):
+        assert gyrotc("emit", made / "result", "--out", tmp_path, "--numeric", "f32").returncode == 0
+    assert (tmp_path / "src.c").read_text() == "mine" and (tmp_path / "c" / "gtc.c").is_file()
+    (tmp_path / "c" / "main.c").write_text("edited")
+    refused(gyrotc, tmp_path, "emit", made / "result", "--out", tmp_path, told="c/main.c")
+
+
+def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path, gyrotc: Command) -> None:
+    out = tmp_path / "result"
+    assert gyrotc("fit", made / "A", "--out", out).returncode == 0
+    refused(gyrotc, tmp_path, "fit", made / "B", "--out", out, told="holds the result of serial A")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", out, told="holds the result of gyrotc fit")
+    refused(gyrotc, tmp_path, "compare", made / "A", "--out", out, told="holds the result of gyrotc fit")
+    (out / MARKER).unlink()
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, told=MARKER)
+
+
+def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
+    made: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    out = tmp_path / "result"
+    steps = (
+        ("fit", made / "A", "--out", out),
+        ("emit", out / "model.json", "--out", out, "--numeric", "f32"),
+        ("evaluate", out, made / "A", "--trace", out / "trace", "--json", out / "more.json"),
+        ("report", out),
+        ("verify", out, "--target", "host-gcc-O2"),
+    )
+    for step in (*steps, *steps[1:]):
+        done = gyrotc(*step)
+        assert done.returncode == 0, done.stderr
+        assert not faults(out)
+    assert {p.name for p in out.iterdir()} == {
+        MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "more.json", "verify.json",
+    }  # fmt: skip
+    (out / "trace" / "notes.txt").write_text("mine")
+    refused(gyrotc, tmp_path, *steps[2], told="trace/notes.txt")
+    (out / "trace" / "notes.txt").unlink()
+    for trace in (out, out / "c"):
+        refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", trace, told="--trace")
+    refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", made / "A", told="is the data set")
+    assert gyrotc(*steps[0]).returncode == 0
+    assert {p.name for p in out.iterdir()} == {MARKER, "model.json", "training.json"}
+    assert json.loads((out / MARKER).read_text())["serial"] == "A"
+
+
+def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) -> None:
+    lock = Lock(tmp_path / "out", "build")
+    try:
+        refused(
+            gyrotc, tmp_path, "fit", made / "A", "--out", tmp_path / "out", told=f"process {os.getpid()} on"
+        )
+    finally:
+        lock.release()
+    assert gyrotc("fit", made / "A", "--out", tmp_path / "out").returncode == 0
+
+
+def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Path, gyrotc: Command) -> None:
+    refused(gyrotc, tmp_path, "check", made / "A", "--json", "/dev/full", told="No space left")
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", "/proc/out", told="/proc")
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", made / "A" / "run-01.csv" / "x", told="run-01.csv")
+    program = Path(sys.executable).with_name("gyrotc")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [program, "check", made / "A"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert (done.returncode, done.stderr) == (2, "gyrotc: standard output: No space left on device\n")
+
+
+def test_a_closed_pipe_is_told_as_shells_expect(made: Path) -> None:
+    program = Path(sys.executable).with_name("gyrotc")
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [program, "check", made / "A"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_cleans_up_and_ends_as_shells_expect(
+    number: signal.Signals, made: Path, tmp_path: Path
+) -> None:
+    program = Path(sys.executable).with_name("gyrotc")
+    command = [program, "build", made / "A", "--out", tmp_path / "out"]
+    job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while job.poll() is None and not list(tmp_path.glob(".out.gyrotc-part-*")):
+        time.sleep(0.005)
+    job.send_signal(number)
+    _, told = job.communicate()
+    assert (job.returncode, told) == (-number, "")
+    assert list(tmp_path.iterdir()) == []
