@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from gyrotc.outputs import MARKER, faults, read_marker, result_folder, write_ato
 from gyrotc.outputs import exchange as exchanging
 from gyrotc.outputs import folder as folders
 from gyrotc.outputs import update as updating
+from gyrotc.outputs.places import check_apart
 
 
 def write(out: Path, text: str, command: str = "build", serial: str = "A", **options: object) -> None:
@@ -157,6 +159,9 @@ def test_inputs_and_sources_are_out_of_reach(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError), result_folder(out, "build", inputs=[data]):
             pytest.fail("began")
+    with pytest.raises(InputError), result_folder(package, "emit", entries=["c"]):
+        pytest.fail("began")
+    check_apart(tmp_path, tmp_path, [data], whole=False)  # a job that only adds may stand above a .venv
     assert list(data.iterdir()) == []
     write(tmp_path / "lab" / "out", "beside", inputs=[data])
 
@@ -219,6 +224,27 @@ def test_what_comes_into_a_result_while_it_is_replaced_is_carried_over(out: Path
     assert content(out) == {
         "model.json": "two", "notes.txt": "thought of it just now", "c/more.c": "and this",
     }  # fmt: skip
+
+
+def test_a_reader_never_finds_the_place_empty(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+    write(out, "0")
+    done, missing = threading.Event(), []
+
+    def read() -> None:
+        while not done.is_set():
+            if not out.is_dir():
+                missing.append(1)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        for number in range(20):
+            write(out, str(number))
+    finally:
+        done.set()
+        reader.join()
+    assert missing == []
 
 
 def test_a_link_is_followed(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ class _Job:
         self.place = final_place(out)
         self._prefix = prefix_of(self.place)
         self._entries = entries
-        check_apart(out, self.place, inputs if entries is None else ())
+        check_apart(out, self.place, inputs, whole=entries is None)
         self.place.parent.mkdir(parents=True, exist_ok=True)
         self._lock = Lock(self.place, command)
         try:

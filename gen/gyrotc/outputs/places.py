@@ -27,8 +27,11 @@ def prefix_of(place: Path) -> str:
     return f".{place.name}.gyrotc-part-"
 
 
-def check_apart(out: Path, place: Path, inputs: Sequence[Path]) -> None:
+def check_apart(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) -> None:
     """`out` is no file, and not the same as, above or inside what the job reads or gyrotc's own sources.
+
+    Args:
+        whole: The folder is replaced. A job that only adds to it may stand above: a project with its `.venv`.
 
     Raises:
         InputError: It is.
@@ -42,7 +45,7 @@ def check_apart(out: Path, place: Path, inputs: Sequence[Path]) -> None:
         other = path.resolve()
         if place == other:
             raise InputError(str(out), f"is {name}", "a folder beside it")
-        if place in other.parents:
+        if whole and place in other.parents:
             raise InputError(str(out), f"is above {name} ({path})", "a folder of its own")
         if other in place.parents:
             raise InputError(str(out), f"lies inside {name} ({path})", "a folder outside it")
