@@ -1,6 +1,6 @@
 """300 jobs and more killed or let down by the disk: afterwards the earlier result or the new one, nothing besides.
 
-usage: python -m tests.kills.run [--commands N] [--every K] [--seed S] [--json FILE]
+usage: python -m tests.kills.run [--commands N] [--only NAME ...] [--every K] [--seed S] [--json FILE]
 """
 
 from __future__ import annotations
@@ -75,10 +75,10 @@ def between_calls(root: Path, every: int) -> Campaign:
     return campaign
 
 
-def of_commands(root: Path, number: int, draw: random.Random) -> Campaign:
+def of_commands(root: Path, number: int, only: set[str], draw: random.Random) -> Campaign:
     """Commands ended at random calls, and signalled at random times."""
     campaign = Campaign(root)
-    cases = commands(root)
+    cases = [case for case in commands(root) if not only or case.name in only]
     calls = {case.name: campaign.first(case) for case in cases}
     lengths = {case.name: seconds(case.job, root) for case in cases}
     campaign.first(cases[0])
@@ -111,7 +111,8 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--commands", type=int, default=300, help="whole commands to end")
-    parser.add_argument("--every", type=int, default=1, help="try every n-th call only")
+    parser.add_argument("--every", type=int, default=1, help="try every n-th call only; 0: none")
+    parser.add_argument("--only", nargs="+", default=(), help="these commands only")
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
     parser.add_argument("--json", type=Path, default=None, help="write the counts here")
     arguments = parser.parse_args()
@@ -124,13 +125,14 @@ def main() -> None:
         os.environ.update(TMPDIR=str(root / "tmp"), XDG_CACHE_HOME=str(root / "cache"))
         for name in ("tmp", "cache", "exchange", "link", "commands"):
             (root / name).mkdir()
-        done["writing, names exchanged"] = between_calls(root / "exchange", arguments.every)
-        os.environ["SHIM_NO_EXCHANGE"] = "1"
-        done["writing, names not exchanged"] = between_calls(root / "link", arguments.every)
-        del os.environ["SHIM_NO_EXCHANGE"]
+        if arguments.every:
+            done["writing, names exchanged"] = between_calls(root / "exchange", arguments.every)
+            os.environ["SHIM_NO_EXCHANGE"] = "1"
+            done["writing, names not exchanged"] = between_calls(root / "link", arguments.every)
+            del os.environ["SHIM_NO_EXCHANGE"]
         if arguments.commands:
             draw = random.Random(arguments.seed)
-            done["commands"] = of_commands(root / "commands", arguments.commands, draw)
+            done["commands"] = of_commands(root / "commands", arguments.commands, set(arguments.only), draw)
     counts = {name: dict(campaign.counts) for name, campaign in done.items()}
     faults = [fault for campaign in done.values() for fault in campaign.found]
     ended = sum(n for counted in counts.values() for key, n in counted.items() if key in ACTIONS)
