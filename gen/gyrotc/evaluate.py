@@ -27,6 +27,7 @@ from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
 from .quantise import Table
 from .simulate.truth import simulated_floor
+from .texts import file_stem
 from .toolchain import Target, all_targets
 from .verify.footprint import Footprint, footprint
 from .verify.replay import history_of, replay_on, replay_program
@@ -188,7 +189,7 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
     if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
         stem = run.file.replace("/", "_")
     shared = sum(r.file == run.file for r in all_runs) > 1
-    return stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+    return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
 
 
 def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:

@@ -6,10 +6,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
-
 from ..model import Model
 from ..table import Table
+from ..texts import c_environment
 from ..toolchain import Target, all_targets, compile_objects, link, symbols
 
 __all__ = ["Footprint", "footprint"]
@@ -39,14 +38,10 @@ def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
     target = next((t for name in _TARGETS if (t := all_targets()[name]).missing() is None), None)
     if target is None:
         return None
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    text = environment.get_template("footprint.c.j2").render(
-        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    text = (
+        c_environment()
+        .get_template("footprint.c.j2")
+        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         source = Path(work) / "footprint.c"

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +22,7 @@ from ..frontend import missed_before, samples_per_block
 from ..model import Model
 from ..reference import Replay, replay
 from ..table import Table, Words
+from ..texts import c_environment
 from ..toolchain import Target, compile_c, run_program
 
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
@@ -82,14 +82,10 @@ def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -
     Raises:
         CheckFailed: The compiler refused.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    text = environment.get_template("replay.c.j2").render(
-        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    text = (
+        c_environment()
+        .get_template("replay.c.j2")
+        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         source = Path(work) / "replay.c"
