@@ -33,6 +33,7 @@ ORDER = [
     "vectors",
     "tabletext",
     "emit",
+    "confined",
     "toolchain",
     "verify",
     "findings",

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import math
 import os
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import Any
 
+from ..confined import confined
 from ..errors import CheckFailed, GyrotcError
 from ..model import Model
 from ..reference.q31 import exp2_table
@@ -27,6 +29,8 @@ __all__ = ["Visited", "visit_all"]
 
 _SLICES = 128  # of exhaustive.c
 _BAR = 32  # characters
+_LIMIT_S = 4 * 3600  # of processor time for one of the processes; all 2^32 inputs take minutes
+_KEPT_LINES = 1000  # exhaustive.c prints fewer than ten
 _COMPILERS = ("host-clang-O3", "host-gcc-O3")
 _SOURCE = Path(__file__).resolve().parent / "exhaustive.c"
 
@@ -143,21 +147,18 @@ class _Counter:
 def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:
     """Lines that one process printed, without its progress."""
     kept: list[str] = []
-    with subprocess.Popen(
-        [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    with confined(
+        [str(program)], program.parent, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, cpu_s=_LIMIT_S
     ) as process:
         assert process.stdin is not None and process.stdout is not None
-        try:
-            process.stdin.write("\n".join(lines) + "\n")
-            process.stdin.close()
-            for line in process.stdout:
-                if line.startswith("progress"):
-                    done.one_more()
-                else:
-                    kept.append(line.strip())
-        except BaseException:
-            process.kill()
-            raise
+        with suppress(BrokenPipeError), process.stdin:  # its status says that it ended early
+            process.stdin.write(("\n".join(lines) + "\n").encode("ascii"))
+        for line in process.stdout:
+            if line.startswith(b"progress"):
+                done.one_more()
+            elif len(kept) < _KEPT_LINES:
+                kept.append(line.decode("ascii", "replace").strip())
+        process.wait()
     if process.returncode != 0:
         raise CheckFailed(f"the visit of all inputs ended with status {process.returncode}")
     return kept
