@@ -32,6 +32,7 @@ from .vectors import MISSING, make_vectors
 __all__ = [
     "Emission",
     "answers_text",
+    "board_test_text",
     "emit",
     "emit_texts",
     "emitted_model",
@@ -39,6 +40,13 @@ __all__ = [
     "quantise_all",
     "replace_folder",
 ]
+
+
+_MADE_BY = re.compile(
+    r"^ \* Make again:  gyrotc emit model\.json --out \.(?: --numeric [a-z0-9,]+)?"
+    r"(?: --zero-at (-?[0-9]+\.[0-9]+))?$",
+    re.MULTILINE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +102,8 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
         InputError: There is no emitted code of this model.
     """
     text = _emitted_header(folder, model)
-    numerics = tuple(n for n in NUMERICS if f"gtc_{n}_table_t gtc_{model.symbol}_{n};" in text)
+    declared = re.findall(rf"^extern const gtc_(\w+)_table_t gtc_{model.symbol}_\1;$", text, re.MULTILINE)
+    numerics = tuple(n for n in declared if n in NUMERICS)
     return quantise_all(emitted_model(folder, model), numerics).tables
 
 
@@ -104,8 +113,9 @@ def emitted_model(folder: Path, model: Model) -> Model:
     Raises:
         InputError: There is no emitted code of this model.
     """
-    zero_at = re.search(r"Make again: .* --zero-at (\S+)", _emitted_header(folder, model))
-    return model.zeroed_at(float(zero_at[1])) if zero_at else model
+    found = _MADE_BY.findall(_emitted_header(folder, model))
+    zero_at = found[-1] if found else ""  # an entry of [meta] may look like it, and stands before it
+    return model.zeroed_at(float(zero_at)) if zero_at else model
 
 
 def _emitted_header(folder: Path, model: Model) -> str:
@@ -160,7 +170,6 @@ def emit_texts(
         "v": vectors,
         "n": numerics[0],
         "n_channels": vectors.n_channels,
-        "missing": {n: f"0x{word:08x}UL" for n, word in MISSING.items()},
         "id_code": first.id,
         "tables": [table_text(t, model) for t in emission.tables.values()],
         "facts": list(_facts(model)),
@@ -174,13 +183,13 @@ def emit_texts(
         f"gtc_{model.id}.h": "table.h.j2",
         f"gtc_{model.id}.c": "table.c.j2",
         f"vectors_{model.id}.h": "vectors.h.j2",
-        "board_test.c": "board_test.c.j2",
         "main.c": "main.c.j2",
     }
     texts = {
         name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
     }
     header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
@@ -190,6 +199,15 @@ def emit_texts(
         {n: answers(t, vectors) for n, t in emission.tables.items()}
     )
     return texts
+
+
+def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
+    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
+    template = c_environment().get_template("board_test.c.j2")
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
+    )
+    return text.encode("ascii")
 
 
 def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:

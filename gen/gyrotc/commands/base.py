@@ -61,6 +61,13 @@ NumericOption = Annotated[
 AppliedOption = Annotated[
     Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
 ]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-code",
+        help="Compile and run DIR/c although it holds code that this gyrotc did not write: only what is your own.",
+    ),
+]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 
 

@@ -26,6 +26,7 @@ from .base import (
     OutOption,
     RhoOption,
     SeedOption,
+    TrustOption,
     app,
     json_text,
     numerics_of,
@@ -129,6 +130,7 @@ def verify(
     exhaustive: Annotated[
         bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
     ] = False,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Compile DIR/c for each target and compare bit for bit with the reference.
@@ -142,7 +144,13 @@ def verify(
     recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
     with progress() as say:
         result = run(
-            folder, targets=target or (), dataset=recordings, log=log, exhaustive=exhaustive, progress=say
+            folder,
+            targets=target or (),
+            dataset=recordings,
+            log=log,
+            exhaustive=exhaustive,
+            trust_code=trust_code,
+            progress=say,
         )
     write_atomically(folder / "verify.json", json_text(result))
     write_json(json_file, result)
@@ -161,6 +169,7 @@ def evaluate(
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
     average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
     applied: AppliedOption = None,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -175,7 +184,15 @@ def evaluate(
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
     with progress() as say:
-        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=trace, progress=say)
+        result = run(
+            folder,
+            recordings,
+            numeric=numeric,
+            average_s=average_s,
+            trace=trace,
+            trust_code=trust_code,
+            progress=say,
+        )
     write_atomically(folder / "evaluate.json", json_text(result))
     write_json(json_file, result)
     OUT.print(evaluation_table(result))

@@ -24,6 +24,7 @@ from ..model import Model
 from ..reference.q31 import exp2_table
 from ..table import Table
 from ..toolchain import Target, all_targets, compile_objects, link
+from .source import checked_sources, table_files
 
 __all__ = ["Visited", "visit_all"]
 
@@ -57,6 +58,7 @@ def visit_all(
     table: Table,
     *,
     every: int = 1,
+    trusted: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Visited:
     """Visits every pair of positions, or every `every`-th slice of slopes.
@@ -64,6 +66,7 @@ def visit_all(
     Args:
         model: The model that the table was made of.
         table: Its fixed-point table.
+        trusted: Code of the folder that is not gyrotc's is compiled and run, too.
         progress: Called with a line that shows the share done and the time left.
 
     Raises:
@@ -72,7 +75,7 @@ def visit_all(
     """
     target = _host()
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        program = _compiled(target, c_folder, model, Path(work))
+        program = _compiled(target, c_folder, model, Path(work), trusted=trusted)
         parts = os.cpu_count() or 1
         lines = list(_numbers(model, table))
         done = _Counter(progress or (lambda _: None))
@@ -91,14 +94,13 @@ def _host() -> Target:
     raise GyrotcError("no C compiler: install clang or gcc")
 
 
-def _compiled(target: Target, c_folder: Path, model: Model, work: Path) -> Path:
-    emitted = compile_objects(
-        target, [c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"], work, include=c_folder
-    )
+def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trusted: bool) -> Path:
+    c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
+    emitted = compile_objects(target, [c / "gtc.c", c / f"gtc_{model.id}.c"], work, include=c)
     # The program itself is no code for targets: it may use what the host has.
     loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})
     defines = [f"TABLE=gtc_{model.symbol}_q31", f'HEADER="gtc_{model.id}.h"']
-    (own,) = compile_objects(loose, [_SOURCE], work, include=c_folder, defines=defines)
+    (own,) = compile_objects(loose, [_SOURCE], work, include=c, defines=defines)
     program = work / "exhaustive"
     link(target.model_copy(update={"link": (*target.link, "-lm")}), [own, *emitted], program)
     return program

@@ -24,6 +24,7 @@ from ..reference import Replay, replay
 from ..table import Table, Words
 from ..texts import c_environment
 from ..toolchain import Target, compile_c, run_program
+from .source import checked_sources, table_files
 
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
 
@@ -76,11 +77,13 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
 
 
 @contextmanager
-def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -> Iterator[Path]:
+def replay_program(
+    c_folder: Path, model: Model, table: Table, target: Target, *, trusted: bool = False
+) -> Iterator[Path]:
     """The replay program of a table, compiled for a target.
 
     Raises:
-        CheckFailed: The compiler refused.
+        CheckFailed: The compiler refused, or the folder holds other code than gyrotc's and is not `trusted`.
     """
     text = (
         c_environment()
@@ -91,8 +94,9 @@ def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -
         source = Path(work) / "replay.c"
         source.write_text(text, encoding="ascii")
         program = Path(work) / "replay"
-        sources = [source, c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"]
-        compile_c(target, sources, program, include=c_folder)
+        c = checked_sources(c_folder, Path(work), table_files(model), trusted=trusted)
+        sources = [source, c / "gtc.c", c / f"gtc_{model.id}.c"]
+        compile_c(target, sources, program, include=c)
         yield program
 
 
