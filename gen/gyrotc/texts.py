@@ -182,7 +182,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 _DRAWN = frozenset(
     _SVG + name
     for name in (
-        "svg", "g", "defs", "metadata", "path", "use", "rect", "clipPath", "text", "tspan", "image", "style",
+        "svg", "g", "defs", "metadata", "path", "use", "rect", "clipPath", "pattern", "text", "tspan", "image", "style",
     )
 )  # fmt: skip
 _FACTS = (
@@ -275,9 +275,9 @@ def csv_cell(value: Any) -> Any:
 def file_stem(text: str) -> str:
     """Text as a file's name without its end: letters, digits, blanks and `._-@+`; else `_`, and its hash behind it."""
     plain = "".join(c if c.isalnum() or c in "._-@+ " else "_" for c in text)
-    plain = "_" + plain[1:] if plain[:1] in (".", "-", " ") else plain
+    plain = "_" + plain[1:] if plain[:1] in ("", ".", "-", " ") else plain
     plain = plain.encode("utf-8")[:_STEM].decode("utf-8", "ignore")
-    if plain == text and plain:
+    if plain == text:
         return plain
     return f"{plain}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
 
