@@ -57,7 +57,9 @@ def svg(figure: Figure) -> Markup:
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
-    text = re.sub(r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)  # what a formula was written as
+    text = re.sub(
+        r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL
+    )  # what a formula was written as
     text = re.sub(r' height="[\d.]+pt"', "", text, count=1)
     return checked_svg(re.sub(r'(<svg[^>]*?) width="[^"]*"', r'\1 width="100%"', text, count=1))
 

@@ -141,3 +141,19 @@ def test_the_user_may_trust_code_of_his_own(whole: Path, tmp_path: Path, gyrotc:
     refused = gyrotc("verify", copy, "--target", FAST)
     assert refused.returncode == 1 and "gtc.c is not the runtime of this gyrotc" in refused.stdout
     assert gyrotc("verify", copy, "--target", FAST, "--trust-code").returncode == 0
+
+
+def test_an_entry_of_meta_is_not_taken_for_the_options_of_the_emission(
+    model_dict: dict[str, Any], tmp_path: Path
+) -> None:
+    line = "gyrotc emit model.json --out . --zero-at 55.0"
+    model = Model.from_dict(model_dict | {"meta": {"Make again": line, "warnings": ["Make again:  " + line]}})
+    assert verify(emitted(tmp_path, model), compiled=False)["failed"] == 0
+    emit(model, tmp_path, zero_at=20.0)
+    assert verify(tmp_path, compiled=False)["failed"] == 0
+
+
+def test_arithmetics_are_verified_in_the_order_they_were_emitted_in(whole: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(whole, tmp_path / "copy"))
+    emit(load_model(folder / "model.json"), folder, numerics=["q31", "f32"])
+    assert verify(folder, compiled=False)["failed"] == 0

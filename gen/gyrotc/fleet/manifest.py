@@ -145,7 +145,12 @@ def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
             )
         try:
             found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
-        except (IndexError, ValueError, OSError, RecursionError) as error:  # ".", "a**", a name that no folder can have
+        except (
+            IndexError,
+            ValueError,
+            OSError,
+            RecursionError,
+        ) as error:  # ".", "a**", a name that no folder can have
             expected = "a pattern below the manifest's folder, e.g. 2026-*"
             raise InputError(f"{path}, field datasets", repr(pattern), expected) from error
         if not found:
