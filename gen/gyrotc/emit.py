@@ -44,7 +44,7 @@ __all__ = [
 
 _MADE_BY = re.compile(
     r"^ \* Make again:  gyrotc emit model\.json --out \.(?: --numeric [a-z0-9,]+)?"
-    r"(?: --zero-at (-?[0-9]+\.[0-9]+))?$",
+    r"(?: --zero-at (-?[0-9]+(?:\.[0-9]+)?(?:e[+-][0-9]+)?))?$",
     re.MULTILINE,
 )
 
