@@ -645,3 +645,21 @@ def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> 
     with base.progress() as say:
         for text in HOSTILE:
             say(f"replaying {text}")
+
+
+# ---- one place ----
+
+PACKAGE = Path(report.__file__).parent
+_ELSEWHERE = re.compile(
+    r"jinja2\.Environment\(|\bMarkup\(|shell=True|os\.system|os\.popen|from_markup|autoescape"
+)
+
+
+def test_nothing_else_builds_such_text() -> None:
+    """Templates come from the two environments of texts; none lets text through unescaped; no shell is given text."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "texts.py":
+            assert not _ELSEWHERE.search(path.read_text("utf-8")), path
+    assert _ELSEWHERE.search((PACKAGE / "texts.py").read_text("utf-8"))
+    for path in (PACKAGE / "templates").iterdir():
+        assert not re.search(r"\|\s*safe|autoescape|\|\s*attr", path.read_text("utf-8")), path
