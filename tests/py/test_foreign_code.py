@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 from conftest import Command
-from emitted import emitted
+from emitted import emitted, recorded
 from gyrotc.emit import emit
 from gyrotc.errors import CheckFailed
+from gyrotc.evaluate import evaluate
 from gyrotc.model import Model, load_model
 from gyrotc.verify import verify
 from gyrotc.verify.source import board_files, checked_sources
@@ -157,3 +158,14 @@ def test_arithmetics_are_verified_in_the_order_they_were_emitted_in(whole: Path,
     folder = Path(shutil.copytree(whole, tmp_path / "copy"))
     emit(load_model(folder / "model.json"), folder, numerics=["q31", "f32"])
     assert verify(folder, compiled=False)["failed"] == 0
+
+
+def test_evaluate_refuses_it_too(whole: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(whole, tmp_path / "copy"))
+    with (folder / "c" / "gtc_rlg_0042.c").open("a") as file:
+        file.write(CALL % (tmp_path / "shown"))
+    dataset = recorded(tmp_path / "data")
+    with pytest.raises(CheckFailed, match=r"gtc_rlg_0042\.c holds, in line \d+, what gyrotc does not write"):
+        evaluate(folder, dataset)
+    assert not (tmp_path / "shown").exists()
+    assert evaluate(whole, dataset)["mismatches"] == 0
