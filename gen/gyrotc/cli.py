@@ -8,6 +8,7 @@ import sys
 
 from .errors import GyrotcError
 from .outputs import Interrupted, die_of, raise_on_signals
+from .texts import terminal_text
 
 _CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
 
@@ -44,7 +45,7 @@ def _failed(error: OSError) -> int:
         return _CLOSED
     where = error.filename or "standard output"
     with contextlib.suppress(OSError):
-        print(f"gyrotc: {where}: {error.strerror or error}", file=sys.stderr, flush=True)
+        print(f"gyrotc: {terminal_text(f'{where}: {error.strerror or error}')}", file=sys.stderr, flush=True)
     return GyrotcError.exit_status
 
 
@@ -64,7 +65,7 @@ def _status() -> int:
     try:
         app(standalone_mode=True)
     except GyrotcError as error:
-        print(f"gyrotc: {error}", file=sys.stderr)
+        print(f"gyrotc: {terminal_text(str(error))}", file=sys.stderr)
         return error.exit_status
     except OSError as error:
         return _failed(error)

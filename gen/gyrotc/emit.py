@@ -7,7 +7,6 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
-import functools
 import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,11 +25,13 @@ from .quantise import NUMERICS, Table, quantise
 from .reference import answers
 from .table import LAYOUT
 from .tabletext import table_text
+from .texts import c_environment
 from .vectors import MISSING, make_vectors
 
 __all__ = [
     "Emission",
     "answers_text",
+    "board_test_text",
     "emit",
     "emit_texts",
     "emitted_model",
@@ -39,6 +39,13 @@ __all__ = [
     "quantise_all",
     "write_texts",
 ]
+
+
+_MADE_BY = re.compile(
+    r"^ \* Make again:  gyrotc emit model\.json --out \.(?: --numeric [a-z0-9,]+)?"
+    r"(?: --zero-at (-?[0-9]+(?:\.[0-9]+)?(?:e[+-][0-9]+)?))?$",
+    re.MULTILINE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +101,8 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
         InputError: There is no emitted code of this model.
     """
     text = _emitted_header(folder, model)
-    numerics = tuple(n for n in NUMERICS if f"gtc_{n}_table_t gtc_{model.symbol}_{n};" in text)
+    declared = re.findall(rf"^extern const gtc_(\w+)_table_t gtc_{model.symbol}_\1;$", text, re.MULTILINE)
+    numerics = tuple(n for n in declared if n in NUMERICS)
     return quantise_all(emitted_model(folder, model), numerics).tables
 
 
@@ -104,8 +112,9 @@ def emitted_model(folder: Path, model: Model) -> Model:
     Raises:
         InputError: There is no emitted code of this model.
     """
-    zero_at = re.search(r"Make again: .* --zero-at (\S+)", _emitted_header(folder, model))
-    return model.zeroed_at(float(zero_at[1])) if zero_at else model
+    found = _MADE_BY.findall(_emitted_header(folder, model))
+    zero_at = found[-1] if found else ""  # an entry of [meta] may look like it, and stands before it
+    return model.zeroed_at(float(zero_at)) if zero_at else model
 
 
 def _emitted_header(folder: Path, model: Model) -> str:
@@ -153,25 +162,26 @@ def emit_texts(
         "v": vectors,
         "n": numerics[0],
         "n_channels": vectors.n_channels,
-        "missing": {n: f"0x{word:08x}UL" for n, word in MISSING.items()},
         "id_code": first.id,
         "tables": [table_text(t, model) for t in emission.tables.values()],
         "facts": list(_facts(model)),
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(emission)),
-        "warnings": list(model.meta.get("warnings", ())),
+        "warnings": list(model.warnings),
         **_example_values(model),
     }
     named = {
         f"gtc_{model.id}.h": "table.h.j2",
         f"gtc_{model.id}.c": "table.c.j2",
         f"vectors_{model.id}.h": "vectors.h.j2",
-        "board_test.c": "board_test.c.j2",
         "main.c": "main.c.j2",
     }
-    texts = {name: _templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+    texts = {
+        name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
+    }
     header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
@@ -183,6 +193,15 @@ def emit_texts(
     return texts
 
 
+def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
+    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
+    template = c_environment().get_template("board_test.c.j2")
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
+    )
+    return text.encode("ascii")
+
+
 def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
     """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
     parts = [
@@ -190,17 +209,6 @@ def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
         for numeric, rows in expected.items()
     ]
     return b"".join(parts)
-
-
-@functools.cache
-def _templates() -> jinja2.Environment:
-    """Compiled once in a process."""
-    return jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
 
 
 def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
@@ -211,14 +219,13 @@ def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
     return lines.tobytes()
 
 
-def _facts(model: Model) -> Iterator[tuple[str, str]]:
-    """Calibration date and meta, one line each."""
+def _facts(model: Model) -> Iterator[str]:
+    """Calibration date and meta, one line each; the template makes them safe."""
     for key, value in sorted(model.meta.items()):
         if key in ("warnings", "environments") or isinstance(value, (dict, list)):
             continue
         text = " ".join(str(value).split())
-        safe = text.encode("ascii", "replace").decode("ascii").replace("*/", "* /").replace("/*", "/ *")[:120]
-        yield key[:24], safe
+        yield f"{key[:24] + ':':<12} {text[:120]}"
 
 
 def _valid(model: Model) -> str:
@@ -238,7 +245,7 @@ def _example_values(model: Model) -> dict[str, Any]:
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
     per_second = 100 if abs(model.block_s * 100 - round(model.block_s * 100)) < 1e-9 else 1
     return {
-        "first_temperature": f"{middle:.1f}",
+        "first_temperature": middle,
         "first_temperature_q16": round(middle * 65536),
         "samples_per_second": per_second,
         "samples_per_block": max(1, round(model.block_s * per_second)),

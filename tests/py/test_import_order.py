@@ -13,6 +13,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 ORDER = [
     "errors",
     "outputs",
+    "texts",
     "_core",
     "terms",
     "dataset",
@@ -33,6 +34,7 @@ ORDER = [
     "vectors",
     "tabletext",
     "emit",
+    "confined",
     "toolchain",
     "verify",
     "findings",

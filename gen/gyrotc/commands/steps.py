@@ -26,6 +26,7 @@ from .base import (
     OutOption,
     RhoOption,
     SeedOption,
+    TrustOption,
     app,
     json_text,
     numerics_of,
@@ -137,6 +138,7 @@ def verify(
     exhaustive: Annotated[
         bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
     ] = False,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Compile DIR/c for each target and compare bit for bit with the reference.
@@ -150,7 +152,13 @@ def verify(
     recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
     with result_folder(folder, "verify", entries=("verify.json",)) as stage, progress() as say:
         result = run(
-            folder, targets=target or (), dataset=recordings, log=log, exhaustive=exhaustive, progress=say
+            folder,
+            targets=target or (),
+            dataset=recordings,
+            log=log,
+            exhaustive=exhaustive,
+            trust_code=trust_code,
+            progress=say,
         )
         write_atomically(stage.folder / "verify.json", json_text(result))
     write_json(json_file, result)
@@ -169,6 +177,7 @@ def evaluate(
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
     average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
     applied: AppliedOption = None,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -183,7 +192,15 @@ def evaluate(
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
-        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=traces, progress=say)
+        result = run(
+            folder,
+            recordings,
+            numeric=numeric,
+            average_s=average_s,
+            trace=traces,
+            trust_code=trust_code,
+            progress=say,
+        )
         write_atomically(stage / "evaluate.json", json_text(result))
     write_json(json_file, result)
     OUT.print(evaluation_table(result))
