@@ -351,7 +351,7 @@ static inline int_least32_t FN(lesser)(int_least32_t a, int_least32_t b)
     return (a < b) ? a : b;
 }
 
-/* Where x is on the way between two different positions, in 2^-24; 0 before `from`. */
+/* Where x is on the way between two different positions, in 2^-24; 0 before `from`, 1 behind `to`. */
 static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, int_least32_t to)
 {
     int_least32_t way = x - from;
@@ -360,6 +360,9 @@ static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, in
     if (whole < 0) {
         way = -way;
         whole = -whole;
+    }
+    if (way >= whole) {
+        return FULL_SHARE; /* no share is larger, and a narrow region's would not fit */
     }
     return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
 }
