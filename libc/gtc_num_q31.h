@@ -26,6 +26,7 @@
 #define NUM_ZERO 0
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
+#define CHANNEL_MAX 2147483647 /* every sample of an auxiliary channel but the mark of a missing one */
 #define NUM_MISSING_BITS 0x80000000UL
 #define ARITHMETIC 2U /* in the second word of an image */
 
