@@ -23,8 +23,8 @@ typedef struct {
 /* Whole numbers, in the order of an image. */
 static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     /*    float32: least, most         fixed point: least, most */
-    RANGE(0U, 0U,                      0U, 0U),                      /* quantity */
-    RANGE(0U, 0U,                      0U, 0U),                      /* unit */
+    RANGE(GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS),     /* quantity */
+    RANGE(GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H), /* unit */
     RANGE(0U, 4294967295U,             0U, 4294967295U),             /* id */
     RANGE(2U, GTC_MAX_SLOPE_BLOCKS,    2U, GTC_MAX_SLOPE_BLOCKS),    /* slope_blocks */
     RANGE(1U, 100000U,                 1U, 100000U),                 /* hold_blocks */
@@ -32,7 +32,7 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     RANGE(0U, 0U,                      0U, 60U),                     /* bias_frac_bits */
     RANGE(1U, 16U,                     1U, 16U),                     /* n_networks */
     RANGE(0U, 512U,                    0U, 512U),                    /* n_centers */
-    RANGE(1U, 1U + GTC_MAX_TERMS,      1U, 1U + GTC_MAX_TERMS),      /* n_channels */
+    RANGE(1U, GTC_MAX_TERMS + 1,       1U, GTC_MAX_TERMS + 1),       /* n_channels */
     RANGE(0U, GTC_MAX_TERMS,           0U, GTC_MAX_TERMS),           /* n_terms */
     RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: T */
     RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: slope */

@@ -61,10 +61,49 @@ static int FN(wholes_fit)(const TABLE *table, uint_least32_t first)
     return fit;
 }
 
+/* One network, or several where the code of the hand-over is there; they share out the centers. */
+static int FN(centers_fit)(const TABLE *table)
+{
+    uint_least32_t n = 0U;
+    uint_least32_t i;
+
+#if !GTC_WITH_BANK
+    if (table->n_networks != 1U) {
+        return 0;
+    }
+#endif
+    for (i = 0U; i < table->n_networks; i++) {
+        const uint_least32_t own = table->networks[i * GTC_NETWORK_WORDS].bits;
+
+        if (own > table->n_centers) {
+            return 0;
+        }
+        n += own;
+    }
+    return (n == table->n_centers) ? 1 : 0;
+}
+
+/* Every term comes with its code; an auxiliary one reads a further channel, others the temperature. */
+static int FN(terms_fit)(const TABLE *table)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+
+        if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != term[0].bits)
+            || (term[1].bits >= table->n_channels)
+            || ((term[1].bits != 0U) != (term[0].bits == GTC_TERM_AUXILIARY))) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 int FN(is_readable)(const TABLE *table)
 {
-    return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT)
-            && FN(arrays_fit)(table)) ? 1 : 0;
+    return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
+            && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
 }
 
 static int FN(members_fit)(const TABLE *table)
@@ -93,79 +132,46 @@ static int FN(region_fits)(const gtc_word_t region[2], uint_least32_t n_networks
     return (FN(is_width)(low, high) || ((n_networks == 1U) && (low <= high))) ? 1 : 0;
 }
 
-/* One network, whose centers lie within the `room` that is left. */
-static int FN(network_fits)(const TABLE *table, uint_least32_t i, const gtc_word_t *centers, uint_least32_t room)
+/* One network with its centers. */
+static int FN(network_fits)(const TABLE *table, const gtc_word_t *network, const gtc_word_t *centers)
 {
-    const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
-    uint_least32_t k;
-    int fit;
+    uint_least32_t i;
+    int fit = FN(numbers_fit)(&network[1], FN(network_limits), GTC_NETWORK_WORDS - 1U)
+              & FN(region_fits)(&network[4], table->n_networks) & FN(region_fits)(&network[6], table->n_networks);
 
-    if (network[0].bits > room) {
-        return 0;
-    }
-    fit = FN(numbers_fit)(&network[1], FN(network_limits), GTC_NETWORK_WORDS - 1U)
-          & FN(region_fits)(&network[4], table->n_networks) & FN(region_fits)(&network[6], table->n_networks);
-    for (k = 0U; k < network[0].bits; k++) {
-        fit &= FN(numbers_fit)(&centers[k * GTC_CENTER_WORDS], FN(center_limits), GTC_CENTER_WORDS);
+    for (i = 0U; i < network[0].bits; i++) {
+        fit &= FN(numbers_fit)(&centers[i * GTC_CENTER_WORDS], FN(center_limits), GTC_CENTER_WORDS);
     }
     return fit & FN(sums_fit)(network, centers);
 }
 
-/* One network, or several where the code of the hand-over is there; they share out the centers. */
 static int FN(networks_fit)(const TABLE *table)
 {
     const gtc_word_t *center = table->centers;
-    uint_least32_t room = table->n_centers;
-    uint_least32_t i;
-
-#if !GTC_WITH_BANK
-    if (table->n_networks != 1U) {
-        return 0;
-    }
-#endif
-    for (i = 0U; i < table->n_networks; i++) {
-        const uint_least32_t own = table->networks[i * GTC_NETWORK_WORDS].bits;
-
-        if (!FN(network_fits)(table, i, center, room)) {
-            return 0;
-        }
-        center = (own != 0U) ? &center[own * GTC_CENTER_WORDS] : center;
-        room -= own;
-    }
-    return (room == 0U) ? 1 : 0;
-}
-
-/* A term comes with its code; an auxiliary one reads a further channel, others the temperature. */
-static int FN(term_fits)(const TABLE *table, uint_least32_t i)
-{
-    const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
-    const uint_least32_t kind = term[0].bits;
-    const uint_least32_t channel = term[1].bits;
-
-    if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != kind) || (channel >= table->n_channels)
-        || ((channel != 0U) != (kind == GTC_TERM_AUXILIARY))) {
-        return 0;
-    }
-    return FN(numbers_fit)(&term[2], FN(term_limits)[kind - 1U], GTC_TERM_WORDS - 2U);
-}
-
-static int FN(terms_fit)(const TABLE *table)
-{
     int fit = 1;
     uint_least32_t i;
 
-    for (i = 0U; i < table->n_terms; i++) {
-        fit &= FN(term_fits)(table, i);
+    for (i = 0U; i < table->n_networks; i++) {
+        const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
+
+        fit &= FN(network_fits)(table, network, center);
+        center = &center[network[0].bits * GTC_CENTER_WORDS];
     }
     return fit;
 }
 
-static int FN(sigma_fits)(const TABLE *table)
+/* Parameters of the terms, and the uncertainties, which nothing reads yet. */
+static int FN(rest_fits)(const TABLE *table)
 {
     const uint_least32_t n = table->sigma_cells[0] * table->sigma_cells[1];
     int fit = 1;
     uint_least32_t i;
 
+    for (i = 0U; i < table->n_terms; i++) {
+        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+
+        fit &= FN(numbers_fit)(&term[2], FN(term_limits)[term[0].bits - 1U], GTC_TERM_WORDS - 2U);
+    }
     for (i = 0U; i < n; i++) {
         fit &= FN(numbers_fit)(&table->sigma[i], FN(sigma_limits), 1U);
     }
@@ -175,5 +181,5 @@ static int FN(sigma_fits)(const TABLE *table)
 int FN(is_usable)(const TABLE *table)
 {
     return (FN(is_readable)(table) && FN(wholes_fit)(table, 0U) && FN(members_fit)(table)
-            && FN(networks_fit)(table) && FN(terms_fit)(table) && FN(sigma_fits)(table)) ? 1 : 0;
+            && FN(networks_fit)(table) && FN(rest_fits)(table)) ? 1 : 0;
 }
