@@ -125,6 +125,7 @@ TEST(positions_beyond_the_last_are_refused)
     REFUSED(TABLE, 14U, 0.0F, 2147483647L);
     OPENED(TABLE, 13U, 0.0F, 0L);
     REFUSED(TABLE, 18U, 0.0F, -1073741824L);
+    REFUSED(TABLE, 18U, 0.0F, 32769L);
     REFUSED(TABLE, 18U, 0.0F, 1073741824L);
 }
 
@@ -138,6 +139,7 @@ TEST(arguments_beyond_their_word_are_refused)
     REFUSED(TABLE, center + 1U, 0.0F, 2147483647L);
     REFUSED(TABLE, center + 1U, 0.0F, GTC_TEMP_MISSING);
     REFUSED(TABLE, center + 3U, 0.0F, 2147483647L);
+    REFUSED(TABLE, center + 11U, 0.0F, GTC_TEMP_MISSING); /* where s is 0 */
     OPENED(TABLE, center + 1U, 0.0F, -2147483647L);
 #if GTC_OPEN_TERMS
     REFUSED(NARROW, centers_at(&NARROW) + 1U, 0.0F, 2147483647L);
@@ -175,6 +177,18 @@ TEST(weights_and_gains_keep_to_their_ranges)
 #endif
     REFUSED(TABLE, centers_at(&TABLE) + (TABLE.n_centers * GTC_CENTER_WORDS) + 1U, 7.6e6F, -1L); /* sigma */
     REFUSED(TABLE, centers_at(&TABLE) + (TABLE.n_centers * GTC_CENTER_WORDS) + 2U, -1.0F, -2147483647L);
+}
+
+/* A table that is linked, with its checksum mended. */
+TEST(a_linked_table_keeps_to_the_ranges_too)
+{
+    table_t table = TABLE;
+    state_t state;
+
+    table.stuck_samples = 0x80000000UL;
+    table.crc = image[image_of(&table, image) - 1U].bits;
+    CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
 }
 
 TEST(an_envelope_of_one_value_is_one)
@@ -268,6 +282,7 @@ int main(void)
     RUN(inputs_beyond_the_normalised_range_are_refused);
 #endif
     RUN(weights_and_gains_keep_to_their_ranges);
+    RUN(a_linked_table_keeps_to_the_ranges_too);
     RUN(an_envelope_of_one_value_is_one);
     RUN(a_region_that_is_reversed_is_refused);
 #if GTC_WITH_BANK

@@ -124,7 +124,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     words[n - 1U].bits = gtc_crc_words(GTC_CRC_START, &words[1], n - 2U) ^ GTC_CRC_FINAL;
     if (FN(open)(&table, words, n, words[5].bits) == GTC_OK) {
         image_opened++;
-        CLAIM(FN(check)(&table) == GTC_OK);
+        /* With other counts, words of another array may be taken for known answers. */
+        CLAIM(FN(check)(&table) == ((table.n_probes == 0U) ? GTC_OK : GTC_E_SELF_TEST));
         for (k = 0U; k < 4U; k++) {
             num_t bias = 0;
             const int status = FN(map)(&table, some_number(&in), some_number(&in), &bias);
