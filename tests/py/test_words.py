@@ -16,8 +16,15 @@ from models import bank_with_channels, random_model, random_terms
 
 LAYOUT, SELF_TEST = -2, -3
 SCALARS = (
-    "slope_blocks hold_blocks stuck_samples bias_frac_bits max_step max_slope fallback n_channels".split()
+    "slope_blocks",
+    "hold_blocks",
+    "stuck_samples",
+    "bias_frac_bits",
+    "max_step",
+    "max_slope",
+    "fallback",
 )
+SCALARS += ("n_channels",)
 EDGES = [0, 1, 2, 0xFFFF, 0x10000, 0x3FFFFFFF, 0x40000000, 0x7FFFFFFF, 0x80000000, 0x80000001, 0xFFFFFFFF]
 EDGES += [0x7F800000, 0x7FC00000, 0x4E6E6B28, 0x42C80000, 0x3F800000, 0xBF800000, 0x4AE4E1C0]
 
