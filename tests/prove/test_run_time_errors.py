@@ -25,8 +25,8 @@ OPTIONS = ["-eva", "-warn-signed-overflow", "-warn-signed-downcast", "-warn-spec
 class Part:
     """An analysis: its C file, the table it is about, how precise, which functions by contract.
 
-    `shape`: instead of the emitted one, any table that `init` accepts, so many networks and so a last term
-    (tests/prove/eva/any_table.h). `checks` are proved besides; `left` is the number of alarms in fixed point that docs/proof.md argues by hand.
+    `checks` are proved besides; `left` is the number of alarms in fixed point that docs/proof.md argues by hand.
+    `shape`: instead of the emitted table any that `init` accepts, of so many networks and with such a last term.
     """
 
     file: str
