@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 PYTHON := .venv/bin/python
 GYROTC := .venv/bin/gyrotc
-FUZZERS := map check open step restore
+FUZZERS := map check open image step restore
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -60,15 +60,16 @@ cov:
 	@tools/setup.sh test
 	@$(PYTHON) tools/coverage.py
 
-## a fuzzer for each function family and arithmetic, SECONDS=20 each; what they learn is kept in build/corpus
+## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC, SEED=1
 fuzz:
 	@tools/setup.sh test
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
 	@for target in $(addsuffix _f32,$(FUZZERS)) $(addsuffix _q31,$(FUZZERS)); do \
 	  mkdir -p build/corpus/$$target && echo "fuzz_$$target" && \
 	  build/fuzz/fuzz_$$target -max_total_time=$(or $(SECONDS),20) -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
-	    -print_final_stats=1 build/corpus/$$target || exit 1; \
+	    -print_final_stats=1 build/corpus/$$target $$(ls -d tests/fuzz/corpus/$$target 2>/dev/null) || exit 1; \
 	done
+	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric $(or $(STORM),1000000) $(or $(SEED),1) || exit 1; done
 
 ## the pictures of a report and of a diagnosis in README.md, by a headless browser
 picture: demo
