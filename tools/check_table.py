@@ -60,6 +60,7 @@ class Model:
 
     def __init__(self, path: Path) -> None:
         self.raw = json.loads(path.read_text(encoding="utf-8"))
+        self.checksum = self.raw.pop("checksum", None)  # of all other fields: the hash
         canonical = json.dumps(self.raw, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         self.hash = hashlib.sha256(canonical.encode("ascii")).hexdigest()
         self.per_block = self.raw["block_s"] / 60.0
@@ -466,6 +467,8 @@ def check(folder: Path) -> list[str]:
     c = folder / "c"
     header = (c / f"gtc_{name}.h").read_text(encoding="ascii")
     wrong = [] if model.hash in header else ["the header names another model's hash"]
+    if model.checksum != model.hash:
+        wrong.append("the checksum of model.json is not that of its other fields")
     zero_at = re.search(r"Make again: .* --zero-at (\S+)", header)
     model.shift = model.bias(float(zero_at[1]), 0.0) if zero_at else 0.0
     for image in images_of(c, name):
