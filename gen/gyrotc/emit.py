@@ -8,7 +8,6 @@ done in `quantise`; here integers are printed.
 from __future__ import annotations
 
 import functools
-import re
 import shutil
 import struct
 import tempfile
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .amalgamate import amalgamate, runtime_folders
+from .emission import RECORD, Options, read_options, record_text
 from .errors import CheckFailed, InputError
 from .model import Model
 from .quantise import NUMERICS, Table, quantise
@@ -35,7 +35,6 @@ __all__ = [
     "answers_text",
     "emit",
     "emit_texts",
-    "emitted_model",
     "emitted_tables",
     "quantise_all",
     "replace_folder",
@@ -92,31 +91,10 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
     """The tables that an emitted folder must hold: made again from the model, with the same options.
 
     Raises:
-        InputError: There is no emitted code of this model.
+        InputError: There is no emitted code, or its record is damaged.
     """
-    text = _emitted_header(folder, model)
-    numerics = tuple(n for n in NUMERICS if f"gtc_{n}_table_t gtc_{model.symbol}_{n};" in text)
-    return quantise_all(emitted_model(folder, model), numerics).tables
-
-
-def emitted_model(folder: Path, model: Model) -> Model:
-    """The model that an emitted folder computes: with `--zero-at`, the shifted one.
-
-    Raises:
-        InputError: There is no emitted code of this model.
-    """
-    zero_at = re.search(r"Make again: .* --zero-at (\S+)", _emitted_header(folder, model))
-    return model.zeroed_at(float(zero_at[1])) if zero_at else model
-
-
-def _emitted_header(folder: Path, model: Model) -> str:
-    header = folder / f"gtc_{model.id}.h"
-    try:
-        return header.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise InputError(
-            str(header), f"cannot be read ({error.strerror})", "a folder that emit wrote"
-        ) from error
+    options = read_options(folder)
+    return quantise_all(options.shifted(model), options.numeric).tables
 
 
 def replace_folder(folder: Path, files: dict[str, bytes]) -> None:
@@ -140,14 +118,25 @@ def replace_folder(folder: Path, files: dict[str, bytes]) -> None:
 
 
 def emit_texts(
-    model: Model, emission: Emission, *, asked: bool = False, zero_at: float | None = None
+    model: Model,
+    emission: Emission,
+    *,
+    asked: bool = False,
+    zero_at: float | None = None,
+    expected: Mapping[str, NDArray[np.uint32]] | None = None,
 ) -> dict[str, bytes]:
-    """All files of `c/` by name."""
+    """All files of `c/` by name.
+
+    Args:
+        model: The model, before `zero_at` shifts it.
+        emission: Its tables.
+        asked: The arithmetics were asked for by name.
+        zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+        expected: Answers of the tables to the vectors, each (status, bits), shape (n, 2), where they are known already.
+    """
     numerics = tuple(emission.tables)
+    options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
     vectors = make_vectors(model, numerics)
-    options = (f" --numeric {','.join(numerics)}" if asked else "") + (
-        f" --zero-at {zero_at!r}" if zero_at is not None else ""
-    )
     first = next(iter(emission.tables.values()))
     values: dict[str, Any] = {
         "id": model.id,
@@ -155,7 +144,7 @@ def emit_texts(
         "serial": model.serial,
         "axis": model.axis,
         "model_hash": model.hash,
-        "options": options,
+        "options": options.text,
         "layout": LAYOUT,
         "numerics": numerics,
         "v": vectors,
@@ -185,9 +174,10 @@ def emit_texts(
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
         texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
-    texts[f"vectors_{model.id}.txt"] = answers_text(
-        {n: answers(t, vectors) for n, t in emission.tables.items()}
-    )
+    if expected is None:
+        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
+    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
+    texts[RECORD] = record_text(model, options, texts)
     return texts
 
 

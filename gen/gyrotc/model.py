@@ -370,7 +370,9 @@ def load_model(path: Path, *, stamped: bool = True) -> Model:
     if stamped and checksum != model.hash:
         raise InputError(
             f"{path}, field {CHECKSUM}",
-            "is missing" if checksum is None else "is not that of the other fields: the file was changed or damaged",
+            "is missing"
+            if checksum is None
+            else "is not that of the other fields: the file was changed or damaged",
             f"the file as gyrotc wrote it (a change made on purpose: gyrotc stamp {path})",
         )
     return model

@@ -31,6 +31,7 @@ ORDER = [
     "amalgamate",
     "vectors",
     "tabletext",
+    "emission",
     "emit",
     "toolchain",
     "verify",

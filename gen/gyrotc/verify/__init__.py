@@ -1,8 +1,8 @@
-"""Prove that the emitted C gives, on every target, bit for bit what the reference gives.
+"""Prove that the emitted C is what gyrotc made, and gives on every target bit for bit what the reference gives.
 
-Stage 7 of the house (… → C → **proof** → report). Believes nothing: compiles `DIR/c` for each
-target, runs the board test and compares every result word with what the reference computes from
-`model.json`. The answers and images in `c/` are not trusted either; they must be the same.
+Stage 7 of the house (… → C → **proof** → report). Believes nothing: makes every file of `DIR/c` again from `model.json`
+and compares it byte for byte; only then compiles them for each target, runs the board test and compares every result
+word with what the reference computes.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ import numpy as np
 
 from .. import __version__
 from ..dataset import Dataset
-from ..emit import emitted_model, emitted_tables
+from ..emit import emit_texts
 from ..errors import InputError
 from ..model import Model, load_model
 from ..reference import answers
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
 from .board import Job, board_entries
-from .emitted import c_hash, check_emitted
+from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
 from .logs import log_entries
 from .recordings import replay_dataset
 
-__all__ = ["verify"]
+__all__ = ["file_entries", "verify"]
 
 SCHEMA = "gyrotc.verify/1"
 Entry = dict[str, Any]
@@ -45,6 +45,8 @@ def verify(
     log: Path | None = None,
     exhaustive: bool = False,
     compiled: bool = True,
+    edited: Sequence[str] = (),
+    compile_differing: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Verifies `folder/c` against `folder/model.json`; the JSON object of `gyrotc verify`.
@@ -56,7 +58,9 @@ def verify(
         log: Output of a board test that ran elsewhere. Its entries join those of an earlier
             `verify.json` of the same model and code; later calls keep them.
         exhaustive: Visit every input of the fixed-point table besides.
-        compiled: False: no target; images, answers and bounds are checked against the reference alone.
+        compiled: False: no target; files and bounds are checked against model and reference alone.
+        edited: Files of `EDITABLE` that the user made their own: they may differ.
+        compile_differing: Compile and run what lies there although a file differs. It is then code of somebody else.
         progress: Called with the name of each target before it is tried.
 
     Raises:
@@ -64,23 +68,35 @@ def verify(
         CheckFailed: The log is not whole, or of another model.
     """
     say = progress or (lambda _: None)
+    _check_edited(edited)
     model = load_model(folder / "model.json")
     chosen = _choose(targets) if compiled and (targets or log is None) else []
-    tables = emitted_tables(folder / "c", model)
+    say("comparing files")
+    options, emission = made_again(folder / "c", model)
+    tables = emission.tables
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
     job = Job(folder / "c", model, tables, {n: answers(table, vectors) for n, table in tables.items()})
+    texts = emit_texts(
+        model,
+        emission,
+        asked=options.numeric is not None,
+        zero_at=options.zero_at_c,
+        expected=job.expected,
+    )
+    emitted = file_entries(job.c_folder, texts, edited)
+    wrong = [e["file"] for e in emitted if e["status"] == "fail"]
+    barred = wrong and not compile_differing
     identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
     entries = log_entries(job, vectors, log) if log is not None else []
-    entries += _test_all(job, chosen, say)
-    if dataset is not None:
+    entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
+    if dataset is not None and not barred:
         replay_dataset(job, entries, chosen, dataset, say)
     entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
-    emitted = check_emitted(job)
-    exact = emitted_model(folder / "c", model)
+    exact = options.shifted(model)
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
-    if exhaustive:
+    if exhaustive and not barred:
         errors = [_every_input(job, exact, say) if e["numeric"] == "q31" else e for e in errors]
     return {
         "schema": SCHEMA,
@@ -90,6 +106,7 @@ def verify(
         **identity,
         **_counts(entries, [*emitted, *errors], set(targets) - {"all"}),
         "targets": entries,
+        "options": options.model_dump(mode="json"),
         "emitted": emitted,
         "errors": errors,
         "error_bound_dph": max(e["bound_dph"] for e in errors),
@@ -108,6 +125,22 @@ def _choose(names: Sequence[str]) -> list[Target]:
     if not names:
         return [t for t in known.values() if t.default]
     return [t for t in known.values() if "all" in names or t.name in names]
+
+
+def _check_edited(names: Sequence[str]) -> None:
+    for name in names:
+        if name not in EDITABLE:
+            raise InputError(
+                "--allow-edited", repr(name), f"{', '.join(sorted(EDITABLE))}: the rest is not to be edited"
+            )
+
+
+def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[Entry]:
+    """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
+    reason = f"not compiled: {wrong[0]}" + (f" and {len(wrong) - 1} more files" if len(wrong) > 1 else "")
+    entry = {"status": "fail", "error": f"{reason} not as gyrotc makes it"}
+    pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
+    return [{"name": name, "numeric": numeric} | entry for name, numeric in pairs]
 
 
 def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[Entry]:
