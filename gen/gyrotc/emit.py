@@ -13,6 +13,7 @@ import struct
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
@@ -228,8 +229,15 @@ def _sizes(emission: Emission) -> Iterator[str]:
     for numeric, table in emission.tables.items():
         yield (
             f"{numeric + ':':<12} {table.table_bytes} bytes of table; "
-            f"|error| <= {table.error_bound_dph:.2e} deg/h against the model (terms excluded)"
+            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
         )
+
+
+def _upwards(bound: float) -> str:
+    """A bound with three digits, never below itself."""
+    with localcontext() as context:
+        context.rounding = ROUND_CEILING
+        return f"{float(f'{Decimal(bound):.2e}'):.2e}"
 
 
 def _example_values(model: Model) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..table import Numeric, Table
@@ -50,7 +52,14 @@ class _Known:
 def _quantised(known: _Known, numeric: str) -> Table:
     """Kept for the next stages of the same job, which ask again."""
     model = known.model
-    table = with_probes(model, _MAKERS[numeric](model))
+    try:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            rounded = _MAKERS[numeric](model)
+    except (FloatingPointError, ZeroDivisionError, OverflowError) as error:
+        raise CheckFailed(
+            f"{numeric}: a number of the model leaves the range of this arithmetic ({error})"
+        ) from error
+    table = with_probes(model, rounded)
     floor = model.noise_floor_dph
     if floor and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
         worst = max(table.bound_parts_dph, key=lambda part: table.bound_parts_dph[part])
