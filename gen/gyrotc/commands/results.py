@@ -86,6 +86,7 @@ def verify_notes(result: dict[str, Any]) -> Iterator[str]:
             if text:
                 yield f"{entry['name']} {entry['numeric']}: {text}"
     yield from file_notes(result)
+    yield from _log_notes(result["log"]) if result.get("log") else ()
     for error in result["errors"]:
         for text in error.get("first_mismatches", ()):
             yield f"{error['numeric']}: {text}"
@@ -94,6 +95,15 @@ def verify_notes(result: dict[str, Any]) -> Iterator[str]:
             f"visited; the bound is {error['bound_dph']:.2e}"
             + (" and is EXCEEDED" if error["worst_dph"] > error["bound_dph"] else "")
         )
+
+
+def _log_notes(log: dict[str, Any]) -> Iterator[str]:
+    """What a log holds, to its last line."""
+    found = ", ".join(f"{part['numeric']} from line {part['line']}" for part in log["parts"])
+    yield f"{log['file']}: {log['lines']} lines; compared: {found}; {log['outside']} lines outside of the board test"
+    yield from (f"{log['file']}, outside: {line}" for line in log["first_outside"])
+    for numeric in log["absent"]:
+        yield f"{log['file']}: the board did not test {numeric}"
 
 
 def file_notes(result: dict[str, Any]) -> Iterator[str]:

@@ -89,7 +89,7 @@ def verify(
     wrong = [e["file"] for e in emitted if e["status"] == "fail"]
     barred = wrong and not compile_differing
     identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
-    entries = log_entries(job, vectors, log) if log is not None else []
+    entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
     if dataset is not None and not barred:
         replay_dataset(job, entries, chosen, dataset, say)
@@ -106,6 +106,7 @@ def verify(
         **identity,
         **_counts(entries, [*emitted, *errors], set(targets) - {"all"}),
         "targets": entries,
+        "log": brought,
         "options": options.model_dump(mode="json"),
         "emitted": emitted,
         "errors": errors,
