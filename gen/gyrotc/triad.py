@@ -15,6 +15,7 @@ from .emission import RECORD, joint_record_text
 from .emit import emitted_tables
 from .errors import CheckFailed, InputError
 from .model import Model, load_model, write_atomically
+from .signature import check_signature, load_public_key
 from .toolchain import all_targets, compile_c, run_program
 from .verify import file_entries
 
@@ -90,7 +91,10 @@ def axes_in(folder: Path) -> tuple[str, ...]:
 
 
 def verify_axes(
-    folder: Path, results: Mapping[str, dict[str, Any]], edited: Sequence[str] = ()
+    folder: Path,
+    results: Mapping[str, dict[str, Any]],
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
 ) -> dict[str, Any]:
     """The JSON object of `gyrotc verify` for a unit: its axes' results, and the files that stand in `folder/c`.
 
@@ -110,7 +114,9 @@ def verify_axes(
     counts["failed"] += sum(e["status"] == "fail" for e in emitted)
     first = next(iter(results.values()))
     head = {k: first[k] for k in ("schema", "gyrotc_version", "serial")} | {"axis": None}
-    return head | counts | {"emitted": emitted, "axes": dict(results)}
+    signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
+    counts["failed"] += signed is not None and signed["status"] == "fail"
+    return head | counts | {"emitted": emitted, "signature": signed, "axes": dict(results)}
 
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:

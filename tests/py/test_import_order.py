@@ -32,6 +32,7 @@ ORDER = [
     "vectors",
     "tabletext",
     "emission",
+    "signature",
     "emit",
     "toolchain",
     "verify",

@@ -120,6 +120,10 @@ def file_notes(result: dict[str, Any]) -> Iterator[str]:
     options = result.get("options") or {}
     shift = f", shifted to 0 at {options['zero_at_c']:g} C" if options.get("zero_at_c") is not None else ""
     yield f"{equal} of {len(files)} files are, byte for byte, what the model gives{shift}"
+    signed = result.get("signature")
+    if signed:
+        verdict = "good" if signed["status"] == "pass" else f"BAD: {signed['reason']}"
+        yield f"signature {verdict}; key sha256 {signed['key']}"
 
 
 def _difference_text(file: dict[str, Any]) -> str:

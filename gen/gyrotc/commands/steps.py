@@ -133,6 +133,9 @@ def verify(
         list[str] | None,
         typer.Option("--allow-edited", help="main.c: the example is yours now and may differ."),
     ] = None,
+    signature: Annotated[
+        Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
+    ] = None,
     compile_differing: Annotated[
         bool,
         typer.Option("--compile-differing", help="Compile and run even files that gyrotc did not write so."),
@@ -164,13 +167,14 @@ def verify(
                 log=log,
                 exhaustive=exhaustive,
                 edited=allowed,
+                signature=signature,
                 compile_differing=compile_differing,
                 progress=say,
             )
             write_atomically(part / "verify.json", json_text(results[str(axis)]))
     result = next(iter(results.values()))
     if axes:
-        result = verify_axes(folder, results, allowed)
+        result = verify_axes(folder, results, allowed, signature)
         write_atomically(folder / "verify.json", json_text(result))
     write_json(json_file, result)
     for one in results.values():

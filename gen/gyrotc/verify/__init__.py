@@ -22,6 +22,7 @@ from ..emit import emit_texts
 from ..errors import InputError
 from ..model import Model, load_model
 from ..reference import answers
+from ..signature import check_signature, load_public_key
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
 from .board import Job, board_entries
@@ -46,6 +47,7 @@ def verify(
     exhaustive: bool = False,
     compiled: bool = True,
     edited: Sequence[str] = (),
+    signature: Path | None = None,
     compile_differing: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -60,6 +62,7 @@ def verify(
         exhaustive: Visit every input of the fixed-point table besides.
         compiled: False: no target; files and bounds are checked against model and reference alone.
         edited: Files of `EDITABLE` that the user made their own: they may differ.
+        signature: Public key with which `folder/c` must be signed.
         compile_differing: Compile and run what lies there although a file differs. It is then code of somebody else.
         progress: Called with the name of each target before it is tried.
 
@@ -69,6 +72,7 @@ def verify(
     """
     say = progress or (lambda _: None)
     _check_edited(edited)
+    key = load_public_key(signature) if signature is not None else None
     model = load_model(folder / "model.json")
     chosen = _choose(targets) if compiled and (targets or log is None) else []
     say("comparing files")
@@ -86,6 +90,7 @@ def verify(
         expected=job.expected,
     )
     emitted = file_entries(job.c_folder, texts, edited)
+    signed = check_signature(job.c_folder, key) if key is not None else None
     wrong = [e["file"] for e in emitted if e["status"] == "fail"]
     barred = wrong and not compile_differing
     identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
@@ -104,11 +109,12 @@ def verify(
         "serial": model.serial,
         "axis": model.axis,
         **identity,
-        **_counts(entries, [*emitted, *errors], set(targets) - {"all"}),
+        **_counts(entries, [*emitted, *errors, *([signed] if signed else [])], set(targets) - {"all"}),
         "targets": entries,
         "log": brought,
         "options": options.model_dump(mode="json"),
         "emitted": emitted,
+        "signature": signed,
         "errors": errors,
         "error_bound_dph": max(e["bound_dph"] for e in errors),
         "worst_error_dph": {
