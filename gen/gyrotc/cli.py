@@ -6,6 +6,7 @@ import os
 import sys
 
 from .errors import GyrotcError
+from .texts import terminal_text
 
 
 def main() -> None:
@@ -37,7 +38,7 @@ def _status() -> int:
     try:
         app(standalone_mode=True)
     except GyrotcError as error:
-        print(f"gyrotc: {error}", file=sys.stderr)
+        print(f"gyrotc: {terminal_text(str(error))}", file=sys.stderr)
         return error.exit_status
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

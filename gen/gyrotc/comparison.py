@@ -15,6 +15,7 @@ from rich.table import Table
 
 from .paper.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
+from .texts import picture_text
 
 __all__ = ["comparison_picture", "comparison_tables", "with_published"]
 
@@ -163,7 +164,7 @@ def _environment(ax: Axes, methods: Sequence[dict[str, Any]], k: int, unit: floa
     if any(paper):
         values = np.array([np.nan if p is None else p / unit for p in paper])
         ax.scatter(values, place, s=22, facecolor="none", edgecolor=BEFORE, zorder=2, label="in the paper")
-    ax.set_title(methods[0]["groups"][k]["environment"], fontsize=8.5, loc="left")
+    ax.set_title(picture_text(methods[0]["groups"][k]["environment"]), fontsize=8.5, loc="left")
 
 
 def _together(ax: Axes, methods: Sequence[dict[str, Any]]) -> None:

@@ -20,6 +20,7 @@ from .diagnosis_plots import draw
 from .errors import InputError
 from .fitting import FitOptions
 from .model import Model, write_atomically
+from .texts import toml_comment, toml_key, toml_value
 
 __all__ = ["diagnose_into", "extended_scenario", "save"]
 
@@ -78,14 +79,18 @@ def extended_scenario(result: dict[str, Any]) -> str | None:
     if not causes:
         return None
     lines = [
-        f"# Causes that gyrotc diagnose found in {result['serial']}, with their fitted parameters.",
+        f"# Causes that gyrotc diagnose found in {toml_comment(result['serial'])}, with their fitted parameters.",
         "# The profiles are those of the scenario named here; put your chamber's in their place.",
         'extends = "separating"',
-        f"title = {json.dumps('the separating profiles with what was found in ' + result['serial'])}",
+        f"title = {toml_value('the separating profiles with what was found in ' + result['serial'])}",
     ]
     noise = result["estimated_noise"]
     if noise:
-        lines += ["", "[noise]", *(f"{name} = {value!r}" for name, value in noise.items())]
+        lines += [
+            "",
+            "[noise]",
+            *(f"{toml_key(name)} = {toml_value(value)}" for name, value in noise.items()),
+        ]
     for cause in causes:
         lines += _cause(cause)
     return "\n".join(lines) + "\n"
@@ -94,11 +99,11 @@ def extended_scenario(result: dict[str, Any]) -> str | None:
 def _cause(cause: dict[str, Any]) -> Iterator[str]:
     values = {name: p["value"] for name, p in cause["parameters"].items()}
     if "channel" in cause:
-        yield from ("", "[[channel]]", f"name = {json.dumps(cause['channel'])}")
-        yield f"level = {values.get('reference', 0.0)!r}"
-    yield from ("", "[[cause]]", f"id = {json.dumps(cause['id'])}")
+        yield from ("", "[[channel]]", f"name = {toml_value(cause['channel'])}")
+        yield f"level = {toml_value(values.get('reference', 0.0))}"
+    yield from ("", "[[cause]]", f"id = {toml_value(cause['id'])}")
     if "channel" in cause:
-        yield f"channel = {json.dumps(cause['channel'])}"
+        yield f"channel = {toml_value(cause['channel'])}"
     for name, value in values.items():
         if math.isfinite(value):
-            yield f"{name} = {value!r}"
+            yield f"{toml_key(name)} = {toml_value(value)}"

@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup
 
 from .errors import InputError
 from .model import write_atomically
 from .report import page_environment, read_json
+from .texts import checked_svg
 
 __all__ = ["PICTURES", "is_diagnosis", "write_page"]
 
@@ -51,10 +53,20 @@ def write_page(folder: Path) -> Path:
     return path
 
 
-def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, str]:
-    """SVG text by name; a picture that is missing is left out."""
-    paths = [folder / name for name in result.get("pictures", [])]
-    return {p.stem: p.read_text(encoding="utf-8") for p in paths if p.is_file()}
+def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, Markup]:
+    """Pictures by name; one that is missing is left out.
+
+    Raises:
+        InputError: One is more than a drawing.
+    """
+    paths = [folder / PICTURES / Path(str(name)).name for name in result.get("pictures", [])]
+    found = {}
+    for path in (p for p in paths if p.is_file()):
+        try:
+            found[path.stem] = checked_svg(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise InputError(str(path), str(error), "a picture that diagnose drew") from error
+    return found
 
 
 def _gains(result: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

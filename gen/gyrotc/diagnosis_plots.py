@@ -23,6 +23,7 @@ from .diagnose.search import Found
 from .diagnose.words import WORDS
 from .metrics import Averages
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
+from .texts import picture_text
 
 __all__ = ["draw"]
 
@@ -75,7 +76,7 @@ def _residual_over_time(records: Records, ensemble: Ensemble, term: Array | None
             )
             if term is not None:
                 ax.plot(hours, _smooth(term[span], width), color=AFTER, linewidth=1.2, label="named causes")
-            title = " ".join(dict.fromkeys((run.name, run.environment)))
+            title = picture_text(" ".join(dict.fromkeys((run.name, run.environment))))
             ax.set_title(title, fontsize=8, loc="left")
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         figure.supxlabel("h since the first row", fontsize=9)

@@ -7,7 +7,6 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
-import functools
 import shutil
 import struct
 import tempfile
@@ -17,7 +16,6 @@ from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,11 +27,13 @@ from .quantise import NUMERICS, Table, quantise
 from .reference import answers
 from .table import LAYOUT
 from .tabletext import table_text
+from .texts import c_environment
 from .vectors import MISSING, make_vectors
 
 __all__ = [
     "Emission",
     "answers_text",
+    "board_test_text",
     "emit",
     "emit_texts",
     "emitted_tables",
@@ -151,25 +151,26 @@ def emit_texts(
         "v": vectors,
         "n": numerics[0],
         "n_channels": vectors.n_channels,
-        "missing": {n: f"0x{word:08x}UL" for n, word in MISSING.items()},
         "id_code": first.id,
         "tables": [table_text(t, model) for t in emission.tables.values()],
         "facts": list(_facts(model)),
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(emission)),
-        "warnings": list(model.meta.get("warnings", ())),
+        "warnings": list(model.warnings),
         **_example_values(model),
     }
     named = {
         f"gtc_{model.id}.h": "table.h.j2",
         f"gtc_{model.id}.c": "table.c.j2",
         f"vectors_{model.id}.h": "vectors.h.j2",
-        "board_test.c": "board_test.c.j2",
         "main.c": "main.c.j2",
     }
-    texts = {name: _templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+    texts = {
+        name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
+    }
     header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
@@ -182,6 +183,15 @@ def emit_texts(
     return texts
 
 
+def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
+    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
+    template = c_environment().get_template("board_test.c.j2")
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
+    )
+    return text.encode("ascii")
+
+
 def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
     """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
     parts = [
@@ -189,17 +199,6 @@ def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
         for numeric, rows in expected.items()
     ]
     return b"".join(parts)
-
-
-@functools.cache
-def _templates() -> jinja2.Environment:
-    """Compiled once in a process."""
-    return jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
 
 
 def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
@@ -210,14 +209,13 @@ def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
     return lines.tobytes()
 
 
-def _facts(model: Model) -> Iterator[tuple[str, str]]:
-    """Calibration date and meta, one line each."""
+def _facts(model: Model) -> Iterator[str]:
+    """Calibration date and meta, one line each; the template makes them safe."""
     for key, value in sorted(model.meta.items()):
         if key in ("warnings", "environments") or isinstance(value, (dict, list)):
             continue
         text = " ".join(str(value).split())
-        safe = text.encode("ascii", "replace").decode("ascii").replace("*/", "* /").replace("/*", "/ *")[:120]
-        yield key[:24], safe
+        yield f"{key[:24] + ':':<12} {text[:120]}"
 
 
 def _valid(model: Model) -> str:
@@ -244,7 +242,7 @@ def _example_values(model: Model) -> dict[str, Any]:
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
     per_second = 100 if abs(model.block_s * 100 - round(model.block_s * 100)) < 1e-9 else 1
     return {
-        "first_temperature": f"{middle:.1f}",
+        "first_temperature": middle,
         "first_temperature_q16": round(middle * 65536),
         "samples_per_second": per_second,
         "samples_per_block": max(1, round(model.block_s * per_second)),

@@ -27,6 +27,7 @@ from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
 from .quantise import Table
 from .simulate.truth import simulated_floor
+from .texts import file_stem
 from .toolchain import Target, all_targets
 from .verify.footprint import Footprint, footprint
 from .verify.replay import history_of, replay_on, replay_program
@@ -72,6 +73,7 @@ def evaluate(
     trace: Path | None = None,
     training: Mapping[str, Any] | None = None,
     compiled: bool = True,
+    trust_code: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Evaluates `folder` (model and C) on a data set; the JSON object of `gyrotc evaluate`.
@@ -83,10 +85,11 @@ def evaluate(
         training: The object of `training.json`; default that of `folder`, where it was made from these
             recordings. Without an exam run its figures of spans left out count.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
+        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
 
     Raises:
         InputError: No emitted code of the model, or the data lack a channel it needs.
-        CheckFailed: The C code does not compile.
+        CheckFailed: The C code does not compile, or is not gyrotc's.
     """
     model = load_model(folder / "model.json")
     tables = emitted_tables(folder / "c", model)
@@ -96,14 +99,15 @@ def evaluate(
     table = tables[chosen]
     window = average_s or model.average_s
     parts = []
-    with _program(folder / "c", model, table) if compiled else nullcontext() as program:
+    compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
+    with compiling as program:
         for run in dataset.runs:
             if progress:
                 progress(run.file)
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
-    sizes = footprint(folder / "c", model, table) if compiled else None
+    sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
     if result["exam"] is None and training:
@@ -126,12 +130,12 @@ def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, A
 
 
 @contextmanager
-def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Target, Path]]:
+def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> Iterator[tuple[Target, Path]]:
     """The replay program of a table, compiled for the host."""
     target = all_targets()[_HOST]
     if target.missing():
         raise GyrotcError(f"no C compiler: install {target.package}")
-    with replay_program(c_folder, model, table, target) as program:
+    with replay_program(c_folder, model, table, target, trusted=trusted) as program:
         yield target, program
 
 
@@ -188,7 +192,7 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
     if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
         stem = run.file.replace("/", "_")
     shared = sum(r.file == run.file for r in all_runs) > 1
-    return stem + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+    return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
 
 
 def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:

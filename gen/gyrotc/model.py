@@ -219,6 +219,12 @@ class Model(_Frozen):
         return self.id if len(self.id) <= _LONGEST_SYMBOL else f"{self.id[:14]}_{self.id[-8:]}"
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know of the recordings, from `meta`; whoever wrote these wrote it."""
+        found = self.meta.get("warnings", ())
+        return tuple(map(str, found)) if isinstance(found, list | tuple) else (str(found),)
+
+    @property
     def n_centers(self) -> int:
         return sum(len(n.centers) for n in self.networks)
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .plots import ACCENT, AFTER, BEFORE, STYLE, svg
+from .texts import picture_text
 
 __all__ = ["accuracy_by_hours", "separability_matrix", "temperatures"]
 
@@ -27,7 +28,7 @@ def temperatures(result: dict[str, Any]) -> str:
             ax.set_visible(False)
         for ax, run in zip(axes.flat, runs, strict=False):
             ax.plot(run["temperature"]["time_h"], run["temperature"]["value_c"], color=BEFORE, linewidth=1.1)
-            ax.set_title(run["profile"], fontsize=8.5, loc="left")
+            ax.set_title(picture_text(run["profile"]), fontsize=8.5, loc="left")
         figure.supxlabel("h", fontsize=9)
         figure.supylabel("temperature at the sensor, C", fontsize=9)
         return svg(figure)
@@ -39,7 +40,8 @@ def separability_matrix(result: dict[str, Any]) -> str:
     others = list(dict.fromkeys([*(row["id"] for row in rows), *(o for row in rows for o in row["d"])]))
     d = np.array([[row["d"].get(o, np.nan) for o in others] for row in rows])
     names = [
-        row["id"].replace("_", " ") + ("" if row["value"] is None else f" {row['value']:.4g}") for row in rows
+        picture_text(row["id"].replace("_", " ")) + ("" if row["value"] is None else f" {row['value']:.4g}")
+        for row in rows
     ]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.4 + 0.33 * len(rows)), layout="constrained")
@@ -51,7 +53,7 @@ def separability_matrix(result: dict[str, Any]) -> str:
                 if np.isfinite(value):
                     text = f">{_FULL:.0f}" if value > _FULL else f"{value:.1f}"
                     ax.text(i, k, text, ha="center", va="center", fontsize=8, color=ACCENT)
-        ax.set_xticks(range(len(others)), [o.replace("_", "\n") for o in others], fontsize=8)
+        ax.set_xticks(range(len(others)), [picture_text(o).replace("_", "\n") for o in others], fontsize=8)
         ax.set_yticks(range(len(rows)), names, fontsize=8)
         ax.grid(visible=False)
         return svg(figure)

@@ -13,12 +13,14 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from .metrics import Averages
 from .model import Model
+from .texts import checked_svg, picture_text
 
 __all__ = [
     "ACCENT",
@@ -49,19 +51,17 @@ STYLE: Any = {
 }
 
 
-def svg(figure: Figure) -> str:
+def svg(figure: Figure) -> Markup:
     """The figure as an SVG element without prologue, date or fixed size."""
     with mpl.rc_context(STYLE):
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
-    text = text[text.index("<svg") :]
-    return re.sub(
-        r'(<svg[^>]*?) width="[^"]*"',
-        r'\1 width="100%"',
-        re.sub(r' height="[\d.]+pt"', "", text, count=1),
-        count=1,
-    )
+    text = re.sub(
+        r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL
+    )  # what a formula was written as
+    text = re.sub(r' height="[\d.]+pt"', "", text, count=1)
+    return checked_svg(re.sub(r'(<svg[^>]*?) width="[^"]*"', r'\1 width="100%"', text, count=1))
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -82,7 +82,7 @@ def bias_over_time(runs: Sequence[tuple[str, str, Averages]]) -> str:
             ax.axhline(0.0, color=ACCENT, linewidth=0.6)
             ax.plot(hours, a.before_dph, color=BEFORE, linewidth=0.8, label="measured")
             ax.plot(hours, a.after_dph, color=AFTER, linewidth=0.8, label="compensated")
-            ax.set_title(f"{label} ({role})", fontsize=8.5, loc="left")
+            ax.set_title(f"{picture_text(label)} ({role})", fontsize=8.5, loc="left")
         for ax in axes[-1]:
             ax.set_xlabel("time, h")
         for ax in axes[:, 0]:

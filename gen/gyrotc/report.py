@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from .errors import InputError
 from .metrics import Averages, average
 from .model import Model, load_model, write_atomically
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
+from .texts import file_stem, html_environment
 
 __all__ = ["page_environment", "read_json", "write_report"]
 
@@ -51,13 +53,10 @@ def write_report(folder: Path) -> Path:
     return path
 
 
+@functools.cache
 def page_environment() -> jinja2.Environment:
-    """Where pages come from; filters `sci` and `number` print figures."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
-    )
-    environment.filters.update(sci=_sci, number=_number, plain=_plain)
-    return environment
+    """Where pages come from, compiled once in a process; filters `sci` and `number` print figures."""
+    return html_environment(sci=_sci, number=_number, plain=_plain)
 
 
 def read_json(path: Path, *, optional: bool = False) -> dict[str, Any]:
@@ -109,7 +108,7 @@ def _pictures(
 
 def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | None:
     start = f"@{run.get('from_s') or 0.0:g}"
-    stems = (run["file"].replace("/", "_"), Path(run["file"]).stem)
+    stems = (file_stem(run["file"].replace("/", "_")), file_stem(Path(run["file"]).stem))
     names = [stem + end + ".csv" for stem in stems for end in (start, "")]
     path = next((folder / n for n in names if (folder / n).is_file()), None)
     if path is None:

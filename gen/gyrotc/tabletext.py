@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from .model import Model
 from .table import LAYOUT, Table
+from .texts import CText, c_code
 
 __all__ = ["TableText", "table_text"]
 
@@ -30,8 +31,14 @@ _HEAD_WORDS = 3  # magic, layout and arithmetic, length
 @dataclass(frozen=True, slots=True)
 class _Member:
     name: str
-    text: str
+    text: CText
     comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    cells: CText
+    comment: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +46,7 @@ class _Array:
     name: str
     comment: str
     size: int
-    rows: tuple[str, ...]
+    rows: tuple[_Row, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,17 +66,17 @@ def table_text(table: Table, model: Model) -> TableText:
     words = iter(table.words[_HEAD_WORDS:])
     sizes = {"scale": 3, "envelope": 4}
     counts: dict[str, list[int]] = {}
-    members = [_Member("layout", str(LAYOUT))]
+    members = [_member("layout", str(LAYOUT))]
     for name in _INTEGERS:
         word = next(words)
-        members.append(_Member(name, f"0x{word:08x}UL" if name == "id" else f"{word}UL"))
+        members.append(_member(name, f"0x{word:08x}UL" if name == "id" else f"{word}UL"))
     for name in (*_NUMBERS, "scale", "envelope"):
         group = [_number(table.numeric, next(words)) for _ in range(sizes.get(name, 1))]
-        members.append(_Member(name, f"{{ {', '.join(group)} }}" if name in sizes else group[0]))
+        members.append(_member(name, f"{{ {', '.join(group)} }}" if name in sizes else group[0]))
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
         text = ", ".join(f"{n}UL" for n in counts[name])
-        members.append(_Member(name, f"{{ {text} }}" if name.endswith("cells") else text))
+        members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
     arrays = []
     kinds: list[int] = []
     for name, length in _array_lengths(counts).items():
@@ -78,14 +85,18 @@ def table_text(table: Table, model: Model) -> TableText:
             kinds = body[:: _RECORDS["terms"]]
         if length:
             arrays.append(_array(table.numeric, name, body, counts, comments.get(name, [])))
-        members.append(_Member(name, f"{table.numeric}_{name}" if length else "NULL"))
-    members.append(_Member("crc", f"0x{next(words):08x}UL"))
+        members.append(_member(name, f"{table.numeric}_{name}" if length else "NULL"))
+    members.append(_member("crc", f"0x{next(words):08x}UL"))
     codes = [f"gtc_{table.numeric}_term_{_TERM_CODES[k]}" for k in kinds]
     filled = ", ".join([f"&{c}" for c in codes] or ["NULL"])
-    members.append(_Member("term_code", f"{{ {filled} }}"))
+    members.append(_member("term_code", f"{{ {filled} }}"))
     return TableText(
         table.numeric, _TITLES[table.numeric], tuple(members), tuple(arrays), tuple(dict.fromkeys(codes))
     )
+
+
+def _member(name: str, text: str) -> _Member:
+    return _Member(name, c_code(text))
 
 
 def _array_lengths(counts: dict[str, list[int]]) -> dict[str, int]:
@@ -124,8 +135,7 @@ def _array(
             _word(numeric, w, integer=_is_integer(name, k)) for k, w in enumerate(body[start : start + width])
         ]
         number = start // width
-        comment = f" /* {comments[number]} */" if number < len(comments) else ""
-        rows.append(", ".join(cells) + "," + comment)
+        rows.append(_Row(c_code(", ".join(cells)), comments[number] if number < len(comments) else ""))
     return _Array(name, _ARRAY_COMMENTS[name], len(body), tuple(rows))
 
 

@@ -19,6 +19,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from .confined import Run, run_to_end
 from .errors import CheckFailed, InputError
 
 if sys.version_info >= (3, 11):
@@ -49,7 +50,6 @@ C_FLAGS = (
 _HERE = Path(__file__).resolve().parent
 _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
-_RUN_LIMIT_S = 600
 _SHOWN_LINES = 12
 _SYMBOL = re.compile(r"[0-9A-Fa-f]+ (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
@@ -88,15 +88,6 @@ class Target(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
-    """How a program ended and what it printed."""
-
-    returncode: int
-    stdout: bytes
-    stderr: str
-
-
-@dataclass(frozen=True, slots=True)
 class Symbol:
     """A symbol of an object or program: its `kind` is nm's letter, its size is in bytes."""
 
@@ -132,11 +123,12 @@ def compile_objects(
         CheckFailed: The compiler refused; the message holds its first lines.
     """
     bare = [f"-I{_BARE}"] if target.bare else []
-    flags = [*target.all_flags, *(f"-D{d}" for d in defines), *bare, f"-I{include}"]
+    flags = [*target.all_flags, *(f"-D{d}" for d in defines), *bare, f"-I{include.absolute()}"]
     objects = []
     for source in sources:
-        objects.append(folder / f"{source.stem}.o")
-        _command(target, [target.compiler, *flags, "-c", str(source), "-o", str(objects[-1])])
+        objects.append(folder.absolute() / f"{source.stem}.o")
+        command = [target.compiler, *flags, "-c", str(source.absolute()), "-o", str(objects[-1])]
+        _command(target, command, folder)
     return objects
 
 
@@ -148,9 +140,9 @@ def link(target: Target, objects: Sequence[Path], program: Path) -> None:
     """
     parts = compile_objects(target, [_BARE / f for f in target.bare], program.parent, include=_BARE)
     script = ["-T", str(_BARE / target.script)] if target.script else []
-    files = [str(f) for f in (*objects, *parts)]
-    arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections", "-o", str(program)]
-    _command(target, [target.compiler, *arguments])
+    files = [str(f.absolute()) for f in (*objects, *parts)]
+    arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections"]
+    _command(target, [target.compiler, *arguments, "-o", str(program.absolute())], program.parent)
 
 
 def compile_c(
@@ -171,29 +163,15 @@ def run_program(target: Target, program: Path, data: bytes = b"") -> Run:
     Raises:
         CheckFailed: It did not end.
     """
-    command = [*target.run, str(program)]
-    # Files, not pipes: a recording goes in and comes out, and is in memory once.
-    with tempfile.TemporaryFile() as stdin, tempfile.TemporaryFile() as stdout:
+    with tempfile.TemporaryFile() as stdin:
         if target.bare:
             (program.parent / _STDIN).write_bytes(data)
         else:
             stdin.write(data)
             stdin.seek(0)
         del data
-        try:
-            done = subprocess.run(
-                command,
-                stdin=stdin,
-                stdout=stdout,
-                stderr=subprocess.PIPE,
-                check=False,
-                timeout=_RUN_LIMIT_S,
-                cwd=program.parent,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise CheckFailed(f"{target.name}: the program did not end within {_RUN_LIMIT_S} s") from error
-        stdout.seek(0)
-        return Run(done.returncode, stdout.read(), done.stderr.decode("utf-8", "replace"))
+        command = [*target.run, str(program.absolute())]
+        return run_to_end(command, program.parent, f"{target.name}: the program", stdin)
 
 
 def symbols(target: Target, *files: Path) -> list[Symbol]:
@@ -213,11 +191,10 @@ def writable_bytes(target: Target, *files: Path) -> int:
 def _inspected(target: Target, tool: str, option: str, files: Sequence[Path]) -> list[str]:
     """Lines that a tool of the toolchain (nm, size) prints."""
     name = _tool(target.compiler, tool)
-    command = [name, option, *(str(f) for f in files)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_to_end([name, option, *(str(f.absolute()) for f in files)], files[0].parent, name)
     if done.returncode != 0:
         raise CheckFailed(f"{target.name}: {name} failed: {done.stderr[:200]}")
-    return done.stdout.splitlines()
+    return done.stdout.decode("utf-8", "replace").splitlines()
 
 
 @functools.cache
@@ -238,8 +215,8 @@ def compiler_version(compiler: str) -> str:
     return compiler
 
 
-def _command(target: Target, command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+def _command(target: Target, command: list[str], folder: Path) -> None:
+    done = run_to_end(command, folder, f"{target.name}: {target.compiler}")
     if done.returncode != 0:
         lines = "\n".join(done.stderr.splitlines()[:_SHOWN_LINES])
         raise CheckFailed(f"{target.name}: {target.compiler} failed:\n{lines}")

@@ -12,7 +12,9 @@ from gyrotc.verify.board import Job
 
 
 def job_of(folder: Path) -> Job:
+    """Takes the folder's code as it is: these tests spoil it, and look whether the proof sees it."""
     model = load_model(folder / "model.json")
     tables = emitted_tables(folder / "c", model)
     vectors = make_vectors(model, tuple(tables))
-    return Job(folder / "c", model, tables, {n: answers(table, vectors) for n, table in tables.items()})
+    expected = {n: answers(table, vectors) for n, table in tables.items()}
+    return Job(folder / "c", model, tables, expected, trusted=True)

@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 # From left to right. A stage is a module or a package of gyrotc.
 ORDER = [
     "errors",
+    "texts",
     "_core",
     "terms",
     "dataset",
@@ -34,6 +35,7 @@ ORDER = [
     "emission",
     "signature",
     "emit",
+    "confined",
     "toolchain",
     "verify",
     "findings",

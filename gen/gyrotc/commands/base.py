@@ -11,9 +11,11 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from .. import __version__
 from ..model import write_atomically
+from ..texts import terminal_text
 
 app = typer.Typer(
     name="gyrotc",
@@ -23,8 +25,17 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-OUT = Console(width=None if sys.stdout.isatty() else 120)
-ERR = Console(stderr=True)
+
+
+class _Console(Console):
+    """Shows text of users as it is: no markup of rich, no names of emoji, nothing that a terminal would obey."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(terminal_text(text), **options | {"markup": False, "emoji": False})
+
+
+OUT = _Console(width=None if sys.stdout.isatty() else 120)
+ERR = _Console(stderr=True)
 
 DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
@@ -50,6 +61,13 @@ NumericOption = Annotated[
 AppliedOption = Annotated[
     Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
 ]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-code",
+        help="Compile and run DIR/c although it holds code that this gyrotc did not write: only what is your own.",
+    ),
+]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 
 
@@ -60,12 +78,12 @@ def progress() -> Iterator[Callable[[str], None]]:
         yield lambda _: None
         return
     with ERR.status("") as status:
-        yield status.update
+        yield lambda text: status.update(Text(terminal_text(text)))
 
 
 def tell(text: str) -> None:
     """A line of the result on stdout, as it is."""
-    OUT.print(text, highlight=False, soft_wrap=True, markup=False)
+    OUT.print(text, highlight=False, soft_wrap=True)
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:

@@ -26,6 +26,7 @@ from .base import (
     OutOption,
     RhoOption,
     SeedOption,
+    TrustOption,
     app,
     json_text,
     numerics_of,
@@ -136,10 +137,7 @@ def verify(
     signature: Annotated[
         Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
     ] = None,
-    compile_differing: Annotated[
-        bool,
-        typer.Option("--compile-differing", help="Compile and run even files that gyrotc did not write so."),
-    ] = False,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
@@ -168,7 +166,7 @@ def verify(
                 exhaustive=exhaustive,
                 edited=allowed,
                 signature=signature,
-                compile_differing=compile_differing,
+                trust_code=trust_code,
                 progress=say,
             )
             write_atomically(part / "verify.json", json_text(results[str(axis)]))
@@ -196,6 +194,7 @@ def evaluate(
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
     average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
     applied: AppliedOption = None,
+    trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -210,7 +209,15 @@ def evaluate(
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
     with progress() as say:
-        result = run(folder, recordings, numeric=numeric, average_s=average_s, trace=trace, progress=say)
+        result = run(
+            folder,
+            recordings,
+            numeric=numeric,
+            average_s=average_s,
+            trace=trace,
+            trust_code=trust_code,
+            progress=say,
+        )
     write_atomically(folder / "evaluate.json", json_text(result))
     write_json(json_file, result)
     OUT.print(evaluation_table(result))

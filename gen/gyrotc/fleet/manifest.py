@@ -53,8 +53,11 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+_Place = Annotated[str, Field(pattern=r"^[^\x00-\x1f]+$")]
+
+
 class _UnitEntry(_Part):
-    dataset: str
+    dataset: _Place
     axis: Literal["x", "y", "z", "all"] | None = None
 
 
@@ -69,12 +72,12 @@ class _Options(_Part):
 
 class _Manifest(_Part):
     schema_: Annotated[Literal[1], Field(alias="schema")]
-    datasets: tuple[str, ...] = ()  # patterns of folders
+    datasets: tuple[_Place, ...] = ()  # patterns of folders
     axis: Literal["x", "y", "z", "all"] | None = None  # of those
     unit: tuple[_UnitEntry, ...] = ()
     options: _Options = _Options()
     numeric: tuple[Literal["f32", "q31"], ...] | None = None
-    limits: str | None = None
+    limits: _Place | None = None
 
 
 def load_manifest(path: Path) -> Fleet:
@@ -140,7 +143,16 @@ def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
             raise InputError(
                 f"{path}, field datasets", repr(pattern), "a pattern below the manifest's folder"
             )
-        found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
+        try:
+            found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
+        except (
+            IndexError,
+            ValueError,
+            OSError,
+            RecursionError,
+        ) as error:  # ".", "a**", a name that no folder can have
+            expected = "a pattern below the manifest's folder, e.g. 2026-*"
+            raise InputError(f"{path}, field datasets", repr(pattern), expected) from error
         if not found:
             raise InputError(f"{path}, field datasets", f"{pattern!r} matches no folder of recordings")
         yield from found

@@ -10,7 +10,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,6 +17,8 @@ from matplotlib.figure import Figure
 from .. import __version__
 from ..model import write_atomically
 from ..plots import ACCENT, AFTER, BEFORE, STYLE, svg
+from ..report import page_environment
+from ..texts import csv_cell
 from .outliers import FIGURES, outliers, spread
 
 __all__ = ["summary_of", "write_summary"]
@@ -51,12 +52,10 @@ def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any
     summary = summary_of(entries)
     write_atomically(out / "fleet.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
     write_atomically(out / "fleet.csv", _table(entries))
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"), undefined=jinja2.StrictUndefined, autoescape=True
-    )
     names = {outlier["name"] for outlier in summary["outliers"]}
     picture = _picture([e for e in entries if e.get("after_rms_dph")], names)
-    page = environment.get_template("fleet.html.j2").render(summary=summary, apart=names, picture=picture)
+    template = page_environment().get_template("fleet.html.j2")
+    page = template.render(summary=summary, apart=names, picture=picture)
     write_atomically(out / "fleet.html", page)
     return summary
 
@@ -90,5 +89,7 @@ def _table(entries: Sequence[dict[str, Any]]) -> str:
     writer.writerow(_COLUMNS)
     for entry in entries:
         cells = (entry.get(column) for column in _COLUMNS)
-        writer.writerow(" ".join(c) if isinstance(c, list) else "" if c is None else c for c in cells)
+        writer.writerow(
+            csv_cell(" ".join(c) if isinstance(c, list) else "" if c is None else c) for c in cells
+        )
     return text.getvalue()

@@ -247,7 +247,7 @@ def _content(where: Path, below: tuple[Path, ...]) -> dict[str, Any]:
         content: dict[str, Any] = tomllib.loads(where.read_text("utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(where), str(error), "TOML") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # no UTF-8, or a name that no file can have
         expected = f"a TOML file or one of: {', '.join(names())}"
         raise InputError(str(where), "no such scenario", expected) from error
     if "extends" not in content:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -18,6 +16,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..texts import toml_key, toml_value
 from .recording import Chunk
 from .truth import FILE as TRUTH_FILE
 
@@ -119,15 +118,11 @@ def dataset_toml(head: dict[str, Any], tables: dict[str, dict[str, Any]], runs: 
     """`dataset.toml` as text: keys of the head, tables of plain values, then the runs."""
     lines = [*_pairs(head)]
     for name, table in tables.items():
-        lines += ["", f"[{name}]", *_pairs(table)]
+        lines += ["", f"[{toml_key(name)}]", *_pairs(table)]
     for run in runs:
         lines += ["", "[[run]]", *_pairs(run)]
     return "\n".join(lines) + "\n"
 
 
 def _pairs(table: dict[str, Any]) -> list[str]:
-    return [f"{key} = {_value(value)}" for key, value in table.items()]
-
-
-def _value(value: Any) -> str:
-    return value.isoformat() if isinstance(value, datetime) else json.dumps(value, ensure_ascii=False)
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]

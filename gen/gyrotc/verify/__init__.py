@@ -48,7 +48,7 @@ def verify(
     compiled: bool = True,
     edited: Sequence[str] = (),
     signature: Path | None = None,
-    compile_differing: bool = False,
+    trust_code: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Verifies `folder/c` against `folder/model.json`; the JSON object of `gyrotc verify`.
@@ -63,7 +63,7 @@ def verify(
         compiled: False: no target; files and bounds are checked against model and reference alone.
         edited: Files of `EDITABLE` that the user made their own: they may differ.
         signature: Public key with which `folder/c` must be signed.
-        compile_differing: Compile and run what lies there although a file differs. It is then code of somebody else.
+        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         progress: Called with the name of each target before it is tried.
 
     Raises:
@@ -81,7 +81,8 @@ def verify(
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
-    job = Job(folder / "c", model, tables, {n: answers(table, vectors) for n, table in tables.items()})
+    expected = {n: answers(table, vectors) for n, table in tables.items()}
+    job = Job(folder / "c", model, tables, expected, trust_code)
     texts = emit_texts(
         model,
         emission,
@@ -92,7 +93,7 @@ def verify(
     emitted = file_entries(job.c_folder, texts, edited)
     signed = check_signature(job.c_folder, key) if key is not None else None
     wrong = [e["file"] for e in emitted if e["status"] == "fail"]
-    barred = wrong and not compile_differing
+    barred = wrong and not trust_code
     identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
@@ -210,7 +211,7 @@ def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> Entry:
 def _every_input(job: Job, model: Model, progress: Progress) -> Entry:
     """The same for every input of the fixed-point table."""
     table = job.tables["q31"]
-    visited = visit_all(job.c_folder, model, table, progress=progress)
+    visited = visit_all(job.c_folder, model, table, trusted=job.trusted, progress=progress)
     sound = visited.mismatches == 0 and visited.worst_dph <= table.error_bound_dph
     return {
         "numeric": "q31",

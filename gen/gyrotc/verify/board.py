@@ -16,6 +16,7 @@ from ..model import Model
 from ..table import Table
 from ..toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
 from .boardlog import BoardOutput, compare, read_output
+from .source import board_files, checked_sources
 
 __all__ = ["Job", "board_entries", "check_identity"]
 
@@ -30,6 +31,7 @@ class Job:
     model: Model
     tables: dict[str, Table]
     expected: dict[str, NDArray[np.uint32]]
+    trusted: bool = False  # the user takes the code of the folder as it is
 
 
 def board_entries(job: Job, target: Target) -> list[dict[str, Any]]:
@@ -46,9 +48,11 @@ def board_entries(job: Job, target: Target) -> list[dict[str, Any]]:
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[dict[str, Any]]:
     """Compiles runtime and table once, and a test program for each arithmetic."""
     shared: list[Path] | CheckFailed
-    sources = [job.c_folder / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
+    files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
     try:
-        shared = compile_objects(target, sources, work, include=job.c_folder)
+        c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
+        sources = [c / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
+        shared = compile_objects(target, sources, work, include=c)
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
@@ -63,19 +67,17 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
         try:
             if isinstance(shared, CheckFailed):
                 raise shared
-            entry |= _one(job, target, numeric, shared, work)
+            entry |= _one(job, target, numeric, shared, work, c)
         except CheckFailed as error:
             entry["error"] = str(error)
         yield entry
 
 
-def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path) -> dict[str, Any]:
+def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path, c: Path) -> dict[str, Any]:
     defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
     if target.counts:
         defines.append('BOARD_HEADER="board.h"')
-    test = compile_objects(
-        target, [job.c_folder / "board_test.c"], work, include=job.c_folder, defines=defines
-    )
+    test = compile_objects(target, [c / "board_test.c"], work, include=c, defines=defines)
     program = work / f"board_{numeric}"
     link(target, [*test, *shared], program)
     run = run_program(target, program)

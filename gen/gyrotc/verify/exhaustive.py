@@ -8,25 +8,30 @@ from __future__ import annotations
 
 import math
 import os
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import Any
 
+from ..confined import confined
 from ..errors import CheckFailed, GyrotcError
 from ..model import Model
 from ..reference.q31 import exp2_table
 from ..table import Table
 from ..toolchain import Target, all_targets, compile_objects, link
+from .source import checked_sources, table_files
 
 __all__ = ["Visited", "visit_all"]
 
 _SLICES = 128  # of exhaustive.c
 _BAR = 32  # characters
+_LIMIT_S = 4 * 3600  # of processor time for one of the processes; all 2^32 inputs take minutes
+_KEPT_LINES = 1000  # exhaustive.c prints fewer than ten
 _COMPILERS = ("host-clang-O3", "host-gcc-O3")
 _SOURCE = Path(__file__).resolve().parent / "exhaustive.c"
 
@@ -53,6 +58,7 @@ def visit_all(
     table: Table,
     *,
     every: int = 1,
+    trusted: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Visited:
     """Visits every pair of positions, or every `every`-th slice of slopes.
@@ -60,6 +66,7 @@ def visit_all(
     Args:
         model: The model that the table was made of.
         table: Its fixed-point table.
+        trusted: Code of the folder that is not gyrotc's is compiled and run, too.
         progress: Called with a line that shows the share done and the time left.
 
     Raises:
@@ -68,7 +75,7 @@ def visit_all(
     """
     target = _host()
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        program = _compiled(target, c_folder, model, Path(work))
+        program = _compiled(target, c_folder, model, Path(work), trusted=trusted)
         parts = os.cpu_count() or 1
         lines = list(_numbers(model, table))
         done = _Counter(progress or (lambda _: None))
@@ -87,14 +94,13 @@ def _host() -> Target:
     raise GyrotcError("no C compiler: install clang or gcc")
 
 
-def _compiled(target: Target, c_folder: Path, model: Model, work: Path) -> Path:
-    emitted = compile_objects(
-        target, [c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"], work, include=c_folder
-    )
+def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trusted: bool) -> Path:
+    c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
+    emitted = compile_objects(target, [c / "gtc.c", c / f"gtc_{model.id}.c"], work, include=c)
     # The program itself is no code for targets: it may use what the host has.
     loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})
     defines = [f"TABLE=gtc_{model.symbol}_q31", f'HEADER="gtc_{model.id}.h"']
-    (own,) = compile_objects(loose, [_SOURCE], work, include=c_folder, defines=defines)
+    (own,) = compile_objects(loose, [_SOURCE], work, include=c, defines=defines)
     program = work / "exhaustive"
     link(target.model_copy(update={"link": (*target.link, "-lm")}), [own, *emitted], program)
     return program
@@ -143,21 +149,18 @@ class _Counter:
 def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:
     """Lines that one process printed, without its progress."""
     kept: list[str] = []
-    with subprocess.Popen(
-        [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    with confined(
+        [str(program)], program.parent, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, cpu_s=_LIMIT_S
     ) as process:
         assert process.stdin is not None and process.stdout is not None
-        try:
-            process.stdin.write("\n".join(lines) + "\n")
-            process.stdin.close()
-            for line in process.stdout:
-                if line.startswith("progress"):
-                    done.one_more()
-                else:
-                    kept.append(line.strip())
-        except BaseException:
-            process.kill()
-            raise
+        with suppress(BrokenPipeError), process.stdin:  # its status says that it ended early
+            process.stdin.write(("\n".join(lines) + "\n").encode("ascii"))
+        for line in process.stdout:
+            if line.startswith(b"progress"):
+                done.one_more()
+            elif len(kept) < _KEPT_LINES:
+                kept.append(line.decode("ascii", "replace").strip())
+        process.wait()
     if process.returncode != 0:
         raise CheckFailed(f"the visit of all inputs ended with status {process.returncode}")
     return kept

@@ -6,11 +6,11 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
-
 from ..model import Model
 from ..table import Table
+from ..texts import c_environment
 from ..toolchain import Target, all_targets, compile_objects, link, symbols
+from .source import checked_sources, table_files
 
 __all__ = ["Footprint", "footprint"]
 
@@ -27,31 +27,28 @@ class Footprint:
     ram_bytes: int
 
 
-def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
+def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = False) -> Footprint | None:
     """Links self-test, init, sample and bias of a table for a Cortex-M4F, or the host where there is none.
 
     Returns:
         The sizes; None where nothing can be compiled.
 
     Raises:
-        CheckFailed: The compiler refused the emitted code.
+        CheckFailed: The compiler refused the emitted code, or it is not gyrotc's and not `trusted`.
     """
     target = next((t for name in _TARGETS if (t := all_targets()[name]).missing() is None), None)
     if target is None:
         return None
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    text = environment.get_template("footprint.c.j2").render(
-        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    text = (
+        c_environment()
+        .get_template("footprint.c.j2")
+        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         source = Path(work) / "footprint.c"
         source.write_text(text, encoding="ascii")
-        return _measured(target, c_folder, [c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"], source)
+        c = checked_sources(c_folder, Path(work), table_files(model), trusted=trusted)
+        return _measured(target, c, [c / "gtc.c", c / f"gtc_{model.id}.c"], source)
 
 
 def _measured(target: Target, c_folder: Path, sources: list[Path], main: Path) -> Footprint:

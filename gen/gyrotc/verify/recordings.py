@@ -67,7 +67,7 @@ def replay_dataset(
         for lane in lanes.values():
             try:
                 lane.program = stack.enter_context(
-                    replay_program(job.c_folder, job.model, lane.table, lane.target)
+                    replay_program(job.c_folder, job.model, lane.table, lane.target, trusted=job.trusted)
                 )
             except CheckFailed as error:
                 lane.error = str(error)

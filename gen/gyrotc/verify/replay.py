@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +22,9 @@ from ..frontend import missed_before, samples_per_block
 from ..model import Model
 from ..reference import Replay, replay
 from ..table import Table, Words
+from ..texts import c_environment
 from ..toolchain import Target, compile_c, run_program
+from .source import checked_sources, table_files
 
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
 
@@ -76,27 +77,26 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
 
 
 @contextmanager
-def replay_program(c_folder: Path, model: Model, table: Table, target: Target) -> Iterator[Path]:
+def replay_program(
+    c_folder: Path, model: Model, table: Table, target: Target, *, trusted: bool = False
+) -> Iterator[Path]:
     """The replay program of a table, compiled for a target.
 
     Raises:
-        CheckFailed: The compiler refused.
+        CheckFailed: The compiler refused, or the folder holds other code than gyrotc's and is not `trusted`.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    text = environment.get_template("replay.c.j2").render(
-        id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels
+    text = (
+        c_environment()
+        .get_template("replay.c.j2")
+        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         source = Path(work) / "replay.c"
         source.write_text(text, encoding="ascii")
         program = Path(work) / "replay"
-        sources = [source, c_folder / "gtc.c", c_folder / f"gtc_{model.id}.c"]
-        compile_c(target, sources, program, include=c_folder)
+        c = checked_sources(c_folder, Path(work), table_files(model), trusted=trusted)
+        sources = [source, c / "gtc.c", c / f"gtc_{model.id}.c"]
+        compile_c(target, sources, program, include=c)
         yield program
 
 

@@ -1,0 +1,665 @@
+"""500 hostile strings through every field that a user or a file can set: nothing that comes out obeys them."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import jinja2
+import pytest
+from emitted import recorded
+from gyrotc import report
+from gyrotc.commands import base
+from gyrotc.commands.results import evaluation_table, verify_table
+from gyrotc.dataset import load
+from gyrotc.dataset.problems import Problems
+from gyrotc.dataset.schema import parse_description
+from gyrotc.diagnosis import extended_scenario
+from gyrotc.diagnosis_page import write_page
+from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.errors import InputError
+from gyrotc.evaluate import evaluate
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.page import write_summary
+from gyrotc.limits import load_limits
+from gyrotc.model import Model, table_id
+from gyrotc.plots import STYLE, svg
+from gyrotc.simulate import scenario
+from gyrotc.simulate.write import dataset_toml
+from gyrotc.texts import (
+    C_COMMENT,
+    c_code,
+    c_comment,
+    c_environment,
+    c_literal,
+    checked_svg,
+    csv_cell,
+    file_stem,
+    picture_text,
+    terminal_text,
+    toml_comment,
+    toml_key,
+    toml_value,
+)
+from gyrotc.verify import verify
+from gyrotc.verify.source import checked_sources, table_files
+from hostile import hostile_strings
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+HOSTILE = hostile_strings()
+AT_ONCE = 50
+GCC = (
+    "gcc",
+    "-std=c99",
+    "-trigraphs",
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wcomment",
+    "-Wtrigraphs",
+    "-Werror",
+    "-fsyntax-only",
+)
+
+
+def _groups() -> Iterator[list[str]]:
+    yield from (HOSTILE[k : k + AT_ONCE] for k in range(0, len(HOSTILE), AT_ONCE))
+
+
+def test_there_are_five_hundred_of_them() -> None:
+    assert len(set(HOSTILE)) == 500
+
+
+# ---- C ----
+
+
+def test_comments_and_literals_hold_the_allowed_alone_and_benign_text_as_it_is() -> None:
+    for text in HOSTILE:
+        comment, literal = c_comment(text), c_literal(text)
+        assert C_COMMENT.fullmatch(comment) and len(comment) <= 1000
+        assert re.fullmatch(r"[ -!#-$&->@-\[\]-~]*", literal) and len(literal) <= 64
+    for text in (
+        "RLG-0042",
+        "ramp 1 C/min, 2 x -40 ... 60 C",
+        "http://x.org/a?b=1&c",
+        "K. Meyer (lab 3); 50 % load",
+    ):
+        assert c_comment(text) == text
+    assert c_comment("Grün*/\n??/") == "Gr<U+00FC>n*<U+002F><U+000A>?<U+003F>/"
+    assert c_comment("x" * 2000).endswith("x...")
+
+
+def test_no_field_of_a_model_reaches_the_compiler(model_dict: dict[str, Any], tmp_path: Path) -> None:
+    """Keys and values of [meta], warnings, environments, names of files, descriptions; every string in each."""
+    emission = quantise_all(Model.from_dict(model_dict), None)
+    for group in _groups():
+        meta: dict[str, Any] = dict(zip(group, reversed(group), strict=True))
+        meta |= {"warnings": group, "environments": group, "description": "".join(group)}
+        data = [model_dict["data"][0] | {"file": text} for text in group]
+        model = Model.from_dict(model_dict | {"meta": meta, "data": data})
+        texts = emit_texts(model, emission, zero_at=20.0)
+        c = tmp_path / "c"
+        c.mkdir(exist_ok=True)
+        for name, content in texts.items():
+            (c / name).write_bytes(content)
+            assert name.endswith((".bin", ".h", ".c")) or content.isascii()
+        work = tmp_path / "work"
+        work.mkdir(exist_ok=True)
+        checked_sources(c, work, table_files(model))  # the grammar of what is compiled accepts it
+        sources = [str(c / n) for n in texts if n.endswith(".c") and n != "gtc.c"]
+        done = subprocess.run([*GCC, *sources], cwd=c, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[:2000]
+        code = re.sub(r"/\*.*?\*/", "", texts["gtc_rlg_0042.h"].decode("ascii"), flags=re.DOTALL)
+        assert all(_HEADER_WORDS.fullmatch(word) for word in re.findall(r"\w+", code))
+
+
+_HEADER_WORDS = re.compile(
+    r"ifndef|define|endif|ifdef|include|extern|const|C|__cplusplus|gtc|h|GTC_RLG_0042_(H_INCLUDED|ID)"
+    r"|gtc_(f32|q31)_table_t|gtc_rlg_0042_(f32|q31)|0x[0-9a-f]{8}UL"
+)
+
+
+def test_a_serial_is_harmless_or_refused(model_dict: dict[str, Any]) -> None:
+    taken = 0
+    for text in HOSTILE:
+        try:
+            model = Model.from_dict(model_dict | {"serial": text})
+        except ValueError:
+            continue
+        taken += 1
+        assert re.fullmatch("[A-Za-z0-9._-]{1,64}", text)
+        assert re.fullmatch("[a-z0-9_]{1,27}", model.id) and c_literal(text) == text == c_comment(text)
+    assert 0 < taken < 20
+    assert table_id("..", None) != table_id("__", None)
+
+
+def test_templates_of_c_refuse_text_that_nothing_made_safe() -> None:
+    template = c_environment().from_string("static int x = {{ value }};")
+    for value in (7, "RLG_1", c_comment("a */ b"), c_literal('"'), c_code("V(0.5F)")):
+        template.render(value=value)
+    for value in ("a b", "1;", 'system("x")', "a-b", 0.5, None, True, ["a"], b"a", "\n"):
+        with pytest.raises(ValueError, match="nothing made safe"):
+            template.render(value=value)
+    with pytest.raises(jinja2.UndefinedError):
+        template.render()
+    for text in [*(set(HOSTILE) - {"-1"}), "V(x)", "0x1UL; int x", "f()", "&gtc_f32_term_x, "]:
+        with pytest.raises(ValueError, match="not an initialiser"):
+            c_code(text)
+
+
+# ---- pages and pictures ----
+
+
+class _Page(HTMLParser):
+    """Elements with the names of their attributes, in order."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, ...]] = []
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, *(name for name, _ in attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        self.elements.append(("/" + tag,))
+
+    def handle_decl(self, decl: str) -> None:
+        self.elements.append(("!", decl))
+
+    def handle_comment(self, data: str) -> None:
+        self.elements.append(("!--", data))
+
+
+_KEPT = ("schema", "verdict", "family", "status")  # words that decide what a page shows
+
+
+def _with(value: Any, text: Callable[[], str], key: str = "") -> Any:
+    """The same object with another text in every field that holds one, and in every key that is no field's name."""
+    if isinstance(value, dict):
+        return {text() if k.startswith("?") else k: _with(v, text, k) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_with(v, text, key) for v in value]
+    return text() if isinstance(value, str) and key not in _KEPT else value
+
+
+def _same_page(draw: Callable[[Callable[[], str]], str]) -> None:
+    """Whatever the texts are, a page has the same elements and attributes as with plain ones."""
+    plain = _Page(draw(lambda: "plain text"))
+    assert len(plain.elements) > 20
+    for start in range(0, len(HOSTILE), 10):
+        place = iter(range(start, 10**9, 10))
+
+        def text(place: Iterator[int] = place) -> str:
+            k = next(place) % len(HOSTILE)
+            return "x" + " ".join(HOSTILE[k : k + 10])
+
+        page = draw(text)
+        assert _Page(page).elements == plain.elements
+        assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u202e\ud800-\udfff]", page)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """A data set, what evaluate and verify say of a model on it (nothing compiled), and the folder."""
+    folder = tmp_path_factory.mktemp("hostile")
+    dataset = recorded(folder / "data")
+    from emitted import emitted
+
+    made = emitted(folder / "result")
+    return {
+        "folder": made,
+        "evaluation": evaluate(made, dataset, compiled=False),
+        "verification": verify(made, compiled=False),
+    }
+
+
+_RAN = {
+    "name": "host",
+    "numeric": "f32",
+    "status": "fail",
+    "compiler": "gcc",
+    "error": "text",
+    "package": "gcc",
+    "mismatches": 1,
+    "vectors": 2,
+    "first_mismatches": ["vector 0"],
+    "replayed": {"rows": 1, "mismatches": 1, "first_mismatches": ["row 0"], "error": "text"},
+}
+_CHANGES = {
+    "same_model": False,
+    "map": None,
+    "figures": {"?name": {"before": 1.0, "after": "text"}},
+    "versions": {"?numpy": {"before": "1", "after": "2"}},
+    "recordings": {"gone": ["a.csv"]},
+    "findings": {"new": ["text"]},
+    "files": {"changed": ["text"]},
+}
+_LIMITS = {
+    "product": "text",
+    "met": False,
+    "limits": [{"limit": "text", "bound": "text", "measured": ["text"], "met": False}],
+}
+_MANIFEST = {"gyrotc_version": "1", "versions": {"?numpy": "1"}, "refused": {"?q31": "text"}}
+
+
+def test_the_report_of_a_build(
+    result: dict[str, Any], model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(("bias", "map", "curve", "allan")))
+    finding = {"id": "text", "text": "text", "evidence": {}}
+    evaluation = result["evaluation"] | {"findings": [finding]}
+    evaluation["runs"] = [run | {"environment": "text"} for run in evaluation["runs"]]
+    verification = result["verification"] | {
+        "targets": [_RAN],
+        "emitted": [{"file": "f", "status": "fail", "mismatches": 1}],
+    }
+    terms = [{"id": "auxiliary", "parameters": {"slope_dph_per_unit": 1.0, "reference": 0.0}, "channel": "c"}]
+    diagnosis = {"text": "text", "measured_on": "exam", "extended": None}
+
+    def draw(text: Callable[[], str]) -> str:
+        meta = {text(): text(), "warnings": [text()], "calibrated_on": text(), "description": text()}
+        data = [model_dict["data"][0] | {"file": text()}]
+        terms[0]["channel"] = text()
+        Model.from_dict(model_dict | {"meta": meta, "data": data, "terms": terms}).save(
+            tmp_path / "model.json"
+        )
+        for name, content in {
+            "evaluate": evaluation,
+            "verify": verification,
+            "manifest": _MANIFEST,
+            "limits": _LIMITS,
+            "changes": _CHANGES,
+            "diagnosis/diagnose": diagnosis,
+        }.items():
+            (tmp_path / "diagnosis").mkdir(exist_ok=True)
+            (tmp_path / f"{name}.json").write_text(json.dumps(_with(content, text)))
+        return report.write_report(tmp_path).read_text("utf-8")
+
+    _same_page(draw)
+
+
+_INTERVAL = {"value": 1.0, "low": 0.5, "high": 2.0}
+_DIAGNOSIS: dict[str, Any] = {
+    "schema": "gyrotc.diagnose/1",
+    "gyrotc_version": "1",
+    "serial": "s",
+    "axis": "x",
+    "verdict": "explained",
+    "text": "t",
+    "meaning": "m",
+    "next": ["text"],
+    "missing": ["text"],
+    "average_s": 100.0,
+    "noise_floor_dph": 1e-3,
+    "single_cycle": None,
+    "pictures": [],
+    "extended": None,
+    "baseline": {"exam_rms_dph": 1e-3, "centers": 3},
+    "measured_on": "exam",
+    "estimated_noise": {"arw_deg_per_sqrt_h": 1e-4},
+    "scenario": "s.toml",
+    "discrepancies": [
+        {
+            "statistic": "s",
+            "measured": 1.0,
+            "simulated_low": 0.0,
+            "simulated_high": 1.0,
+            "p_value": 0.001,
+            "extended": None,
+        }
+    ],
+    "unexplained": {
+        "best_partial_match": ["text"],
+        "share_explained": 0.5,
+        "p_value": 0.1,
+        "looks_like": "text",
+    },
+    "causes": [
+        {
+            "id": "auxiliary",
+            "family": family,
+            "name": "name",
+            "p_value": 0.001,
+            "channel": "c",
+            "signature": "s",
+            "remedy": "r",
+            "gain": None,
+            "parameters": {"?slope": _INTERVAL},
+            "equivalent": ["text"],
+            "equivalent_channels": ["text"],
+            "separate_by": "text",
+        }
+        for family in ("auxiliary", "noise")
+    ],
+    "considered": [
+        {
+            "id": "i",
+            "channel": "c",
+            "p_value": None,
+            "not_testable": "text",
+            "detection_limit": {"value": 1.0, "unit": "u", "parameter": "p", "over": [[1.0, 2.0]]},
+        }
+    ],
+}
+
+
+def test_the_page_of_a_diagnosis(tmp_path: Path) -> None:
+    def draw(text: Callable[[], str]) -> str:
+        (tmp_path / "diagnose.json").write_text(json.dumps(_with(_DIAGNOSIS, text)))
+        return write_page(tmp_path).read_text("utf-8")
+
+    _same_page(draw)
+
+
+def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str, Any]) -> None:
+    entries = [
+        {"name": "n", "serial": "s", "axis": None, "status": "failed", "reason": "text", "dataset": "d"},
+        {
+            "name": "n",
+            "serial": "s",
+            "axis": "x",
+            "status": "done",
+            "judged_on": "exam",
+            "before_rms_dph": 1.0,
+            "after_rms_dph": None,
+            "rms_over_floor": None,
+            "noise_floor_dph": None,
+            "bias_dph": 0.0,
+            "centers": 1,
+            "table_bytes": 2,
+            "sum_abs_weights_dph": 0.0,
+            "error_bound_dph": 0.0,
+            "findings": ["text"],
+            "model_hash": "h",
+            "after_mean_dph": None,
+        },
+    ]
+
+    def fleet(text: Callable[[], str]) -> str:
+        write_summary(tmp_path, _with(entries, text))
+        return (tmp_path / "fleet.html").read_text("utf-8")
+
+    def axes(text: Callable[[], str]) -> str:
+        found = result["evaluation"] | {"findings": [{"id": "text"}]}
+        models = [_with({"serial": "s"}, text)]
+        return (
+            report.page_environment()
+            .get_template("axes.html.j2")
+            .render(models=models, results=[_with(found, text)])
+        )
+
+    _same_page(fleet)
+    _same_page(axes)
+    for text in HOSTILE:
+        cell = csv_cell(text)
+        assert cell[:1] not in tuple("=+-@\t\r\n") and "\x1b" not in cell
+
+
+def test_the_page_of_a_plan(tmp_path: Path) -> None:
+    """Its template alone: its pictures are drawn of the same texts below."""
+    over = {"value": 1.0, "unit": "u", "parameter": "p", "over": [[1.0, 2.0]]}
+    plan = {
+        "scenario": "s",
+        "runs": [{"profile": "p"}],
+        "hours": 1.0,
+        "noise": {"arw_deg_per_sqrt_h": 1e-4},
+        "bias_range_dph": [0.0, 1.0],
+        "limits": [{"id": "i", "detection_limit": over}],
+        "not_testable": {"?id": "why"},
+        "hard_to_separate": [{"pair": ["a", "b"], "d": 9.0, "add": "t"}],
+        "shortest": {"required": {"?id": 1.0}, "runs": ["a"], "hours": 1.0},
+        "additions": {"pair": ["a", "b"], "runs": [{"profile": "a", "hours": 1.0, "d": 3.0}]},
+    }
+
+    def draw(text: Callable[[], str]) -> str:
+        template = report.page_environment().get_template("plan.html.j2")
+        return template.render(p=_with(plan, text), temperatures="", matrix="", accuracy="")
+
+    _same_page(draw)
+
+
+def test_pictures_show_every_text_as_it_is() -> None:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    shown = [text for text in HOSTILE if text.strip()]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10.0, 60.0))
+        for k, text in enumerate(shown):
+            figure.text(0.0, k / len(shown), f"{picture_text(text)} (train)")
+        root = ElementTree.fromstring(str(svg(figure)))
+    drawn = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    wanted = [f"{picture_text(text)} (train)".replace(r"\$", "$") for text in shown]
+    assert [" ".join(str(t).split()) for t in drawn] == [" ".join(t.split()) for t in wanted]
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">{}</svg>'
+
+
+def test_a_picture_of_somebody_elses_folder_does_nothing_but_draw(tmp_path: Path) -> None:
+    assert checked_svg(SVG.format('<path d="M 0 0"/><use xlink:href="#a"/>')).__html__()
+    for inside in (
+        "<script>alert(1)</script>",
+        '<path onload="alert(1)"/>',
+        '<a href="javascript:alert(1)"/>',
+        '<use xlink:href="http://x/y.svg#z"/>',
+        "<foreignObject><body/></foreignObject>",
+        '<image href="https://x/y.png"/>',
+        '<rect style="fill:url(http://x)"/>',
+        "<style>@import 'x'</style>",
+        "<!-- x -->",
+        "<![CDATA[x]]>",
+        "<g>",
+        "<animate/>",
+        '<image href="data:text/html,x"/>',
+        '<h:script xmlns:h="http://www.w3.org/1999/xhtml"/>',
+    ):
+        with pytest.raises(ValueError, match=r"is no|holds|refers"):
+            checked_svg(SVG.format(inside))
+        (tmp_path / "pictures").mkdir(exist_ok=True)
+        (tmp_path / "pictures" / "residual.svg").write_text(SVG.format(inside))
+        (tmp_path / "diagnose.json").write_text(
+            json.dumps(_DIAGNOSIS | {"pictures": ["pictures/residual.svg"]})
+        )
+        with pytest.raises(InputError, match=r"residual\.svg"):
+            write_page(tmp_path)
+    for text in HOSTILE:
+        with pytest.raises(ValueError, match="is no"):
+            checked_svg(text)
+
+
+# ---- TOML ----
+
+
+def test_toml_reads_back_what_was_written() -> None:
+    head = dict(zip(HOSTILE, reversed(HOSTILE), strict=True))
+    runs = [{"file": text, "exclude": [{"reason": text, "from_s": 1e-05}]} for text in HOSTILE]
+    assert tomllib.loads(dataset_toml(head, {}, runs)) == head | {"run": runs}
+    for text in HOSTILE:
+        tables = {text: {text: [text, 1, 1.5, True]}} if text != "run" else {}
+        assert tomllib.loads(dataset_toml({"a": 1}, tables, [])) == {"a": 1, **tables}
+        assert tomllib.loads(f"# {toml_comment(text)}\n{toml_key(text)} = {toml_value(text)}") == {text: text}
+    assert tomllib.loads("a = " + toml_value("\ud800")) == {"a": "<U+D800>"}
+
+
+def test_the_scenario_of_a_diagnosis_reads_back() -> None:
+    for text in HOSTILE:
+        cause = _DIAGNOSIS["causes"][0] | {"channel": text, "parameters": {text: _INTERVAL}}
+        written = extended_scenario(_DIAGNOSIS | {"serial": text, "causes": [cause]})
+        assert written is not None
+        content = tomllib.loads(written)
+        assert content["channel"][0]["name"] == content["cause"][0]["channel"] == text
+        assert content["title"].endswith(text) and set(content) == {
+            "extends",
+            "title",
+            "noise",
+            "channel",
+            "cause",
+        }
+
+
+_FREE = """
+schema = 1
+serial = "s"
+description = {0}
+{1} = 1
+[meta]
+{1} = {0}
+[[run]]
+file = "a.csv"
+environment = {0}
+exclude = [{{reason = {0}, from_s = 1.0, to_s = 2.0}}]
+{1} = 1
+"""
+_BOUND = """
+schema = 1
+serial = {0}
+earth_rate = {0}
+applied_table = {0}
+columns = {{time = {0}, temperature = {0}, rate = {0}}}
+[noise]
+{1} = 1.0
+[[run]]
+file = "a.csv"
+role = {0}
+started = {0}
+power_on_s = {0}
+[[run]]
+file = {0}
+"""
+
+
+def test_a_description_is_read_or_refused_in_words(tmp_path: Path) -> None:
+    """Every field of dataset.toml that holds a text, and keys that it does not have."""
+    path = tmp_path / "dataset.toml"
+    for text in HOSTILE:
+        for form in (_FREE, _BOUND):
+            path.write_text(form.format(toml_value(text), toml_key(text)), "utf-8")
+            problems = Problems(collect=True)
+            parse_description(path, problems)
+            for problem in problems.found:
+                assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f]", terminal_text(str(problem)))
+
+
+def test_columns_of_a_recording_are_told_as_they_are(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    """Names of columns that one run of several has."""
+    names = [text for text in map(str.strip, HOSTILE) if text.isprintable() and '"' not in text]
+    names = [name for name in dict.fromkeys(names) if 1 <= len(name) <= 64]
+    header = ",".join(["time_s", "temperature_c", "rate_dph", *(f'"{n}"' for n in names)])
+    rows = [f"{10 * k},{20 + k / 10},0.001" for k in range(60)]
+    (tmp_path / "a.csv").write_text(
+        "\n".join([header, *(r + ",1.0" * len(names) for r in rows)]) + "\n", "utf-8"
+    )
+    (tmp_path / "b.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *rows]) + "\n", "utf-8")
+    description = 'schema = 1\nserial = "s"\n[[run]]\nfile = "a.csv"\n[[run]]\nfile = "b.csv"\n'
+    (tmp_path / "dataset.toml").write_text(description)
+    dataset = load(tmp_path)
+    assert len(dataset.warnings) == len(names) > 100
+    model = Model.from_dict(model_dict | {"meta": {"warnings": list(dataset.warnings)}})
+    texts = emit_texts(model, quantise_all(model, ["f32"]))
+    for name, content in texts.items():
+        (tmp_path / name).write_bytes(content)
+    assert checked_sources(tmp_path, tmp_path, table_files(model)) == tmp_path
+
+
+def _read_or_refused(read: Callable[[], object]) -> None:
+    try:
+        read()
+    except InputError as error:
+        assert "\x1b" not in terminal_text(str(error))
+
+
+def test_manifests_limits_and_scenarios_are_read_or_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    for text in HOSTILE:
+        word, key = toml_value(text), toml_key(text)
+        options = f"[options]\nmethod = {word}\n[[unit]]\ndataset = {word}"
+        for content in (f"datasets = [{word}]", f"limits = {word}", f"axis = {word}", options, f"{key} = 1"):
+            path.write_text(f"schema = 1\n{content}\n", "utf-8")
+            _read_or_refused(lambda: load_manifest(path))
+        for content in (f"product = {word}", f"[at_most]\n{key} = 1.0", f"[needs]\ntargets = [{word}]"):
+            path.write_text(f"schema = 1\n{content}\n", "utf-8")
+            _read_or_refused(lambda: load_limits(path))
+        for content in (
+            f"title = {word}",
+            f"[[channel]]\nname = {word}\n[[cause]]\nid = {word}",
+            f"{key} = 1",
+            f'extends = {word}\ntitle = "x"',
+            f"[gyro]\nserial = {word}",
+        ):
+            ground = "" if content.startswith("extends") else 'extends = "paper"\n'
+            path.write_text(f"{ground}{content}\n", "utf-8")
+            _read_or_refused(lambda: scenario.read(path))
+
+
+# ---- file names and terminals ----
+
+
+def test_names_of_files_stay_in_their_folder_and_differ(tmp_path: Path) -> None:
+    stems = [file_stem(text) for text in HOSTILE]
+    assert len(set(stems)) == len(HOSTILE)
+    for stem in stems:
+        assert "/" not in stem and not stem.startswith((".", "-")) and len(stem.encode()) <= 200
+        (tmp_path / (stem + "@123.5.csv")).write_text("")
+    assert file_stem("run-01") == "run-01" and file_stem("Lauf ä (1)") != "Lauf ä (1)"
+    assert file_stem("\udcff").isprintable()
+
+
+def test_terminals_show_every_text_and_obey_none(
+    result: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = io.StringIO()
+    console = type(base.OUT)(file=stream, force_terminal=True, color_system=None, width=10**4)
+    monkeypatch.setattr(base, "OUT", console)
+    for text in HOSTILE:
+        base.tell(text)
+    evaluation = result["evaluation"]
+    evaluation = evaluation | {
+        "runs": [evaluation["runs"][0] | {"environment": t, "file": t} for t in HOSTILE[:400]]
+    }
+    console.print(evaluation_table(evaluation | {"serial": "[/x] " + "".join(HOSTILE)}))
+    console.print(verify_table({"targets": [_RAN | {"name": t} for t in HOSTILE]}))
+    said = re.sub(r"\x1b\[\d*(;\d+)*m", "", stream.getvalue())  # rich's own, bold and plain
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u202e]", said)
+    for text in ("[/bold]", "[red]", ":smile:", "<U+001B>[2J", "<U+202E>", "[link=http://x]"):
+        assert said.count(text) > 3
+
+
+def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = io.StringIO()
+    monkeypatch.setattr(base, "ERR", type(base.ERR)(file=stream, force_terminal=True, width=200))
+    with base.progress() as say:
+        for text in HOSTILE:
+            say(f"replaying {text}")
+
+
+# ---- one place ----
+
+PACKAGE = Path(report.__file__).parent
+_ELSEWHERE = re.compile(
+    r"jinja2\.Environment\(|\bMarkup\(|shell=True|os\.system|os\.popen|from_markup|autoescape"
+)
+
+
+def test_nothing_else_builds_such_text() -> None:
+    """Templates come from the two environments of texts; none lets text through unescaped; no shell is given text."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "texts.py":
+            assert not _ELSEWHERE.search(path.read_text("utf-8")), path
+    assert _ELSEWHERE.search((PACKAGE / "texts.py").read_text("utf-8"))
+    for path in (PACKAGE / "templates").iterdir():
+        assert not re.search(r"\|\s*safe|autoescape|\|\s*attr", path.read_text("utf-8")), path
