@@ -145,8 +145,9 @@ def _check_edited(names: Sequence[str]) -> None:
 
 def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[Entry]:
     """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
-    reason = f"not compiled: {wrong[0]}" + (f" and {len(wrong) - 1} more files" if len(wrong) > 1 else "")
-    entry = {"status": "fail", "error": f"{reason} not as gyrotc makes it"}
+    more = f" (and {len(wrong) - 1} more files)" if len(wrong) > 1 else ""
+    reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}; --trust-code runs it all the same"
+    entry = {"status": "fail", "error": reason}
     pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
     return [{"name": name, "numeric": numeric} | entry for name, numeric in pairs]
 
