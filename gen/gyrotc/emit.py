@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from .amalgamate import amalgamate, runtime_folders
 from .errors import CheckFailed, InputError
+from .inputs import read_input
 from .model import Model
 from .quantise import NUMERICS, Table, quantise
 from .reference import answers
@@ -40,6 +41,8 @@ __all__ = [
     "quantise_all",
     "replace_folder",
 ]
+
+_ZERO_AT_C = (-200.0, 400.0)
 
 
 _MADE_BY = re.compile(
@@ -115,17 +118,17 @@ def emitted_model(folder: Path, model: Model) -> Model:
     """
     found = _MADE_BY.findall(_emitted_header(folder, model))
     zero_at = found[-1] if found else ""  # an entry of [meta] may look like it, and stands before it
-    return model.zeroed_at(float(zero_at)) if zero_at else model
+    if not zero_at:
+        return model
+    if not _ZERO_AT_C[0] <= float(zero_at) <= _ZERO_AT_C[1]:
+        where = f"{folder / f'gtc_{model.id}.h'}, --zero-at"
+        raise InputError(where, zero_at[:40], f"{_ZERO_AT_C[0]:g} ... {_ZERO_AT_C[1]:g} C")
+    return model.zeroed_at(float(zero_at))
 
 
 def _emitted_header(folder: Path, model: Model) -> str:
     header = folder / f"gtc_{model.id}.h"
-    try:
-        return header.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise InputError(
-            str(header), f"cannot be read ({error.strerror})", "a folder that emit wrote"
-        ) from error
+    return read_input(header, "result_mib", "a folder that emit wrote").decode("ascii", "replace")
 
 
 def replace_folder(folder: Path, files: dict[str, bytes]) -> None:

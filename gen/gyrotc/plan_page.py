@@ -6,12 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
-from .errors import InputError
 from .model import write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
-from .report import page_environment, read_json
+from .report import page_environment, page_from
+from .stored import read_result
 
 __all__ = ["is_plan", "write_plan", "write_plan_page"]
 
@@ -33,8 +31,8 @@ def write_plan_page(folder: Path) -> Path:
     Raises:
         InputError: `plan.json` is missing or broken.
     """
-    result = read_json(folder / "plan.json")
-    try:
+    result = read_result(folder / "plan.json", "plan")
+    with page_from(folder / "plan.json"):
         text = (
             page_environment()
             .get_template("plan.html.j2")
@@ -45,8 +43,6 @@ def write_plan_page(folder: Path) -> Path:
                 accuracy=accuracy_by_hours(result),
             )
         )
-    except (KeyError, TypeError, jinja2.UndefinedError) as error:
-        raise InputError(str(folder / "plan.json"), f"lacks {error}", "a result of plan") from error
     path = folder / "report.html"
     write_atomically(path, text)
     return path

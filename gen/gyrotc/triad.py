@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from .emit import emitted_tables
 from .errors import CheckFailed
 from .model import load_model, write_atomically
 from .report import page_environment
+from .stored import read_result
 from .texts import c_environment
 from .toolchain import all_targets, compile_c, run_program
 
@@ -41,7 +41,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     main = c_environment().get_template("main_axes.c.j2").render(models=models, n=numerics[0])
     (c / "main.c").write_text(main, encoding="ascii")
     _run_together(c, [m.id for m in models])
-    results = [json.loads((folder / axis / "evaluate.json").read_text(encoding="utf-8")) for axis in axes]
+    results = [read_result(folder / axis / "evaluate.json", "evaluate") for axis in axes]
     text = page_environment().get_template("axes.html.j2").render(models=models, results=results)
     write_atomically(folder / "report.html", text)
 

@@ -12,6 +12,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 # From left to right. A stage is a module or a package of gyrotc.
 ORDER = [
     "errors",
+    "inputs",
+    "stored",
     "texts",
     "_core",
     "terms",
@@ -57,6 +59,7 @@ ORDER = [
     "build",
     "fleet",
     "commands",
+    "crash",
     "cli",
 ]
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import CheckFailed, InputError
+from ..errors import CheckFailed
+from ..inputs import read_input
 from ..reference import answers
 from ..vectors import Vectors
 from .board import Job, checked_output
 from .boardlog import BoardOutput, compare, read_output
 
-__all__ = ["log_entries"]
+__all__ = ["log_entries", "log_parts"]
 
 
 def log_entries(job: Job, vectors: Vectors, log: Path) -> list[dict[str, Any]]:
@@ -23,16 +24,27 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> list[dict[str, Any]]:
         CheckFailed: It does not hold a whole board test of this model.
     """
     try:
-        text = log.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise InputError(
-            str(log), f"cannot be read ({error.strerror})", "the output of board_test.c"
-        ) from error
-    try:
-        parts = [checked_output(text, job, part.numeric) for part in read_output(text)]
+        parts = [checked_output(_text(log), job, part.numeric) for part in log_parts(log)]
         return [_entry(job, vectors, log, part) for part in parts]
     except CheckFailed as error:
         raise CheckFailed(f"{log}: {error}") from error
+
+
+def _text(log: Path) -> str:
+    return read_input(log, "result_mib", "the output of board_test.c").decode("ascii", "replace")
+
+
+def log_parts(log: Path) -> list[BoardOutput]:
+    """The parts of a log.
+
+    Raises:
+        InputError: The file cannot be read.
+        CheckFailed: It is not whole.
+    """
+    try:
+        return read_output(_text(log))
+    except (ValueError, LookupError, ArithmeticError) as error:
+        raise CheckFailed(f"a line of the output is damaged ({error})") from error
 
 
 def _entry(job: Job, vectors: Vectors, log: Path, output: BoardOutput) -> dict[str, Any]:
