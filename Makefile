@@ -60,7 +60,7 @@ cov:
 	@tools/setup.sh test
 	@$(PYTHON) tools/coverage.py
 
-## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC, SEED=1
+## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC; 20,000 damaged files; SEED=1
 fuzz:
 	@tools/setup.sh test
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
@@ -70,6 +70,7 @@ fuzz:
 	    -print_final_stats=1 build/corpus/$$target $$(ls -d tests/fuzz/corpus/$$target 2>/dev/null) || exit 1; \
 	done
 	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric $(or $(STORM),1000000) $(or $(SEED),1) || exit 1; done
+	@$(PYTHON) tests/py/mutants.py --count 20000 --seed "$${SEED:-1}"
 
 ## the pictures of a report and of a diagnosis in README.md, by a headless browser
 picture: demo

@@ -6,7 +6,6 @@ envelope is the drift of the gyro, of its thermometer or of the procedure, and b
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from . import __version__
 from .errors import InputError
 from .model import Model, load_model
+from .stored import read_result
 
 __all__ = ["Earlier", "changes_since", "load_earlier"]
 
@@ -28,8 +28,8 @@ class Earlier:
 
     def __init__(self, folder: Path) -> None:
         self.model = load_model(folder / "model.json")
-        self.evaluation = _read(folder / "evaluate.json")
-        self.manifest = _read(folder / "manifest.json")
+        self.evaluation = read_result(folder / "evaluate.json", "evaluate", optional=True)
+        self.manifest = read_result(folder / "manifest.json", "manifest", optional=True)
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
@@ -47,16 +47,6 @@ def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
     if (old.serial, old.axis) != (serial, axis):
         raise InputError(f"--previous {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
     return earlier
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), f"cannot be read ({error})", "a JSON result") from error
-    return content if isinstance(content, dict) else {}
 
 
 def changes_since(

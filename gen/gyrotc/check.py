@@ -17,7 +17,14 @@ from . import __version__
 from .dataset import Applied, Dataset, RunFacts, axes_of, facts_of, survey
 from .dataset.problems import Problems
 from .errors import InputError
-from .findings import earth_rate_findings, jump_findings, temperature_findings
+from .findings import (
+    contradiction_findings,
+    counter_findings,
+    earth_rate_findings,
+    jump_findings,
+    outlier_findings,
+    temperature_findings,
+)
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
 
@@ -163,6 +170,9 @@ def _doubts(dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | No
     isothermal = list(temperature_findings(facts))
     for finding in (*isothermal, *jump_findings(facts), *earth_rate_findings(dataset, facts)):
         yield Doubt(finding["id"], "data set", finding["text"])
+    for finding in (*counter_findings(facts), *outlier_findings(facts), *contradiction_findings(facts)):
+        where = _where(finding["evidence"]["file"], finding["evidence"]["from_s"])
+        yield Doubt(finding["id"], where, finding["text"])
     for f in facts:
         yield from _doubts_of_temperature(f)
         yield from _doubts_of_rate(f)
@@ -194,8 +204,11 @@ def _doubts_of_rate(f: RunFacts) -> Iterator[Doubt]:
     if 0.0 < f.largest_dph < _SMALL_DPH:
         text = f"no rate exceeds {f.largest_dph:.3g} deg/h; are they in deg/s or rad/s?"
         yield Doubt("small_rates", where, text)
-    if f.outliers:
-        text = f"{f.outliers} rows depart from both neighbours by more than 8 times the noise"
+    if f.outlier is not None and not any(outlier_findings([f])):
+        text = (
+            f"{f.outliers} rows depart from those around them by more than 8 times the noise, most at "
+            f"{f.outlier.time_s:.10g} s: {f.outlier.rate_dph:.4g} deg/h"
+        )
         yield Doubt("rate_outliers", where, text)
     stuck = f.stuck_s > max(_STUCK_S, _STUCK_ROWS * f.row_period_s)
     if stuck and "rate" not in f.constant:

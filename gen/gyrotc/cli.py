@@ -60,9 +60,9 @@ def _single_threaded() -> None:
 
 def _status() -> int:
     """Runs the command; errors become one message on stderr and their exit status."""
-    from .commands import app
-
     try:
+        from .commands import app
+
         app(standalone_mode=True)
     except GyrotcError as error:
         print(f"gyrotc: {terminal_text(str(error))}", file=sys.stderr)
@@ -73,4 +73,12 @@ def _status() -> int:
         if isinstance(end.__context__, BrokenPipeError):  # typer's own way of ending then
             return _CLOSED
         return end.code if isinstance(end.code, int) else int(end.code is not None)
+    except MemoryError:
+        print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
+        return GyrotcError.exit_status
+    except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
+        from .crash import EXIT_STATUS, crash_line
+
+        print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
+        return EXIT_STATUS
     return 0

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from .errors import InputError
-from .report import page_environment, read_json, write_page
+from .inputs import read_input
+from .report import page_environment, page_from, write_page
+from .stored import read_result
 from .texts import checked_svg
 
 __all__ = ["PICTURES", "is_diagnosis", "write_diagnosis_page"]
@@ -28,11 +29,8 @@ def write_diagnosis_page(folder: Path) -> Path:
     Raises:
         InputError: `diagnose.json` is missing, broken or of another kind.
     """
-    result = read_json(folder / "diagnose.json")
-    if result.get("schema") != "gyrotc.diagnose/1":
-        found = repr(result.get("schema"))
-        raise InputError(f"{folder / 'diagnose.json'}, field schema", found, "gyrotc.diagnose/1")
-    try:
+    result = read_result(folder / "diagnose.json", "diagnose")
+    with page_from(folder / "diagnose.json"):
         text = (
             page_environment()
             .get_template("diagnosis.html.j2")
@@ -45,8 +43,6 @@ def write_diagnosis_page(folder: Path) -> Path:
                 pictures=_pictures(folder, result),
             )
         )
-    except (KeyError, TypeError, jinja2.UndefinedError) as error:
-        raise InputError(str(folder / "diagnose.json"), f"lacks {error}", "a result of diagnose") from error
     return write_page(folder, text)
 
 
@@ -60,7 +56,7 @@ def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, Markup]:
     found = {}
     for path in (p for p in paths if p.is_file()):
         try:
-            found[path.stem] = checked_svg(path.read_text(encoding="utf-8"))
+            found[path.stem] = checked_svg(read_input(path, "result_mib", "a picture").decode("utf-8"))
         except ValueError as error:
             raise InputError(str(path), str(error), "a picture that diagnose drew") from error
     return found

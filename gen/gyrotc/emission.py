@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .errors import InputError
+from .inputs import read_input
 from .model import Model
 from .table import Numeric
 
@@ -25,7 +26,6 @@ SIGNATURE = "emission.json.sig"
 #: Names in `c/` that gyrotc writes but does not make from the model: a signature, and the marker of a result.
 BESIDES = frozenset({SIGNATURE, ".gyrotc-result.json"})
 _SCHEMA = "gyrotc.emission/1"
-_LARGEST = 2**16  # bytes; three axes have 17 files
 
 
 class Options(BaseModel):
@@ -80,14 +80,9 @@ def read_options(c_folder: Path) -> Options:
         InputError: There is no record, or it is damaged.
     """
     path = c_folder / RECORD
+    data = read_input(path, "result_mib", "a folder that emit wrote")
     try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST)
         found = _Record.model_validate_json(data)
-    except OSError as error:
-        raise InputError(
-            str(path), f"cannot be read ({error.strerror})", "a folder that emit wrote"
-        ) from error
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])

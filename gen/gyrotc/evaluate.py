@@ -6,7 +6,6 @@ noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -21,12 +20,13 @@ from numpy.typing import NDArray
 from . import __version__
 from .dataset import Dataset, Rows, Run, RunFacts, facts_of
 from .emit import emitted_tables
-from .errors import CheckFailed, GyrotcError, InputError
+from .errors import CheckFailed, GyrotcError
 from .findings import findings_of
 from .metrics import Averages, average, pooled, statistics, time_statistics
 from .model import Model, load_model
 from .quantise import Table
 from .simulate.truth import simulated_floor
+from .stored import read_result
 from .texts import file_stem
 from .toolchain import Target, all_targets
 from .verify.footprint import Footprint, footprint
@@ -122,11 +122,7 @@ def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, A
     path = folder / "training.json"
     if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
         return None
-    try:
-        training = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), f"cannot be read ({error})", "what gyrotc fit wrote") from error
-    return training if isinstance(training, dict) else None
+    return read_result(path, "training")
 
 
 @contextmanager

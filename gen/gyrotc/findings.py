@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from .dataset import Dataset, RunFacts, earth_rate_warning
 from .model import Model
 
-__all__ = ["earth_rate_findings", "findings_of", "jump_findings", "temperature_findings"]
+__all__ = [
+    "contradiction_findings",
+    "counter_findings",
+    "earth_rate_findings",
+    "findings_of",
+    "jump_findings",
+    "outlier_findings",
+    "temperature_findings",
+]
 
 Finding = dict[str, Any]
 
@@ -28,6 +36,11 @@ _OUTLIER_SIGMAS = 6.0
 _OUTLIER_SCATTER = 3.0
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
 _MAD_TO_SIGMA = 1.4826
+_GROSS_OUTLIER = 100.0  # times the noise of a row: no noise of a gyro, whatever its tails
+_PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature and rate of it
+_COMMON_PLACES = 5
+_CONTRADICTION = 5.0  # times the scatter of a minute within such a place
+_LEAST_FREEDOM = 10
 
 
 def findings_of(
@@ -50,6 +63,9 @@ def findings_of(
         found += _unseen(result, training)
         found += _coverage(model)
     found += jump_findings(facts)
+    found += counter_findings(facts)
+    found += outlier_findings(facts)
+    found += contradiction_findings(facts)
     found += earth_rate_findings(dataset, facts)
     found += _weights(model)
     found += _outliers(result)
@@ -85,6 +101,110 @@ def jump_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
                 {"file": name, "time_s": j.time_s, "from_c": j.from_c, "to_c": j.to_c} for name, j in jumps
             ],
         )
+
+
+def counter_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Counts of pulses that step by the whole range of a counter: it passed its end, and nobody added that."""
+    for f in facts:
+        if f.wrapped is not None:
+            time_s, bits, places = f.wrapped
+            yield _finding(
+                "counter_wrapped",
+                f"Pulses in {_run(f)} step by 2^{bits}, the range of a counter of {bits} bits ({places} places), first "
+                f"at {time_s:.10g} s: it passed its end, or negative counts were stored without their sign.",
+                file=f.file,
+                from_s=f.from_s,
+                time_s=time_s,
+                bits=bits,
+                places=places,
+            )
+
+
+def outlier_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Rows that no noise explains."""
+    for f in facts:
+        if f.outlier is not None and abs(f.outlier.departure_dph) > _GROSS_OUTLIER * f.noise_dph:
+            yield _finding(
+                "rate_outliers",
+                f"{f.outliers} rows of {_run(f)} depart from those around them, most at {f.outlier.time_s:.10g} s: "
+                f"{f.outlier.rate_dph:.4g} deg/h, where a row's noise is {f.noise_dph:.2g} deg/h.",
+                file=f.file,
+                from_s=f.from_s,
+                rows=f.outliers,
+                time_s=f.outlier.time_s,
+                rate_dph=f.outlier.rate_dph,
+                noise_dph=f.noise_dph,
+            )
+
+
+def contradiction_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Training runs that show another rate where others were at the same temperature and rate of it.
+
+    A map gives one answer there; what it then fits is a mean of both, which neither run shows.
+    """
+    runs = [f for f in facts if f.role == "train" and len(f.rates_dph)]
+    if len(runs) < 2:
+        return
+    run = np.concatenate([np.full(len(f.rates_dph), k) for k, f in enumerate(runs)])
+    rate = np.concatenate([f.rates_dph for f in runs])
+    at = np.concatenate(
+        [
+            np.column_stack([f.temperatures_c / _PLACE_C, f.slopes_c_per_min / _PLACE_C_PER_MIN]).round()
+            for f in runs
+        ]
+    )
+    keys, group = np.unique(np.column_stack([at, run]), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    count = np.bincount(group)
+    mean = np.bincount(group, rate) / count
+    freedom = len(rate) - len(keys)
+    if freedom < _LEAST_FREEDOM:
+        return
+    scatter = float(np.sqrt(np.sum((rate - mean[group]) ** 2) / freedom))
+    yield from _contradictions(runs, keys, mean, scatter)
+
+
+def _contradictions(
+    runs: Sequence[RunFacts], keys: NDArray[np.float64], mean: NDArray[np.float64], scatter: float
+) -> Iterator[Finding]:
+    """One finding for each run that departs from the run, or the middle of the runs, that was in the same places.
+
+    Args:
+        keys: Place (two columns) and number of the run, shape (n, 3).
+        mean: Mean rate there, deg/h, shape (n,).
+        scatter: Of a minute within a place, deg/h.
+    """
+    _, place = np.unique(keys[:, :2], axis=0, return_inverse=True)
+    order = np.argsort(place.reshape(-1), kind="stable")
+    departures: dict[int, list[float]] = {}
+    for members in np.split(order, np.flatnonzero(np.diff(place.reshape(-1)[order])) + 1):
+        if len(members) < 2:
+            continue
+        middle = float(np.median(mean[members]))
+        for k, m in enumerate(members):
+            other = (
+                middle if len(members) > 2 else float(mean[members[1 - k]])
+            )  # of two, each against the other
+            departures.setdefault(int(keys[m, 2]), []).append(float(mean[m]) - other)
+    for k, values in departures.items():
+        apart = float(np.median(np.abs(values)))
+        if len(values) >= _COMMON_PLACES and apart > _CONTRADICTION * scatter:
+            yield _finding(
+                "runs_contradict",
+                f"{_run(runs[k])} contradicts the other training runs: at the same temperature and its rate, it "
+                f"shows {apart:.4g} deg/h more or less ({len(values)} places; minutes of a run scatter by "
+                f"{scatter:.2g}). "
+                "A map can follow only one of them.",
+                file=runs[k].file,
+                from_s=runs[k].from_s,
+                apart_dph=apart,
+                scatter_dph=scatter,
+                places=len(values),
+            )
+
+
+def _run(f: RunFacts) -> str:
+    return f.file if f.from_s is None else f"{f.file} from {f.from_s:.6g} s"
 
 
 def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator[Finding]:

@@ -7,39 +7,47 @@ keep a limit.
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from . import __version__
 from .errors import InputError
+from .inputs import parse_toml, read_input
 from .model import Model
 from .toolchain import all_targets
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 __all__ = ["Limits", "held_against", "load_limits"]
 
-_MAX_BYTES = 2**20
 Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
-    "large_weights", "sparse_coverage", "run_outlier",
+    "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
 ]  # fmt: skip
-Amount = Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None
-Range = (
-    Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=2, max_length=2)] | None
-)
+Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
+
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError("the lower end comes first")
+    return pair
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
+CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Temperatures = Annotated[tuple[Celsius, Celsius], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
+Slopes = Annotated[tuple[CelsiusPerMin, CelsiusPerMin], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    # Strict: `true` is no number and "1" none either.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class AtMost(_Part):
@@ -71,22 +79,24 @@ class AtLeast(_Part):
 class Covers(_Part):
     """Ranges that the envelope of the model must contain."""
 
-    temperature_c: Range = None
-    slope_c_per_min: Range = None
+    temperature_c: Temperatures | None = None
+    slope_c_per_min: Slopes | None = None
 
 
 class Needs(_Part):
     """What must be there, and what must not."""
 
-    arithmetics: tuple[Literal["f32", "q31"], ...] = ()
-    targets: tuple[str, ...] = ()  # verified bit for bit, in every arithmetic that they have
-    no_findings: tuple[Finding, ...] = ()  # ids, or "any"
+    arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
+    targets: Annotated[
+        tuple[str, ...], BeforeValidator(_as_tuple)
+    ] = ()  # bit for bit, in all their arithmetics
+    no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
 
 
 class Limits(_Part):
     """A limits file."""
 
-    schema_: Annotated[Literal[1], Field(alias="schema")]
+    schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     product: str = ""
     at_most: AtMost = AtMost()
     at_least: AtLeast = AtLeast()
@@ -112,15 +122,8 @@ def load_limits(path: Path) -> Limits:
     Raises:
         InputError: It cannot be read, is no TOML, or a field is wrong or not known.
     """
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(str(path), f"{path.stat().st_size} bytes", f"at most {_MAX_BYTES}")
-        data = path.read_bytes()
-        content = tomllib.loads(data.decode("utf-8"))
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read ({error.strerror})", "a limits file") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(str(path), f"no TOML: {error}", "a limits file") from error
+    data = read_input(path, "text_mib", "a limits file")
+    content = parse_toml(data, str(path), "a limits file")
     if "sha256" in content:
         raise InputError(f"{path}, field sha256", "is not known", "a field named in docs/limits.md")
     try:
@@ -132,7 +135,8 @@ def load_limits(path: Path) -> Limits:
             raise InputError(where, "is not known", "a field named in docs/limits.md") from error
         if detail["type"] == "missing":
             raise InputError(where, "is missing", "schema = 1") from error
-        raise InputError(where, repr(detail["input"]), detail["msg"]) from error
+        expected = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        raise InputError(where, repr(detail["input"])[:80], expected) from error
     known = all_targets()
     for name in limits.needs.targets:
         if name not in known:

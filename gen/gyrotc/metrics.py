@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs import need_memory
+
 __all__ = ["Averages", "average", "pooled", "statistics", "time_statistics"]
 
 Array = NDArray[np.float64]
 _HALF_HOUR_S = 1800.0
 _HOUR_S = 3600.0
 _FIRST_S = 600.0
+_BIN_BYTES = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,7 @@ def _bins(time_s: Array, scored: NDArray[np.bool_], average_s: float) -> tuple[N
     passed /= max(average_s, period)
     raw = np.floor(passed, out=passed).astype(np.int64)
     full = max(average_s, period) / period
+    need_memory(_BIN_BYTES * float(raw[-1]), "the recording", f"its means over {average_s:g} s")
     count = np.bincount(raw if scored.all() else raw[scored], minlength=int(raw[-1]) + 1)
     keep = count >= max(0.5 * full, 1.0)
     number = np.where(keep, np.cumsum(keep) - 1, -1)

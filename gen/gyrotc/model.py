@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .errors import InputError
+from .inputs import read_json
 from .outputs import write_atomically
 
 __all__ = [
@@ -44,7 +45,6 @@ __all__ = [
 SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
-_MAX_FILE_BYTES = 4 * 2**20
 _MAX_CENTERS = 512
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
@@ -353,14 +353,7 @@ def load_model(path: Path, *, stamped: bool = True) -> Model:
     path = Path(path)
     if path.is_dir():
         path = path / "model.json"
-    try:
-        if path.stat().st_size > _MAX_FILE_BYTES:
-            raise InputError(str(path), "the file is larger than 4 MiB", "a model file")
-        raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read ({error.strerror})", "a model.json") from error
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise InputError(str(path), f"is not JSON ({error})", "a model.json") from error
+    raw = read_json(path, "a model.json", ceiling_name="text_mib")
     if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
         raise InputError(f"{path}, field schema", repr(found), repr(SCHEMA))
@@ -380,7 +373,3 @@ def load_model(path: Path, *, stamped: bool = True) -> Model:
             f"the file as gyrotc wrote it (a change made on purpose: gyrotc stamp {path})",
         )
     return model
-
-
-def _refuse_constant(text: str) -> float:
-    raise ValueError(f"{text} is not a finite number")

@@ -6,12 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
-from .errors import InputError
 from .outputs import result_folder, write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
-from .report import page_environment, read_json, write_page
+from .report import page_environment, page_from, write_page
+from .stored import read_result
 
 __all__ = ["is_plan", "write_plan", "write_plan_page"]
 
@@ -35,8 +33,8 @@ def write_plan_page(folder: Path) -> Path:
     Raises:
         InputError: `plan.json` is missing or broken.
     """
-    result = read_json(folder / "plan.json")
-    try:
+    result = read_result(folder / "plan.json", "plan")
+    with page_from(folder / "plan.json"):
         text = (
             page_environment()
             .get_template("plan.html.j2")
@@ -47,6 +45,4 @@ def write_plan_page(folder: Path) -> Path:
                 accuracy=accuracy_by_hours(result),
             )
         )
-    except (KeyError, TypeError, jinja2.UndefinedError) as error:
-        raise InputError(str(folder / "plan.json"), f"lacks {error}", "a result of plan") from error
     return write_page(folder, text)

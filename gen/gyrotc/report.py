@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,18 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from .errors import InputError
+from .inputs import need_memory, open_input, refuse_above
 from .metrics import Averages, average
 from .model import Model, load_model
 from .outputs import result_folder, write_atomically
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
+from .stored import read_result
 from .texts import file_stem, html_environment
 
-__all__ = ["page_environment", "read_json", "write_page", "write_report"]
+__all__ = ["page_environment", "page_from", "write_page", "write_report"]
+
+_TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
+_LEAST_ROW_BYTES = 12  # six cells and their commas
 
 
 def write_report(folder: Path) -> Path:
@@ -29,26 +35,29 @@ def write_report(folder: Path) -> Path:
         InputError: `model.json` or `evaluate.json` is missing or broken.
     """
     model = load_model(folder / "model.json")
-    evaluation = read_json(folder / "evaluate.json")
-    training = read_json(folder / "training.json", optional=True)
-    verification = read_json(folder / "verify.json", optional=True)
-    manifest = read_json(folder / "manifest.json", optional=True)
-    text = (
-        page_environment()
-        .get_template("report.html.j2")
-        .render(
-            model=model,
-            evaluation=evaluation,
-            training=training,
-            verification=verification,
-            manifest=manifest,
-            diagnosis=read_json(folder / "diagnosis" / "diagnose.json", optional=True),
-            limits=read_json(folder / "limits.json", optional=True),
-            changes=read_json(folder / "changes.json", optional=True),
-            judged=_judged(evaluation),
-            pictures=_pictures(folder, model, evaluation, training),
+    evaluation = read_result(folder / "evaluate.json", "evaluate")
+    training = read_result(folder / "training.json", "training", optional=True)
+    beside = {
+        "verification": read_result(folder / "verify.json", "verify", optional=True),
+        "manifest": read_result(folder / "manifest.json", "manifest", optional=True),
+        "diagnosis": read_result(folder / "diagnosis" / "diagnose.json", "diagnose", optional=True),
+        "limits": read_result(folder / "limits.json", "limits", optional=True),
+        "changes": read_result(folder / "changes.json", "changes", optional=True),
+    }
+    with page_from(folder):
+        pictures = _pictures(folder, model, evaluation, training)
+        text = (
+            page_environment()
+            .get_template("report.html.j2")
+            .render(
+                model=model,
+                evaluation=evaluation,
+                training=training,
+                judged=_judged(evaluation),
+                pictures=pictures,
+                **beside,
+            )
         )
-    )
     return write_page(folder, text)
 
 
@@ -69,23 +78,27 @@ def page_environment() -> jinja2.Environment:
     return html_environment(sci=_sci, number=_number, plain=_plain)
 
 
-def read_json(path: Path, *, optional: bool = False) -> dict[str, Any]:
-    """A JSON object that a stage wrote; {} for an optional one that is absent.
+@contextmanager
+def page_from(source: Path) -> Iterator[None]:
+    """Drawing computes nothing: where it stumbles, the results it is given are not as they were written.
 
     Raises:
-        InputError: It is missing or broken.
+        InputError: It stumbled.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        if optional:
-            return {}
-        raise InputError(str(path), "is missing", "the result of gyrotc build or evaluate") from None
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), f"cannot be read ({error})", "a JSON result") from error
-    if not isinstance(content, dict):
-        raise InputError(str(path), "is not a JSON object", "a JSON result")
-    return content
+        yield
+    except (
+        ArithmeticError,
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        jinja2.TemplateError,
+    ) as error:
+        what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise InputError(
+            str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them"
+        ) from error
 
 
 def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
@@ -125,7 +138,17 @@ def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | No
         return None
     names = ["time_s", "temperature_c", "rate_dph", "compensated_dph"]
     types = pacsv.ConvertOptions(include_columns=names, column_types=dict.fromkeys(names, pa.float64()))
-    columns = pacsv.read_csv(path, pacsv.ReadOptions(use_threads=False), convert_options=types).columns
+    file, size = open_input(path, str(path), "a trace")
+    refuse_above("recording_mib", size / 2**20, str(path), "MiB")
+    need_memory(_TRACE_COPIES * size / _LEAST_ROW_BYTES, str(path), "its rows")
+    with file:
+        read = pacsv.read_csv(file, pacsv.ReadOptions(use_threads=False), convert_options=types)
+    columns = read.columns
+    del read
+    time_s = columns[0].to_numpy()
+    if not (np.isfinite(time_s).all() and np.all(time_s[1:] > time_s[:-1])):
+        raise InputError(f"{path}, column time_s", "times that do not increase", "a trace as gyrotc wrote it")
+    del time_s
     scored = np.ones(len(columns[0]), dtype=bool)
     # Popped, so that a full-rate trace is not in memory twice.
     return average(*(columns.pop(0).to_numpy() for _ in names), scored=scored, average_s=average_s)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from .model import Model, load_model
 from .outputs import write_atomically
 from .report import page_environment
 from .signature import check_signature, load_public_key
+from .stored import read_result
 from .texts import c_environment
 from .toolchain import all_targets, compile_c, run_program
 from .verify import file_entries
@@ -41,7 +41,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         (c / name).write_bytes(data)
     _run_together(c, [m.id for m in models.values()])
-    results = [json.loads((folder / axis / "evaluate.json").read_text(encoding="utf-8")) for axis in axes]
+    results = [read_result(folder / axis / "evaluate.json", "evaluate") for axis in axes]
     text = (
         page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
     )

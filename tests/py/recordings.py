@@ -294,7 +294,7 @@ REFUSED: dict[str, Refused] = {
     "file missing": Refused(description('file = "run-02.csv"'), ("run-02.csv", "does not exist")),
     "file is a folder": Refused(
         lambda folder: (described(folder, 'file = "b.csv"'), (folder / "b.csv").mkdir()),
-        ("b.csv", "is no file"),
+        ("b.csv", "is a folder"),
     ),
     "file outside": Refused(
         description('file = "../run-01.csv"'),

@@ -158,3 +158,72 @@ def test_findings_are_json(tmp_path: Path, model_dict: dict[str, Any]) -> None:
     for finding in json.loads(json.dumps(found, allow_nan=False)):
         assert set(finding) == {"id", "text", "evidence"}
         assert finding["text"].endswith(".")
+
+
+def test_outliers_that_no_noise_makes(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    def told(*rows: int, size: float = 7e6) -> list[dict[str, Any]]:
+        table = columns(600)
+        table["rate_dph"][list(rows)] += size
+        dataset = dataset_of(tmp_path / "R", table)
+        facts = [facts_of(run, run.rows()) for run in dataset.runs]
+        found = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
+        return [f for f in found if f["id"] != "earth_rate_not_stated"]
+
+    assert told() == []
+    for rows in ((300,), (0,), (599,), (300, 301), (300, 301, 302), tuple(range(300, 310)), (100, 300, 500)):
+        for size in (7e6, -7e6, 1.0):
+            [finding] = told(*rows, size=size)
+            assert (finding["id"], finding["evidence"]["rows"]) == ("rate_outliers", len(rows))
+            assert finding["evidence"]["time_s"] in [10.0 * k for k in rows]
+    assert told(*range(300, 400)) == [], "a hundred rows are a piece of record"
+    assert told(300, size=0.02) == [], "a doubt of check, no finding"
+
+
+def test_an_outlier_among_rates_that_repeat(tmp_path: Path) -> None:
+    """Where more than half of the rows are as the one before, the noise was taken from the outliers themselves."""
+    rate = np.repeat(np.arange(200.0) % 3.0, 5)
+    rate[77] = 7e6
+    [run] = dataset_of(tmp_path / "R", columns(1000) | {"rate_dph": rate}).runs
+    facts = facts_of(run, run.rows())
+    assert facts.outlier is not None and facts.outlier.time_s == 770.0
+
+
+@pytest.mark.parametrize("bits", [8, 16, 24])
+@pytest.mark.parametrize("kind", ["unsigned", "cumulative"])
+def test_a_counter_that_wraps(bits: int, kind: str, tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    rng = np.random.default_rng(bits)
+    table = columns(600)
+    del table["rate_dph"]
+    small = np.round(rng.normal(2.0, 1.5, 600))
+    assert (small < 0).any()
+    cumulative = np.cumsum(np.round(rng.normal(2.0**bits / 100.0, 1.0, 600)))
+    counted = small if kind == "unsigned" else cumulative
+    head = 'schema = 1\nserial = "A"\nearth_rate = "none"\npulse_weight_arcsec = 0.01'
+
+    def found(pulses: np.ndarray) -> list[dict[str, Any]]:
+        dataset = dataset_of(tmp_path / "R", table | {"pulses": pulses}, head=head)
+        facts = [facts_of(run, run.rows()) for run in dataset.runs]
+        every = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
+        return [f for f in every if f["id"] == "counter_wrapped"]
+
+    assert found(counted) == []
+    [finding] = found(counted % 2**bits)
+    assert finding["evidence"]["bits"] == bits
+    row = int(finding["evidence"]["time_s"] / 10.0)
+    assert abs((counted % 2**bits)[row] - (counted % 2**bits)[row - 1]) > 2 ** (bits - 1)
+
+
+def test_training_runs_that_contradict_one_another(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+    def told(*shifts: float) -> list[str]:
+        tables = [columns(1800, seed=k) for k in range(len(shifts))]
+        for table, shift in zip(tables, shifts, strict=True):
+            table["rate_dph"] = table["rate_dph"] + shift
+        dataset = dataset_of(tmp_path / "R", *tables)
+        facts = [facts_of(run, run.rows()) for run in dataset.runs]
+        found = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
+        return [f["evidence"]["file"] for f in found if f["id"] == "runs_contradict"]
+
+    floor = 0.001 / np.sqrt(10.0)  # of 100 s
+    assert told(0.0) == told(0.0, 0.0) == told(0.0, 2.0 * floor) == []
+    assert told(0.0, 24.0 * floor) == ["0.csv", "1.csv"], "two runs: nobody knows which"
+    assert told(0.0, 0.0, 24.0 * floor, 0.0) == ["2.csv"]

@@ -102,7 +102,7 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "nothing": ("schema = 1", "0 data sets"),
+    "nothing": ("schema = 1", "names no data set"),
     "no schema": ('datasets = ["*"]', "schema"),
     "typing error": ('schema = 1\ndataset = ["*"]', "field dataset"),
     "no match": ('schema = 1\ndatasets = ["x-*"]', "matches no folder"),

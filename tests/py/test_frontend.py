@@ -14,7 +14,7 @@ def recording(temperature: np.ndarray, time_s: np.ndarray | None = None, *, from
     """Rows and run of a recording with a row a second; the rate is 10 times the temperature."""
     time_s = np.arange(len(temperature), dtype=float) if time_s is None else time_s
     rows = SimpleNamespace(time_s=time_s, temperature_c=temperature, rate_dph=10.0 * temperature)
-    return rows, SimpleNamespace(row_period_s=1.0, in_span=lambda t: t >= from_s)
+    return rows, SimpleNamespace(file="a.csv", row_period_s=1.0, in_span=lambda t: t >= from_s)
 
 
 def blocks_of(temperature: np.ndarray, time_s: np.ndarray | None = None, **changes: Any) -> Blocks:

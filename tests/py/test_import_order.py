@@ -13,6 +13,8 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 ORDER = [
     "errors",
     "outputs",
+    "inputs",
+    "stored",
     "texts",
     "_core",
     "terms",
@@ -60,6 +62,7 @@ ORDER = [
     "build",
     "fleet",
     "commands",
+    "crash",
     "cli",
 ]
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from .. import __version__
+from ..inputs import CEILINGS, set_ceilings
 from ..outputs import check_replaceable, write_result
 from ..texts import terminal_text
 
@@ -111,6 +112,10 @@ def numerics_of(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",")]
 
 
+def _ceilings(texts: list[str] | None) -> None:
+    set_ceilings(texts or [])
+
+
 def _version(value: bool) -> None:
     if value:
         typer.echo(f"gyrotc {__version__}")
@@ -122,5 +127,16 @@ def _main(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
+    ceilings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--max",
+            metavar="NAME=VALUE",
+            callback=_ceilings,
+            help="Move a ceiling of inputs, before the command; may be repeated: "
+            + ", ".join(CEILINGS)
+            + ".",
+        ),
+    ] = None,
 ) -> None:
     pass

@@ -5,7 +5,7 @@ after a problem and tells all of them. What a folder may hold is written in docs
 """
 
 from .earth import earth_rate_warning
-from .facts import Jump, RunFacts, facts_of
+from .facts import Jump, Outlier, RunFacts, facts_of
 from .load import axes_of, load, survey
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run
 
@@ -16,6 +16,7 @@ __all__ = [
     "EarthRate",
     "Exclusion",
     "Jump",
+    "Outlier",
     "Rows",
     "Run",
     "RunFacts",

@@ -19,6 +19,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from ..errors import InputError
+from ..inputs import need_memory, open_input, refuse_above
 from .records import Floats
 from .source import Prefix, Source
 from .values import Fault
@@ -28,6 +29,7 @@ __all__ = ["CsvFile"]
 _BLOCK_BYTES = 2**20
 _LONGEST_LINE = 2**20
 _LF, _CR = 10, 13
+_COPIES = 2.0  # of the columns while they are checked
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
 
@@ -49,10 +51,12 @@ class CsvFile(Source):
         self.name = name
         self.path = path
         try:
-            size = path.stat().st_size
-            with path.open("rb") as file:
-                head = file.readline(_LONGEST_LINE)
+            file, size = open_input(path, name, "a CSV file")
+            with file:
+                refuse_above("recording_mib", size / 2**20, name, "MiB")
+                head = io.BytesIO(file.read(min(size, _LONGEST_LINE))).readline()
             self.names = _header(name, head)
+            refuse_above("columns", len(self.names), f"{name}, line 1", "columns")
             self._head = len(head)
             self.size, self.torn = _without_torn_line(path, size, len(head), len(self.names))
             self.keep_as_read()
@@ -71,6 +75,8 @@ class CsvFile(Source):
         )
         at_once = pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=unique)
         most = self._most_rows()
+        refuse_above("rows", most, self.name, "rows")
+        need_memory(_COPIES * 8.0 * most * len(columns), self.name, f"{most} rows of {len(columns)} columns")
         read = {name: np.empty(most) for name in columns}
         at = 0
         try:
@@ -86,13 +92,15 @@ class CsvFile(Source):
         return {name: column[:at] for name, column in read.items()}
 
     def _most_rows(self) -> int:
-        """A number that the rows do not exceed: all line ends, of either kind, and a last line without."""
+        """A number that the rows do not exceed: all line ends, of either kind, and a last line without; nor can
+        there be more than cells of one character have room for.
+        """
         ends = 0
         with Prefix(self.path, self.size) as prefix:
             while block := prefix.read(_BLOCK_BYTES):
                 octets = np.frombuffer(block, dtype=np.uint8)
                 ends += np.count_nonzero(octets == _LF) + np.count_nonzero(octets == _CR)
-        return ends + 1
+        return min(ends, self.size // (2 * len(self.names))) + 1
 
     def _blocks_of_lines(self) -> Iterator[bytes]:
         """Whole lines below the header, about `_BLOCK_BYTES` at a time.
@@ -144,7 +152,11 @@ class CsvFile(Source):
         """Lines below the header that are not empty, with their numbers."""
         with Prefix(self.path, self.size) as prefix:
             text = io.TextIOWrapper(io.BufferedReader(prefix), encoding="utf-8", errors="replace")
-            for number, line in enumerate(text, start=1):
+            lines = iter(lambda: text.readline(_LONGEST_LINE), "")
+            for number, line in enumerate(lines, start=1):
+                if len(line) == _LONGEST_LINE:
+                    where = f"{self.name}, line {number}"
+                    raise InputError(where, f"{_LONGEST_LINE} characters and no end", "lines of cells")
                 if number > 1 and line.rstrip("\r\n"):
                     yield number, line.rstrip("\r\n")
 
@@ -212,7 +224,8 @@ def _bare(cell: str) -> str:
 def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[int, str]:
     """Size without a torn last line (no line end, and cells missing or a number cut), and that line."""
     start = max(head, size - _LONGEST_LINE)
-    with path.open("rb") as file:
+    file, _ = open_input(path, path.name, "a CSV file")
+    with file:
         file.seek(start)
         tail = file.read(size - start)
     at = max(tail.rfind(b"\n"), tail.rfind(b"\r")) + 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .records import EarthRate, Floats, Rows, Run
 
-__all__ = ["Jump", "RunFacts", "facts_of"]
+__all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
 
 _GAP_PERIODS = 1.5
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
@@ -21,6 +21,8 @@ _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing doe
 _HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
 _MAX_JUMPS = 20
 _OUTLIER_SIGMAS = 8.0
+_OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
+_COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _MAD_TO_SIGMA = 1.4826
 _PART = 2**16  # rows that are looked at together
 
@@ -34,6 +36,15 @@ class Jump:
     time_s: float
     from_c: float
     to_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """The largest of the outliers of a run: its first row and by how much it departs from the row before."""
+
+    time_s: float
+    rate_dph: float
+    departure_dph: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +69,15 @@ class RunFacts:
         jumps: Jumps of temperature, the first ones.
         slopes_c_per_min: Rates of temperature of cells of a minute (at least five rows).
         temperatures_c: Mean temperatures of these cells, same shape.
+        rates_dph: Mean rates of these cells, same shape.
         hold_share: Share of these cells that change by less than 0.1 C/min.
         mean_dph: Mean rate.
         largest_dph: Largest magnitude of a rate.
         noise_dph: Scatter from row to row, robust.
-        outliers: Rows whose rate departs from both neighbours by more than 8 times that.
+        outliers: Rows whose rate departs from those before and after by more than 8 times that, to the same side; up to
+            ten in a row.
+        outlier: The largest of them.
+        wrapped: Where a counter of pulses passed its end: time of the first place, bits of the counter, places.
         stuck_s: Longest stretch of one identical rate.
         constant: Columns that hold one value only.
         earth: Earth's rate that was taken off, None where there was nothing to take off.
@@ -85,11 +100,14 @@ class RunFacts:
     jumps: tuple[Jump, ...]
     slopes_c_per_min: Floats
     temperatures_c: Floats
+    rates_dph: Floats
     hold_share: float
     mean_dph: float
     largest_dph: float
     noise_dph: float
     outliers: int
+    outlier: Outlier | None
+    wrapped: tuple[float, int, int] | None
     stuck_s: float
     constant: tuple[str, ...]
     earth: EarthRate | None
@@ -99,12 +117,15 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
     time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
-    rate = _those(rows.rate_dph, inside & np.isfinite(rows.rate_dph))
+    finite = inside & np.isfinite(rows.rate_dph)
+    rate = _those(rows.rate_dph, finite)
     step = np.diff(time)
     gaps = step > _GAP_PERIODS * run.row_period_s
     levels = np.unique(temperature[_changes(temperature)])
     resolution = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
-    cells_t, slopes = _cells(time, temperature, run.row_period_s)
+    measured = np.where(np.isfinite(rows.rate_dph), rows.rate_dph, rate.mean() if len(rate) else 0.0)
+    cells_t, slopes, cells_rate = _cells(time, temperature, _those(measured, inside), run.row_period_s)
+    count, outlier = _outliers(_those(rows.time_s, finite), rate)
     noise = _robust_sigma(np.diff(rate)) / np.sqrt(2.0)
     return RunFacts(
         file=run.file,
@@ -124,11 +145,14 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         jumps=_jumps(time, temperature, resolution),
         slopes_c_per_min=slopes,
         temperatures_c=cells_t,
+        rates_dph=cells_rate,
         hold_share=float(np.mean(np.abs(slopes) < _HOLD_C_PER_MIN)) if len(slopes) else 1.0,
         mean_dph=float(rate.mean()) if len(rate) else 0.0,
         largest_dph=float(max(rate.max(), -rate.min())) if len(rate) else 0.0,
         noise_dph=float(noise),
-        outliers=_outliers(rate, float(noise)),
+        outliers=count,
+        outlier=outlier,
+        wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
         stuck_s=_longest_stretch(rate) * run.row_period_s,
         constant=_constant(rows, inside, rate),
         earth=run.earth,
@@ -156,8 +180,8 @@ def _robust_sigma(values: Floats) -> float:
     return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
 
 
-def _cells(time: Floats, temperature: Floats, period_s: float) -> tuple[Floats, Floats]:
-    """Mean temperature of cells and its rate (C/min) by central differences; empty for fewer than three cells."""
+def _cells(time: Floats, temperature: Floats, rate: Floats, period_s: float) -> tuple[Floats, Floats, Floats]:
+    """Mean temperature of cells, its rate (C/min) by central differences, mean rate; empty for fewer than three."""
     length = max(_CELL_S, _CELL_ROWS * period_s)
     number = (time - time[0]) / length
     starts = _changes(np.floor(number, out=number))
@@ -166,8 +190,9 @@ def _cells(time: Floats, temperature: Floats, period_s: float) -> tuple[Floats, 
     mean_t = (np.add.reduceat(temperature, starts) / count)[full]
     mean_s = (np.add.reduceat(time, starts) / count)[full]
     if len(mean_t) < 3:
-        return np.zeros(0), np.zeros(0)
-    return mean_t, np.gradient(mean_t, mean_s) * 60.0
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    mean_rate = (np.add.reduceat(rate, starts) / count)[full]
+    return mean_t, np.gradient(mean_t, mean_s) * 60.0, mean_rate
 
 
 def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, ...]:
@@ -200,14 +225,54 @@ def _departures(step: Floats) -> Floats:
     return result
 
 
-def _outliers(rate: Floats, noise: float) -> int:
-    """Rows that depart from both neighbours to the same side (at the ends: from the two next rows)."""
-    if len(rate) < 3 or noise == 0.0:
-        return 0
-    limit = _OUTLIER_SIGMAS * noise
+def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
+    """Rows between two steps of opposite sign, each beyond 8 times the noise, and the largest of them.
+
+    At the ends of the record the two next rows stand for the missing neighbour. Where most rows repeat the one before,
+    the noise is that of those that do not.
+    """
+    if len(rate) < 3:
+        return 0, None
     step = np.diff(np.r_[rate[2], rate, rate[-3]])
-    up, down = step > limit, step < -limit
-    return int(np.count_nonzero((up[:-1] & down[1:]) | (down[:-1] & up[1:])))
+    moved = np.abs(step[step != 0.0])
+    limit = _OUTLIER_SIGMAS * _MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0) if len(moved) else np.inf
+    large = np.flatnonzero(np.abs(step) > limit)
+    first, last = large[:-1], large[1:]
+    pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
+    pair[1:] &= ~_follows(pair)[1:]
+    first, last = first[pair], last[pair]
+    if len(first) == 0:
+        return 0, None
+    k = first[np.argmax(np.abs(step[first]))]
+    return int(np.sum(last - first)), Outlier(float(time[k]), float(rate[k]), float(step[k]))
+
+
+def _follows(pair: Mask) -> Mask:
+    """Pairs that share their first step with the pair before: every other one of a chain."""
+    chain = np.zeros(len(pair), dtype=bool)
+    for k in np.flatnonzero(pair):
+        chain[k] = k > 0 and pair[k - 1] and not chain[k - 1]
+    return chain
+
+
+def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[float, int, int] | None:
+    """Places where counted pulses step by a whole range of a counter (2^8 ... 2^32) and hardly by anything else."""
+    if weight_arcsec is None or len(rows) < 4:
+        return None
+    counts = np.rint(rows.rate_dph[1:] * np.diff(rows.time_s) / weight_arcsec)
+    use, time = finite[1:], rows.time_s[1:]
+    step = np.diff(counts[use])
+    for bits in _COUNTER_BITS:
+        size = 2.0**bits
+        if len(step) == 0 or np.abs(step).max() > 1.5 * size:
+            continue
+        rest = np.abs(step - size * np.rint(step / size))
+        wraps = np.flatnonzero((np.abs(step) > 0.5 * size) & (rest < size / 8.0))
+        usual = _MAD_TO_SIGMA * float(np.median(rest))
+        wraps = wraps[rest[wraps] <= _OUTLIER_SIGMAS * usual + 4.0]
+        if len(wraps) and usual < size / 32.0:
+            return float(time[use][wraps[0] + 1]), bits, len(wraps)
+    return None
 
 
 def _longest_stretch(values: Floats) -> int:

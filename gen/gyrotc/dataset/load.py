@@ -11,6 +11,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
+from ..inputs import refuse_above
 from .columns import arrange
 from .consistency import check_description, check_spans, common_channels, in_entry, of_axis, place_of
 from .earth import earth_rate
@@ -106,8 +107,13 @@ def survey(
 
 
 def _description(folder: Path, problems: Problems) -> Description | None:
-    if not folder.is_dir():
-        found = "is no folder" if folder.exists() else "does not exist"
+    try:
+        there, is_folder = folder.exists(), folder.is_dir()
+    except OSError as error:
+        problems.add(InputError(str(folder), f"cannot be read ({error.strerror})", "a folder of recordings"))
+        return None
+    if not is_folder:
+        found = "is no folder" if there else "does not exist"
         problems.add(InputError(str(folder), found, "a folder of recordings"))
         return None
     if (folder / FILE).exists():
@@ -115,6 +121,11 @@ def _description(folder: Path, problems: Problems) -> Description | None:
     files = sorted(f.name for f in folder.iterdir() if f.suffix.lower() in _KINDS and f.name[0] != ".")
     if not files:
         problems.add(InputError(str(folder), f"no recordings and no {FILE}", "*.csv or *.parquet files"))
+        return None
+    try:
+        refuse_above("runs", len(files), str(folder), "recordings")
+    except InputError as error:
+        problems.add(error)
         return None
     serial = folder.resolve().name
     try:
@@ -209,6 +220,7 @@ def _run(folder: Path, entry: RunEntry, recording: Recording, reader: Reader) ->
         row_period_s=recording.row_period_s,
         n_rows=recording.n_rows,
         earth=reader.earth,
+        pulse_weight_arcsec=reader.pulse_weight_arcsec if reader.layout.pulses else None,
         reader=reader,
     )
 

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..errors import InputError
+from ..inputs import ceiling, need_memory, open_input, refuse_above
 from .records import Floats
 from .source import Source
 from .values import Fault
@@ -17,6 +18,8 @@ from .values import Fault
 __all__ = ["ParquetFile"]
 
 _BATCH_ROWS = 2**16
+_HARMLESS_BYTES = 2**26
+_COPIES = 2.0  # of the columns while they are checked
 _DAMAGE = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)  # of whatever pyarrow meets
 
 
@@ -36,17 +39,22 @@ class ParquetFile(Source):
     def __init__(self, name: str, path: Path) -> None:
         self.name = name
         self.path = path
+        opened, self.size = open_input(path, name, "a Parquet file")
+        refuse_above("recording_mib", self.size / 2**20, name, "MiB")
         try:
-            with pq.ParquetFile(path) as file:
-                schema = file.schema_arrow
-                self._n_rows = file.metadata.num_rows
-            self.size = path.stat().st_size
+            with opened, pq.ParquetFile(opened) as file:
+                metadata, schema = file.metadata, file.schema_arrow
+                self._n_rows = metadata.num_rows
+                unpacked = _unpacked(metadata)
             self.keep_as_read()
         except _DAMAGE as error:
             raise InputError(
                 name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
             ) from error
         self.names = tuple(schema.names)
+        refuse_above("columns", len(self.names), name, "columns")
+        refuse_above("rows", self._n_rows, name, "rows")
+        _refuse_bomb(name, self.size, max(unpacked, 8 * self._n_rows * len(self.names)))
         for field in schema:
             if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
                 raise InputError(f"{name}, column {field.name}", f"holds {field.type}", "numbers")
@@ -54,9 +62,15 @@ class ParquetFile(Source):
     def read(self, columns: Sequence[str]) -> dict[str, Floats]:
         """As `Source.read`, row group by row group; never None."""
         at = 0
+        need_memory(
+            _COPIES * 8.0 * self._n_rows * len(columns),
+            self.name,
+            f"{self._n_rows} rows of {len(columns)} columns",
+        )
+        opened, _ = open_input(self.path, self.name, "a Parquet file")
         try:
             read = {column: np.empty(self._n_rows) for column in columns}
-            with pq.ParquetFile(self.path, pre_buffer=False) as file:
+            with opened, pq.ParquetFile(opened, pre_buffer=False) as file:
                 for batch in file.iter_batches(_BATCH_ROWS, columns=list(columns), use_threads=False):
                     for name, values in zip(batch.schema.names, batch.columns, strict=True):
                         read[name][at : at + len(batch)] = values.to_numpy(zero_copy_only=False)
@@ -75,6 +89,23 @@ class ParquetFile(Source):
     def place(self, row: int) -> int:
         """Number of a row, from 1."""
         return row + 1
+
+
+def _unpacked(metadata: pq.FileMetaData) -> int:
+    """Bytes of all pages once unpacked, as the file states them."""
+    groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
+    return sum(g.column(c).total_uncompressed_size for g in groups for c in range(g.num_columns))
+
+
+def _refuse_bomb(name: str, size: int, unpacked: int) -> None:
+    """A small file that unpacks to gigabytes.
+
+    Raises:
+        InputError: It is one.
+    """
+    if unpacked > _HARMLESS_BYTES and unpacked > ceiling("parquet_ratio") * size:
+        found = f"{size} bytes that unpack to {unpacked} or more"
+        raise InputError(name, found, f"at most {ceiling('parquet_ratio'):g} times (--max parquet_ratio=...)")
 
 
 def _short(error: Exception) -> str:

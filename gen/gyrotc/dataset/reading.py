@@ -19,6 +19,8 @@ from .values import MIN_ROWS, Fault, faults, rate_faults
 
 __all__ = ["Reader", "Recording", "open_file", "open_recording"]
 
+_SHORTEST_S = 1e-5  # no gyro is recorded faster; a time scale taken wrong makes blocks of 10^12 rows
+
 
 @dataclass(frozen=True, slots=True)
 class Recording:
@@ -109,6 +111,10 @@ def open_recording(
     if len(problems) > before:
         return None
     period = float(np.median(np.diff(time), overwrite_input=True))
+    if period < _SHORTEST_S:
+        where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
+        problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
+        return None
     return Recording(file, layout, time, len(time), period)
 
 
@@ -118,8 +124,6 @@ def open_file(name: str, path: Path) -> Source:
     Raises:
         InputError: There is none, or it is not what its name says.
     """
-    if not path.is_file():
-        raise InputError(name, "is no file" if path.exists() else "does not exist", "a file of the data set")
     return ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
 
 

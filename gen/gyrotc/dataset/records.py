@@ -107,6 +107,7 @@ class Run:
         row_period_s: Median row period of the file, s.
         n_rows: Rows of the file.
         earth: Earth's rate that is taken off, None where there is nothing to take off.
+        pulse_weight_arcsec: Angle of one pulse, None where a rate was recorded.
         reader: Reads the whole file; `rows` is the way to call it.
     """
 
@@ -123,6 +124,7 @@ class Run:
     row_period_s: float
     n_rows: int
     earth: EarthRate | None
+    pulse_weight_arcsec: float | None
     reader: Callable[[], Rows] = field(repr=False, compare=False)
 
     def rows(self) -> Rows:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from datetime import date, datetime, time, timezone
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,17 +20,12 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ..errors import InputError
+from ..inputs import read_toml, refuse_above
 from .problems import Problems
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 __all__ = ["FILE", "Columns", "Description", "RunEntry", "check_serial", "parse_description"]
 
 FILE = "dataset.toml"
-_MAX_BYTES = 4 * 2**20
 _ATTEMPTS = 3  # a field taken out can bring another error to light
 _SERIAL = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _SERIAL_FORM = "1 to 64 of the characters A-Z a-z 0-9 . _ -, at least one of them a letter or digit"
@@ -178,7 +172,9 @@ def parse_description(path: Path, problems: Problems) -> Description | None:
         The description; where fields were wrong, what remains without them; None if nothing usable remains.
     """
     try:
-        content = _content(path)
+        content = read_toml(path, "a TOML file", FILE)
+        runs = content.get("run")
+        refuse_above("runs", len(runs) if isinstance(runs, list) else 0, FILE, "runs")
     except InputError as error:
         problems.add(error)
         return None
@@ -195,20 +191,6 @@ def parse_description(path: Path, problems: Problems) -> Description | None:
             if not all(_dropped(content, detail) for detail in details):
                 return None
     return None
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(FILE, f"{path.stat().st_size} bytes", f"at most {_MAX_BYTES}")
-        content: dict[str, Any] = tomllib.loads(path.read_text("utf-8-sig"))
-        return content
-    except OSError as error:
-        raise InputError(FILE, f"cannot be read ({error.strerror})", "a readable file") from error
-    except UnicodeDecodeError as error:
-        raise InputError(FILE, f"no UTF-8 text ({error.reason})", "a TOML file") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(FILE, f"no TOML: {error}", "a TOML file") from error
 
 
 def _causes(details: list[ErrorDetails]) -> list[ErrorDetails]:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..inputs import open_input
 from .records import Floats
 from .values import Fault
 
@@ -21,14 +22,14 @@ class Prefix(io.RawIOBase):
     """The first `size` bytes of a file."""
 
     def __init__(self, path: Path, size: int) -> None:
-        self._file = path.open("rb", buffering=0)
+        self._file, _ = open_input(path, path.name, "a recording")
         self._left = size
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        count = self._file.readinto(memoryview(buffer)[: self._left])
+        count: int = self._file.readinto(memoryview(buffer)[: self._left])  # type: ignore[attr-defined]
         self._left -= count
         return count
 

@@ -12,11 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs import need_memory
 from ..terms.base import History
 
 __all__ = ["Record", "Records", "centred_slope", "singled_out"]
 
 Array = NDArray[np.float64]
+_BLOCK_BYTES = 8 * 64  # of the features of a block that are averaged together
 _SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could stand for
 
 
@@ -68,6 +70,7 @@ class Records:
         for run in self.runs:
             time = run.history.time_s
             number = np.floor((time - time[0]) / self.block_s + 1e-6).astype(np.int64)
+            need_memory(_BLOCK_BYTES * float(number[-1]), run.name, f"its blocks of {self.block_s:g} s")
             nominal = max(round(self.block_s / run.row_s), 1)
             count = np.bincount(number, weights=run.usable)
             index.append(number)

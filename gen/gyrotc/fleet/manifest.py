@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..dataset import axes_of
 from ..errors import InputError
 from ..fitting import FitOptions
+from ..inputs import read_toml, refuse_above
 from ..limits import Limits, load_limits
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 __all__ = ["Fleet", "Unit", "load_manifest"]
-
-_MAX_BYTES = 64 * 2**20
-_MAX_UNITS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +45,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-_Place = Annotated[str, Field(pattern=r"^[^\x00-\x1f]+$")]
+_Place = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00-\x1f]+$")]
 
 
 class _UnitEntry(_Part):
@@ -114,15 +106,9 @@ def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
 
 
 def _parsed(path: Path) -> _Manifest:
+    content = read_toml(path, "a manifest or a folder")
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(str(path), f"{path.stat().st_size} bytes", f"at most {_MAX_BYTES}")
-        content = tomllib.loads(path.read_text("utf-8"))
         return _Manifest.model_validate(content)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read ({error.strerror})", "a manifest or a folder") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(str(path), f"no TOML: {error}", "a manifest") from error
     except ValidationError as error:
         raise _wrong_field(path, error) from error
 
@@ -147,12 +133,13 @@ def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
             found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
         except (
             IndexError,
+            NotImplementedError,
             ValueError,
             OSError,
             RecursionError,
         ) as error:  # ".", "a**", a name that no folder can have
             expected = "a pattern below the manifest's folder, e.g. 2026-*"
-            raise InputError(f"{path}, field datasets", repr(pattern), expected) from error
+            raise InputError(f"{path}, field datasets", repr(pattern)[:80], expected) from error
         if not found:
             raise InputError(f"{path}, field datasets", f"{pattern!r} matches no folder of recordings")
         yield from found
@@ -167,8 +154,9 @@ def _has_recordings(folder: Path) -> bool:
 
 
 def _distinct(path: Path, fleet: Fleet) -> Fleet:
-    if not 1 <= len(fleet.units) <= _MAX_UNITS:
-        raise InputError(str(path), f"{len(fleet.units)} data sets", f"1 to {_MAX_UNITS}")
+    if not fleet.units:
+        raise InputError(str(path), "names no data set", "one at least")
+    refuse_above("units", len(fleet.units), str(path), "data sets")
     seen: dict[str, Path] = {}
     for unit in fleet.units:
         if unit.name in seen:

@@ -15,6 +15,7 @@ from ..emit import emit
 from ..errors import GyrotcError
 from ..evaluate import evaluate
 from ..fitting import fit_dataset
+from ..inputs import read_json
 from ..limits import held_against
 from ..model import Model, load_model
 from ..outputs import result_folder, write_atomically
@@ -56,9 +57,9 @@ class Task:
 def done_before(task: Task) -> Entry | None:
     """The entry of an earlier call that still holds; None if the job must be done."""
     try:
-        entry: Entry = json.loads((task.out / ENTRY).read_text(encoding="utf-8"))
+        entry: Entry = read_json(task.out / ENTRY, "the entry of a gyro")
         return entry if entry["key"] == task.key else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (GyrotcError, OSError, KeyError, TypeError):
         return None
 
 

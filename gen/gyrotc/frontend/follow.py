@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs import need_memory
 from .believe import HELD, RESTART, believe
 from .numbers import Arithmetic, Numbers
 
@@ -29,6 +30,7 @@ __all__ = [
 
 MAP, KEEP, FALLBACK = 0, 1, 2
 _WARMING = 1  # GTC_WARMING
+_SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
 
 
@@ -86,8 +88,13 @@ def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.i
     return shortened
 
 
-def positions(missed: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number of each row's sample where `missed` samples come before the row."""
+def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.int64]:
+    """Number of each row's sample where `missed` samples come before the row.
+
+    Raises:
+        InputError: Rows and gaps together are more samples than memory is granted for.
+    """
+    need_memory(_SAMPLE_BYTES * float(missed.size + missed.sum()), where, "its rows and gaps as samples")
     position = np.arange(missed.size)
     if missed.any():
         position += np.cumsum(missed)
@@ -169,6 +176,10 @@ def _means(
 ) -> tuple[NDArray[np.bool_], Numbers]:
     """`_block_means` of a part that begins with a block."""
     blocks = -(-x.size // n)
+    if blocks == 1:
+        n, whole = x.size, n  # a block may be far longer than the recording
+    else:
+        whole = n
     values, there = np.zeros((blocks, n), dtype=x.dtype), np.zeros((blocks, n), dtype=np.bool_)
     values.reshape(-1)[: x.size] = np.where(used, x, 0)
     there.reshape(-1)[: x.size] = used
@@ -176,7 +187,7 @@ def _means(
     base = values[np.arange(blocks), np.argmax(there, axis=1)]
     d = np.where(there, arithmetic.diff(values, base[:, None]), values.dtype.type(0))
     mean = arithmetic.mean(base, arithmetic.running_sum(d), np.maximum(count, 1))
-    return 2 * count >= n, mean
+    return 2 * count >= whole, mean
 
 
 def _restarts(

@@ -86,7 +86,7 @@ def run_blocks(
         max_slope=np.float32(max_rate_c_per_min * block_s / 60.0),
     )
     missed = expand_missed(missed_before(rows.time_s, run.row_period_s), settings)
-    position = positions(missed)
+    position = positions(missed, run.file)
     samples = with_missing(F32, F32.numbers(rows.temperature_c), position)
     steps = follow(F32, samples, settings)
     n = settings.samples_per_block

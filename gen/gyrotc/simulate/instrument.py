@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs import need_memory
 from ..terms import CATALOGUE, Scene
 from ..terms.operators import first_order
 from . import chamber, channels, noise, profile, thermal
@@ -17,6 +18,7 @@ from .scenario import Cause, Gyro, Profile, Scenario
 __all__ = ["Record", "record", "thermal_network"]
 
 Array = NDArray[np.float64]
+_ARRAYS = 24  # of a value a second, besides nodes and channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,8 @@ def record(
     """
     world, sensing, noisy, fine, causal = seeds.spawn(5)
     first, cells = _cells(run.record_from_min), _cells(run.record_min)
+    arrays = _ARRAYS + len(scenario.gyro.node) + 2 * len(scenario.channel)
+    need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
     inside = slice(first, first + cells + 1)
     air_c, scene, true_channels = _scene(scenario, run, first + cells + 1, day, world)
     scene, bias = _bias(scenario, scene, true_channels, bias_map, causal)

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
+from ..errors import InputError
+
 __all__ = ["Step", "corners", "sample"]
 
 Celsius = Annotated[float, Field(ge=-90.0, le=200.0)]
@@ -107,6 +109,8 @@ Step = Annotated[
 ]
 Repeat.model_rebuild()
 
+_MOST_CORNERS = 10**6  # a corner a second for eleven days
+
 _Leg = tuple[float, float]  # duration in s, temperature at its end in C
 
 
@@ -136,7 +140,12 @@ def _targets(step: Ramp | Staircase | Triangle | Nested, now_c: float) -> list[f
     if isinstance(step, Ramp):
         return [step.ramp_to_c]
     if isinstance(step, Staircase):
-        treads = max(1, round(abs(step.staircase_to_c - now_c) / step.tread_c))
+        treads = abs(step.staircase_to_c - now_c) / step.tread_c
+        if treads > _MOST_CORNERS:
+            raise InputError(
+                "tread_c", f"{treads:.4g} treads", f"at most {_MOST_CORNERS} corners in a programme"
+            )
+        treads = max(1, round(treads))
         return [float(c) for c in np.linspace(now_c, step.staircase_to_c, treads + 1)[1:]]
     if isinstance(step, Triangle):
         first, second = step.triangle_c
@@ -168,12 +177,18 @@ def corners(
 
     Returns:
         Times (s, ascending) and temperatures (C), same length.
+
+    Raises:
+        InputError: It has more than a million corners.
     """
     times, temperatures = [0.0], [start_c]
     for step in steps:
         for duration_s, end_c in _legs(step, temperatures[-1], fastest_c_per_min):
             times.append(times[-1] + duration_s)
             temperatures.append(end_c)
+            if len(times) > _MOST_CORNERS:
+                where = f"programme at {times[-1]:.4g} s"
+                raise InputError(where, f"more than {_MOST_CORNERS} corners", "longer or fewer steps")
             if times[-1] >= until_s:
                 return np.array(times), np.array(temperatures)
     times.append(max(until_s, times[-1]))

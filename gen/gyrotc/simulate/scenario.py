@@ -7,7 +7,6 @@ docs/simulation.md describes every key.
 
 from __future__ import annotations
 
-import sys
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,18 +14,15 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..errors import InputError
+from ..inputs import read_toml, refuse_above
 from ..terms import CATALOGUE
 from .profile import Step
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 __all__ = ["Cause", "Chamber", "Channel", "NoiseLevels", "Profile", "Scenario", "names", "read"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
+Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 
 _FOLDER = Path(__file__).parent.parent / "scenarios"
@@ -167,9 +163,9 @@ class Profile(_Strict):
     """One chamber programme, when power comes on in it and what of it is recorded (min from its start)."""
 
     start_c: float
-    power_on_min: NonNegative = 0.0
-    record_from_min: NonNegative = 0.0
-    record_min: Positive
+    power_on_min: Minutes = 0.0
+    record_from_min: Minutes = 0.0
+    record_min: Annotated[Minutes, Field(gt=0.0)]
     steps: Annotated[list[Step], Field(min_length=1)]
 
 
@@ -229,12 +225,14 @@ def read(scenario: str | Path) -> tuple[str, Scenario]:
     """
     where = _place(scenario)
     try:
-        return where.stem, Scenario.model_validate(_content(where, ()))
+        checked = Scenario.model_validate(_content(where, ()))
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
         reason = str(first["msg"]).removeprefix("Value error, ")
         raise InputError(f"{where}, {field}" if field else str(where), reason) from error
+    refuse_above("runs", sum(len(run_set.profiles) for run_set in checked.set), str(where), "runs")
+    return where.stem, checked
 
 
 def _place(scenario: str | Path) -> Path:
@@ -243,13 +241,12 @@ def _place(scenario: str | Path) -> Path:
 
 
 def _content(where: Path, below: tuple[Path, ...]) -> dict[str, Any]:
+    expected = f"a TOML file or one of: {', '.join(names())}"
     try:
-        content: dict[str, Any] = tomllib.loads(where.read_text("utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(str(where), str(error), "TOML") from error
-    except (OSError, ValueError) as error:  # no UTF-8, or a name that no file can have
-        expected = f"a TOML file or one of: {', '.join(names())}"
-        raise InputError(str(where), "no such scenario", expected) from error
+        content = read_toml(where, expected)
+    except InputError as error:
+        found = "no such scenario" if error.found == "does not exist" else error.found
+        raise InputError(error.where, found, error.expected) from error
     if "extends" not in content:
         return content
     ground = _place(str(content.pop("extends")))

@@ -5,7 +5,7 @@ Only `evaluate` and tests open it; nothing that fits or diagnoses may.
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..inputs import read_input
+from ..stored import read_result
 
 __all__ = ["FILE", "SCHEMA", "Truth", "read_truth", "simulated_floor"]
 
 SCHEMA = "gyrotc.truth/1"
 FILE = "truth.json"
+# What numpy.save writes of one dimension (NEP 1); matched, not evaluated.
+_HEAD = re.compile(
+    rb"\x93NUMPY\x01\x00..\{'descr': '<f(?P<size>[48])', 'fortran_order': False, "
+    rb"'shape': \((?P<count>[0-9]{1,12}),\), \} *\n",
+    re.DOTALL,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,16 +55,19 @@ class Truth:
         runs = {run["file"]: run for run in self.content["runs"]}
         if file not in runs:
             raise InputError(str(self.folder / FILE), f"no run {file}", ", ".join(sorted(runs)))
-        path = self.folder / runs[file]["noise"]
-        try:
-            return float(runs[file]["noise_step_s"]), np.load(path).astype(np.float64)
-        except (OSError, ValueError) as error:
-            raise InputError(str(path), "cannot be read", "the noise of a simulated run") from error
+        name = Path(runs[file]["noise"])
+        if name.is_absolute() or ".." in name.parts:
+            where = f"{self.folder / FILE}, run {file}, field noise"
+            raise InputError(where, repr(str(name)), "a file in the folder of the data set")
+        return float(runs[file]["noise_step_s"]), _array(self.folder / name)
 
     def mean_noise_dph(self, file: str, average_s: float) -> NDArray[np.float64]:
         """Means over `average_s` (rounded to whole steps, at least one) of the noise of one run, deg/h."""
         step_s, noise = self.noise_dph(file)
         count = max(1, round(average_s / step_s))
+        if len(noise) < count:
+            where = f"{self.folder / FILE}, run {file}"
+            raise InputError(where, f"noise of {len(noise) * step_s:g} s", f"{average_s:g} s at least")
         return np.asarray(noise[: len(noise) - len(noise) % count].reshape(-1, count).mean(axis=1))
 
 
@@ -82,12 +93,23 @@ def read_truth(folder: Path) -> Truth | None:
         InputError: `truth.json` is there and is not what `simulate` writes.
     """
     path = folder / FILE
-    if not path.exists():
+    if not path.exists() and not path.is_symlink():
         return None
-    try:
-        content = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), "cannot be read", "JSON") from error
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-        raise InputError(str(path), "not the truth of a simulated data set", f'"schema": "{SCHEMA}"')
-    return Truth(folder, content)
+    return Truth(folder, read_result(path, "truth"))
+
+
+def _array(path: Path) -> NDArray[np.float64]:
+    """The finite float numbers of an .npy file of one dimension.
+
+    Raises:
+        InputError: It holds anything else; also where its head promises more than the file holds.
+    """
+    expected = "the noise of a simulated run"
+    data = read_input(path, "recording_mib", expected)
+    head = _HEAD.match(data)
+    if head is None or int(head["count"]) * int(head["size"]) != len(data) - head.end():
+        raise InputError(str(path), "is no whole array of numbers", expected)
+    values = np.frombuffer(data[head.end() :], dtype=f"<f{int(head['size'])}").astype(np.float64)
+    if not np.isfinite(values).all():
+        raise InputError(str(path), "a number that is not finite", expected)
+    return values

@@ -7,7 +7,6 @@ word with what the reference computes.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -23,6 +22,7 @@ from ..errors import InputError
 from ..model import Model, load_model
 from ..reference import answers
 from ..signature import check_signature, load_public_key
+from ..stored import read_result
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
 from .board import Job, board_entries
@@ -166,11 +166,11 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[E
 def _earlier(folder: Path, identity: dict[str, str], *, boards_only: bool) -> list[Entry]:
     """Entries of an earlier `verify.json` that still hold: same model, same code."""
     try:
-        earlier = json.loads((folder / "verify.json").read_text(encoding="utf-8"))
-        same = earlier["schema"] == SCHEMA and all(earlier[k] == v for k, v in identity.items())
-        return [e for e in earlier["targets"] if same and ("log" in e or not boards_only)]
-    except (OSError, ValueError, KeyError, TypeError):
+        earlier = read_result(folder / "verify.json", "verify", optional=True)
+    except InputError:
         return []
+    same = all(earlier.get(k) == v for k, v in identity.items())
+    return [e for e in earlier["targets"] if "log" in e or not boards_only] if same else []
 
 
 def _merged(earlier: list[Entry], entries: list[Entry]) -> list[Entry]:

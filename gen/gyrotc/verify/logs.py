@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import CheckFailed, InputError
+from ..errors import CheckFailed
+from ..inputs import read_input
 from ..reference import answers
 from ..vectors import Vectors
 from .board import Job, check_identity
-from .boardlog import BoardOutput, Comparison, compare, read_log
+from .boardlog import BoardLog, BoardOutput, Comparison, compare, read_log
 
-__all__ = ["log_entries"]
+__all__ = ["log_entries", "log_parts"]
 
 _SHOWN = 5  # lines outside of a board test, differences
 
@@ -30,13 +31,7 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[Entry], Ent
         CheckFailed: It does not hold whole board tests of this model alone; names the line.
     """
     try:
-        text = log.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise InputError(
-            str(log), f"cannot be read ({error.strerror})", "the output of board_test.c"
-        ) from error
-    try:
-        found = read_log(text)
+        found = log_parts(log)
         compared = [(part, _compared(job, vectors, part)) for part in found.parts]
     except CheckFailed as error:
         raise CheckFailed(f"{log}: {error}") from error
@@ -55,6 +50,16 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[Entry], Ent
         "first_outside": [f"line {number}: {line[:80]}" for number, line in found.outside[:_SHOWN]],
     }
     return [_entry(job, log, name, parts) for (name, _), parts in groups.items()], whole
+
+
+def log_parts(log: Path) -> BoardLog:
+    """The board tests that a log holds.
+
+    Raises:
+        InputError: The file cannot be read.
+        CheckFailed: A line of a board test is damaged, or one is not whole.
+    """
+    return read_log(read_input(log, "result_mib", "the output of board_test.c").decode("ascii", "replace"))
 
 
 def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> Comparison:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..applied import channels_of
 from ..dataset import Rows, Run
-from ..errors import CheckFailed
+from ..errors import CheckFailed, InputError
 from ..frontend import missed_before, samples_per_block
 from ..model import Model
 from ..reference import Replay, replay
@@ -29,6 +29,7 @@ from .source import checked_sources, table_files
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
 
 _SHOWN_MISMATCHES = 5
+_MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,11 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
     per_block = samples_per_block(model.block_s, run.row_period_s)
     if run.power_on_s is not None and any(term.id == "warm_up" for term in model.terms):
         before_s = float(rows.time_s[0]) - run.power_on_s
-        missed[0] = per_block * max(round(before_s / model.block_s), 0)
+        before = per_block * max(round(before_s / model.block_s), 0)
+        if before > _MOST_MISSED:
+            found = f"power-on {before_s:.4g} s before the first row"
+            raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
+        missed[0] = before
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)
     return History(channels, missed, per_block, answers)
 
