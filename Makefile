@@ -2,9 +2,17 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-PYTHON := .venv/bin/python
-GYROTC := .venv/bin/gyrotc
-FUZZERS := map check open step restore
+override PYTHON := .venv/bin/python
+override GYROTC := .venv/bin/gyrotc
+override FUZZERS := map check open step restore
+# What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
+# the shell from reading it, and unexport keeps make from expanding it for the environment.
+unexport DATA AXIS SECONDS SEED GYROTC_REAL_DATA
+override export SET_DATA := $(value DATA)
+override export SET_AXIS := $(value AXIS)
+override export SET_SECONDS := $(or $(value SECONDS),20)
+override export SET_SEED := $(value SEED)
+override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -19,7 +27,7 @@ setup:
 ## the main job: data -> verified C and a report in build/demo (DATA=folder [AXIS=x] for your own recordings)
 demo: setup
 ifdef DATA
-	@$(GYROTC) build "$(DATA)" --out build/demo --any-serial $(if $(AXIS),--axis $(AXIS))
+	@$(GYROTC) build --out build/demo --any-serial $${SET_AXIS:+"--axis=$$SET_AXIS"} -- "$$SET_DATA"
 else
 	@$(GYROTC) simulate paper --seed 1 --out build/demo-data
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
@@ -62,11 +70,12 @@ cov:
 
 ## a fuzzer for each function family and arithmetic, SECONDS=20 each; what they learn is kept in build/corpus
 fuzz:
+	@[[ $$SET_SECONDS =~ ^[1-9][0-9]{0,5}$$ ]] || { echo "make fuzz: SECONDS=$$SET_SECONDS is no number of seconds" >&2; exit 2; }
 	@tools/setup.sh test
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
 	@for target in $(addsuffix _f32,$(FUZZERS)) $(addsuffix _q31,$(FUZZERS)); do \
 	  mkdir -p build/corpus/$$target && echo "fuzz_$$target" && \
-	  build/fuzz/fuzz_$$target -max_total_time=$(or $(SECONDS),20) -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
+	  build/fuzz/fuzz_$$target -max_total_time="$$SET_SECONDS" -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
 	    -print_final_stats=1 build/corpus/$$target || exit 1; \
 	done
 
@@ -74,11 +83,11 @@ fuzz:
 picture: demo
 	@tools/setup.sh picture
 	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1240 \
-	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/report.html" >/dev/null 2>&1
+	  --screenshot=docs/report.png "file://$$PWD/build/demo/report.html" >/dev/null 2>&1
 	@$(GYROTC) simulate thermal-gradient --seed 3 --out build/picture-data
 	@$(GYROTC) diagnose build/picture-data --out build/picture >/dev/null
 	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1020 \
-	  --screenshot=docs/diagnosis.png "file://$(CURDIR)/build/picture/report.html" >/dev/null 2>&1
+	  --screenshot=docs/diagnosis.png "file://$$PWD/build/picture/report.html" >/dev/null 2>&1
 	@rm -rf build/browser
 
 ## the paper's table and figures again: docs/paper.md
@@ -87,8 +96,8 @@ paper: setup
 
 ## measured recordings with their last span left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
 real: setup
-	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
-	@$(PYTHON) tools/real_diagnosis.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
+	@$(PYTHON) tools/real.py "$$SET_REAL" docs build/real
+	@$(PYTHON) tools/real_diagnosis.py "$$SET_REAL" docs build/real
 
 ## training beside its peers (in build/bench), cost of the runtime in emulators: docs/results.md
 bench:
@@ -103,11 +112,11 @@ fleet: setup
 
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results/kills.json
 kills: setup
-	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $(if $(SEED),--seed $(SEED))
+	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup
-	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $(if $(SEED),--seed $(SEED))
+	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## remove what was built (not .venv)
 clean:
