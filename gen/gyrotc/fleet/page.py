@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +20,7 @@ from ..outputs import write_atomically
 from ..plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from ..report import page_environment
 from ..texts import csv_cell
+from .entry import INTERNAL
 from .outliers import FIGURES, outliers, spread
 
 __all__ = ["summary_of", "write_summary"]
@@ -31,7 +33,7 @@ _COLUMNS = (
 
 def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The JSON object of `fleet.json`."""
-    done = [entry for entry in entries if entry["status"] == "done"]
+    counts = Counter(entry["status"] for entry in entries)
     figured = [entry for entry in entries if "model_hash" in entry]
     return {
         "schema": "gyrotc.fleet/1",
@@ -39,11 +41,12 @@ def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "serial": None,
         "axis": None,
         "units": len(entries),
-        "done": len(done),
-        "failed": len(entries) - len(done),
+        "done": counts["done"],
+        "failed": counts["failed"],
+        "unfinished": counts["unfinished"],
         "figures": {f: spread(figured, f) for f in (*FIGURES, "centers", "table_bytes")},
         "outliers": [asdict(outlier) for outlier in outliers(figured)],
-        "serials": [{k: v for k, v in entry.items() if k not in ("key", "kept")} for entry in entries],
+        "serials": [{k: v for k, v in entry.items() if k not in INTERNAL} for entry in entries],
     }
 
 

@@ -1,0 +1,77 @@
+"""The entry of one gyro: what the summary says of it, and what its result was made of (`entry.json`)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..model import write_atomically
+from .fingerprint import digest_of, files_of
+
+__all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
+
+ENTRY = "entry.json"
+INTERNAL = ("key", "kept", "results", "seal")  # of no use in a summary
+Entry = dict[str, Any]
+_MAX_BYTES = 2**22
+_WRITTEN_AGAIN = (ENTRY, "verify.json")  # a later `gyrotc verify` tells its own result
+_Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+_Count = Annotated[int, Field(ge=0)]
+
+
+class _Stored(BaseModel):
+    """Fields of `entry.json`; figures in deg/h, None where nothing was measured."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    name: str
+    dataset: str
+    axis: Literal["x", "y", "z"] | None
+    status: Literal["done", "failed"]
+    reason: str | None = None
+    serial: str
+    judged_on: Literal["exam", "left_out", "train"] | None
+    before_rms_dph: float | None
+    after_rms_dph: float | None
+    after_mean_dph: float | None
+    rms_over_floor: float | None
+    noise_floor_dph: float | None
+    bias_dph: float
+    centers: _Count
+    table_bytes: _Count
+    sum_abs_weights_dph: float
+    error_bound_dph: float | None
+    findings: list[str]
+    model_hash: str
+    key: _Hash
+    results: dict[str, _Hash]
+    seal: _Hash
+
+
+def write_entry(folder: Path, entry: Entry) -> Entry:
+    """Writes `entry.json` beside a unit's results, with their hashes and a seal over all it says; returns it."""
+    results = {name: digest for name, digest in files_of(folder).items() if name not in _WRITTEN_AGAIN}
+    content = entry | {"results": results}
+    whole = content | {"seal": digest_of(content)}
+    write_atomically(folder / ENTRY, json.dumps(whole, indent=1, allow_nan=False) + "\n")
+    return whole
+
+
+def kept_entry(folder: Path, key: str) -> Entry | None:
+    """The entry of a result that is whole and was made of the same things (`key`); None: it must be made again."""
+    try:
+        path = folder / ENTRY
+        if path.stat().st_size > _MAX_BYTES:
+            return None
+        entry: Entry = json.loads(path.read_text(encoding="utf-8"))
+        stored = _Stored.model_validate(entry)
+        if stored.key != key or stored.status != "done":
+            return None
+        if digest_of({name: value for name, value in entry.items() if name != "seal"}) != stored.seal:
+            return None
+        return entry if stored.results.items() <= files_of(folder).items() else None
+    except (OSError, ValueError, RecursionError, ValidationError):
+        return None
