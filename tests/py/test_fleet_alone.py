@@ -6,6 +6,7 @@ import csv
 import ctypes
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,8 +21,10 @@ from gyrotc.errors import InputError
 from gyrotc.fitting import FitOptions
 from gyrotc.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
 from gyrotc.fleet.fingerprint import inputs_of, program_of
+from gyrotc.fleet.manifest import SUMMARY
 from gyrotc.fleet.unit import Task, do_unit, done_before
 from gyrotc.limits import load_limits
+from gyrotc.outputs import MARKER, Lock
 from recordings import columns, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -90,6 +93,8 @@ TAMPERED: dict[str, Callable[[Path], object]] = {
     "its status": _edit("entry.json", '"status": "done"', '"status": "dune"'),
     "a type of the entry": _edit("entry.json", '"findings": [', '"findings": [1, '),
     "deep nesting": lambda folder: (folder / "entry.json").write_text("[" * 100_000),
+    "the marker": _edit(".gyrotc-result.json", '"schema"', '"scheme"'),
+    "a list of the marker": _edit(".gyrotc-result.json", '"model.json"', '"mode1.json"'),
     "an empty entry": lambda folder: (folder / "entry.json").write_text(""),
     "half the files": lambda folder: [p.unlink() for p in sorted((folder / "c").iterdir())[::2]],
     "the evaluation": lambda folder: (folder / "evaluate.json").unlink(),
@@ -100,7 +105,9 @@ def _stable(folder: Path) -> dict[str, bytes]:
     """Files of a result but those that tell how long it took, or hold hashes of these."""
     files = (path for path in folder.rglob("*") if path.is_file())
     return {
-        path.name: path.read_bytes() for path in files if path.name not in ("training.json", "entry.json")
+        path.name: path.read_bytes()
+        for path in files
+        if path.name not in ("training.json", "entry.json", MARKER)
     }
 
 
@@ -110,8 +117,87 @@ def test_a_tampered_result_is_not_done(case: str, task: Task) -> None:
     before = _stable(task.out)
     TAMPERED[case](task.out)
     assert done_before(task) is None
-    assert do_unit(task)["status"] == "done"
+    damaged = {path.relative_to(task.out): path.read_bytes() for path in task.out.rglob("*.*")}
+    again = do_unit(task)
+    if case == "a list of the marker":  # model.json is then a file that gyrotc did not write
+        assert again["status"] == "failed" and "model.json" in again["reason"]
+        return
+    assert again["status"] == "done"
     assert _stable(task.out) == before
+    if "aside" in again:  # nobody's file is lost
+        aside = task.out.with_name(again["aside"])
+        assert {path.relative_to(aside): path.read_bytes() for path in aside.rglob("*.*")} == damaged
+    else:
+        assert case in ("half the files", "the evaluation")
+    assert {p.name for p in task.out.parent.iterdir()} <= {"RLG-1", "RLG-1.changed-1"}
+
+
+def test_a_foreign_file_in_a_result_stays_and_stops_its_gyro_alone(task: Task) -> None:
+    do_unit(task)
+    (task.out / "notes.txt").write_text("mine")
+    assert done_before(task) is not None
+    other = replace(task, fleet=replace(task.fleet, options=FitOptions(seed=1)))
+    entry = do_unit(other)
+    assert entry["status"] == "failed" and "notes.txt" in entry["reason"]
+    assert "its folder holds an earlier result" in entry["reason"]
+    assert done_before(task) is not None and (task.out / "notes.txt").read_text() == "mine"
+
+
+def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
+    told = []
+
+    def meanwhile(_jobs: int, tasks: list[Task]) -> Any:
+        with pytest.raises(InputError, match="another job writes there: gyrotc fleet, process") as caught:
+            run_fleet(fleet, out)
+        told.append(caught.value)
+        yield 0, do_unit(tasks[0])
+
+    monkeypatch.setattr(run, "on_processes", meanwhile)
+    assert run_fleet(fleet, out)[0]["status"] == "done"
+    assert told and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
+
+
+@pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
+def test_recordings_are_never_the_place_for_results(place: str, tmp_path: Path) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    with pytest.raises(InputError, match="the data set"):
+        run_fleet(load_manifest(tmp_path / "d"), tmp_path / place)
+    assert {path.name for path in (tmp_path / "d" / "RLG-1").iterdir()} == {"run-01.csv", "dataset.toml"}
+
+
+def test_a_result_is_no_data_set(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    data = task.unit.dataset.parent
+    run_fleet(load_manifest(data), data / "out")
+    assert [unit.name for unit in load_manifest(data).units] == ["RLG-1"]
+
+
+def test_a_summary_of_somebody_else_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "fleet.csv").write_text("aircraft,pilot\n")
+    with pytest.raises(InputError, match=r"fleet\.csv"):
+        run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out")
+    assert (tmp_path / "out" / "fleet.csv").read_text() == "aircraft,pilot\n"
+
+
+def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    out = task.out.parent
+    run_fleet(task.fleet, out)
+    before = {path.name for path in out.iterdir()}
+    shutil.copytree(task.out, out / ".RLG-1.gyrotc-part-01234567")
+    (out / ".RLG-1.lock").touch()
+    busy = Lock(out / "RLG-1", "verify")
+    assert run_fleet(task.fleet, out)[0]["kept"]
+    busy.release()
+    assert run_fleet(task.fleet, out)[0]["kept"]
+    assert {path.name for path in out.iterdir()} == before
 
 
 def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:

@@ -62,4 +62,6 @@ def _tell_entry(entry: dict[str, Any]) -> None:
         )
     if entry["status"] != "done":
         text += f"; {entry['reason']}"
+    if entry.get("aside"):
+        text += f"; its earlier result had been changed and is now {entry['aside']}"
     tell(text)

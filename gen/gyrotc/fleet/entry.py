@@ -6,18 +6,17 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from ..model import write_atomically
-from .fingerprint import digest_of, files_of
+from ..errors import GyrotcError
+from ..outputs import faults, write_atomically
 
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
 ENTRY = "entry.json"
-INTERNAL = ("key", "kept", "results", "seal")  # of no use in a summary
+INTERNAL = ("key", "kept")  # of no use in a summary
 Entry = dict[str, Any]
 _MAX_BYTES = 2**22
-_WRITTEN_AGAIN = (ENTRY, "verify.json")  # a later `gyrotc verify` tells its own result
 _Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 _Count = Annotated[int, Field(ge=0)]
 
@@ -47,17 +46,12 @@ class _Stored(BaseModel):
     findings: list[str]
     model_hash: str
     key: _Hash
-    results: dict[str, _Hash]
-    seal: _Hash
 
 
 def write_entry(folder: Path, entry: Entry) -> Entry:
-    """Writes `entry.json` beside a unit's results, with their hashes and a seal over all it says; returns it."""
-    results = {name: digest for name, digest in files_of(folder).items() if name not in _WRITTEN_AGAIN}
-    content = entry | {"results": results}
-    whole = content | {"seal": digest_of(content)}
-    write_atomically(folder / ENTRY, json.dumps(whole, indent=1, allow_nan=False) + "\n")
-    return whole
+    """Writes `entry.json` into a unit's result, whose marker will hold its hash; returns it."""
+    write_atomically(folder / ENTRY, json.dumps(entry, indent=1, allow_nan=False) + "\n")
+    return entry
 
 
 def kept_entry(folder: Path, key: str) -> Entry | None:
@@ -68,10 +62,8 @@ def kept_entry(folder: Path, key: str) -> Entry | None:
             return None
         entry: Entry = json.loads(path.read_text(encoding="utf-8"))
         stored = _Stored.model_validate(entry)
-        if stored.key != key or stored.status != "done":
+        if stored.key != key or stored.status != "done" or faults(folder):
             return None
-        if digest_of({name: value for name, value in entry.items() if name != "seal"}) != stored.seal:
-            return None
-        return entry if stored.results.items() <= files_of(folder).items() else None
-    except (OSError, ValueError, RecursionError, ValidationError):
+        return entry
+    except (GyrotcError, OSError, ValueError, RecursionError):
         return None

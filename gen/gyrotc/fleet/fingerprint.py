@@ -1,4 +1,4 @@
-"""What a result depends on and what it consists of, as hashes of contents: times and sizes of files say nothing."""
+"""What a result depends on, as hashes of contents: times and sizes of files say nothing."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from typing import Any
 
 from .. import __version__, _core
 from ..amalgamate import runtime_folders
+from ..outputs import sha256
 
-__all__ = ["digest_of", "files_of", "inputs_of", "program_of"]
+__all__ = ["digest_of", "inputs_of", "program_of"]
 
-_BLOCK_BYTES = 2**20
 _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures come out of
 
 
@@ -33,8 +33,8 @@ def program_of() -> str:
     parts: list[Any] = [__version__, {name: metadata.version(name) for name in _COMPUTING}]
     for folder in (here, *runtime_folders()):
         files = (path for path in _regular(folder) if "__pycache__" not in path.parts)
-        parts.append({path.relative_to(folder).as_posix(): _sha256(path) for path in files})
-    return digest_of([*parts, _sha256(Path(_core.__file__))])
+        parts.append({path.relative_to(folder).as_posix(): sha256(path) for path in files})
+    return digest_of([*parts, sha256(Path(_core.__file__))])
 
 
 def inputs_of(dataset: Path) -> dict[str, str]:
@@ -42,19 +42,10 @@ def inputs_of(dataset: Path) -> dict[str, str]:
     found = {}
     for path in _regular(dataset):
         try:
-            found[str(path.relative_to(dataset))] = _sha256(path)
+            found[str(path.relative_to(dataset))] = sha256(path)
         except OSError as error:
             found[str(path.relative_to(dataset))] = str(error.strerror)
     return found
-
-
-def files_of(folder: Path) -> dict[str, str]:
-    """Every file of a result by its path in it, with its SHA-256.
-
-    Raises:
-        OSError: One cannot be read.
-    """
-    return {path.relative_to(folder).as_posix(): _sha256(path) for path in _regular(folder)}
 
 
 def _regular(folder: Path) -> Iterator[Path]:
@@ -75,11 +66,3 @@ def _is_regular(path: Path) -> bool:
         return stat.S_ISREG(path.stat().st_mode)
     except OSError:
         return False
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK_BYTES):
-            digest.update(block)
-    return digest.hexdigest()

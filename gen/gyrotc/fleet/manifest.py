@@ -15,6 +15,7 @@ from ..dataset import axes_of
 from ..errors import GyrotcError, InputError
 from ..fitting import FitOptions
 from ..limits import Limits, load_limits
+from ..outputs import KINDS, read_marker
 from ..train import NETWORK_METHODS
 
 if sys.version_info >= (3, 11):
@@ -197,11 +198,22 @@ def _has_recordings(folder: Path) -> bool:
     try:
         if not folder.is_dir():
             return False
+        if _is_result(folder):
+            return False
         return (folder / "dataset.toml").is_file() or any(
             file.suffix.lower() in (".csv", ".parquet") for file in folder.iterdir()
         )
     except OSError:
         return True
+
+
+def _is_result(folder: Path) -> bool:
+    """Whether gyrotc made it of recordings: also a fleet's folder holds CSV files."""
+    try:
+        marker = read_marker(folder)
+    except InputError:
+        return False
+    return marker is not None and marker.kind != KINDS["simulate"]
 
 
 def printable(text: str) -> str:

@@ -16,11 +16,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .. import __version__
-from ..outputs import write_atomically
+from ..outputs import result_folder, write_atomically
 from ..plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from ..report import page_environment
 from ..texts import csv_cell
 from .entry import INTERNAL
+from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
 
 __all__ = ["summary_of", "write_summary"]
@@ -51,15 +52,20 @@ def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns the object of the first."""
+    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns the object of the first.
+
+    Raises:
+        InputError: There are files of these names that gyrotc did not write.
+    """
     summary = summary_of(entries)
-    write_atomically(out / "fleet.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
-    write_atomically(out / "fleet.csv", _table(entries))
     names = {outlier["name"] for outlier in summary["outliers"]}
     picture = _picture([e for e in entries if e.get("after_rms_dph")], names)
     template = page_environment().get_template("fleet.html.j2")
     page = template.render(summary=summary, apart=names, picture=picture)
-    write_atomically(out / "fleet.html", page)
+    texts = (json.dumps(summary, indent=1, allow_nan=False) + "\n", _table(entries), page)
+    with result_folder(out, "fleet", entries=SUMMARY) as stage:
+        for name, text in zip(SUMMARY, texts, strict=True):
+            write_atomically(stage.folder / name, text)
     return summary
 
 

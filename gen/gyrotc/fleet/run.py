@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from ..outputs import Lock
+from ..outputs.places import check_apart, final_place
+from .aside import clean_units
 from .entry import Entry
 from .fingerprint import program_of
 from .manifest import Fleet
@@ -40,8 +44,18 @@ def run_fleet(
         InputError: A scheduler is named and Dask is not installed, or cannot be reached; or another fleet is being
             written to `out`.
     """
-    say = told or (lambda _: None)
-    out.mkdir(parents=True, exist_ok=True)
+    place = final_place(out)
+    check_apart(out, place, [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)])  # noqa: PTH112 (never raises)
+    place.mkdir(parents=True, exist_ok=True)
+    lock = Lock(place / "fleet.json", "fleet")
+    try:
+        return _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
+    finally:
+        lock.release()
+
+
+def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told) -> list[Entry]:
+    clean_units(out, [unit.folder for unit in fleet.units])
     program = program_of()
     tasks = [Task(unit, fleet, out / unit.folder, full, program) for unit in fleet.units]
     entries: dict[int, Entry] = {}

@@ -7,15 +7,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..build import build_into, folder_in_place
-from ..dataset import load
+from ..build import build_into
+from ..dataset import Dataset, load
 from ..emit import emit
 from ..errors import CheckFailed, GyrotcError, InputError
 from ..evaluate import evaluate
 from ..fitting import fit_dataset
 from ..limits import held_against
-from ..model import Model, load_model, write_atomically
+from ..model import Model, load_model
+from ..outputs import KINDS, result_folder, write_atomically
 from ..verify import verify
+from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
@@ -88,37 +90,42 @@ def _who(task: Task) -> Entry:
 def _built(task: Task) -> Entry:
     """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
     key = task.key()
-    with folder_in_place(task.out) as work:
-        model, evaluation, verification, held = (_whole if task.full else _quick)(task, work)
+    dataset = load(task.unit.dataset, axis=task.unit.axis)
+    aside = set_aside(task.out)
+    with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        model, evaluation, verification, held = (_whole if task.full else _quick)(
+            task.fleet, dataset, stage.folder
+        )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        faults = [f"{verification['failed']} checks failed"] if verification["failed"] else []
-        if evaluation["mismatches"]:
-            faults.append(f"{evaluation['mismatches']} steps differ from the reference")
-        faults += [
-            f"{c['limit']} {c['bound']} is not met: {c['measured']}"
-            for c in (held or {"limits": ()})["limits"]
-            if not c["met"]
-        ]
+        faults = _faults(evaluation, verification, held)
         status = {"status": "failed", "reason": "; ".join(faults)} if faults else {"status": "done"}
         figures = {"serial": model.serial} | _figures(model, evaluation, verification)
-        return write_entry(work, _who(task) | status | {"key": key} | figures)
+        entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
+    return entry | {"aside": aside} if aside else entry
+
+
+def _faults(evaluation: Entry, verification: Entry, held: Entry | None) -> list[str]:
+    found = [f"{verification['failed']} checks failed"] if verification["failed"] else []
+    if evaluation["mismatches"]:
+        found.append(f"{evaluation['mismatches']} steps differ from the reference")
+    for check in held["limits"] if held else ():
+        if not check["met"]:
+            found.append(f"{check['limit']} {check['bound']} is not met: {check['measured']}")
+    return found
 
 
 _Made = tuple[Model, Entry, Entry, "Entry | None"]
 
 
-def _whole(task: Task, work: Path) -> _Made:
-    dataset = load(task.unit.dataset, axis=task.unit.axis)
-    fleet = task.fleet
+def _whole(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
     result = build_into(work, dataset, fleet.options, numerics=fleet.numerics, limits=fleet.limits)
     return load_model(work), result.evaluation, result.verification, result.limits
 
 
-def _quick(task: Task, work: Path) -> _Made:
+def _quick(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
     """Without a compiler: what the C code gives is taken from the reference."""
-    fleet = task.fleet
-    dataset = load(task.unit.dataset, axis=task.unit.axis)
     fitted = fit_dataset(dataset, fleet.options)
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training)
