@@ -6,6 +6,7 @@ import csv
 import ctypes
 import json
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -24,10 +25,11 @@ from gyrotc.fleet.fingerprint import inputs_of, program_of
 from gyrotc.fleet.manifest import SUMMARY
 from gyrotc.fleet.unit import Task, do_unit, done_before
 from gyrotc.limits import load_limits
-from gyrotc.outputs import MARKER, Lock
+from gyrotc.outputs import MARKER, Lock, faults
 from recordings import columns, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
+KILLS = int(os.environ.get("GYROTC_KILLS", "3"))
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
 
 
@@ -182,6 +184,7 @@ def test_a_summary_of_somebody_else_stays(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match=r"fleet\.csv"):
         run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out")
     assert (tmp_path / "out" / "fleet.csv").read_text() == "aircraft,pilot\n"
+    assert not (tmp_path / "out" / "RLG-1").exists(), "refused before any work"
 
 
 def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
@@ -381,3 +384,46 @@ def test_no_process_outlives_its_fleet(tmp_path: Path) -> None:
     while any(_alive(pid) for pid in children):
         assert time.monotonic() < end, "a process goes on writing for a fleet that is gone"
         time.sleep(0.05)
+
+
+def _agrees(out: Path) -> int:
+    """Every unit is whole, and what the summary says of a gyro as done is what lies in its folder; how many are."""
+    for folder in out.glob("RLG-*"):
+        assert faults(folder) == [], folder
+    if not (out / "fleet.json").exists():
+        return 0
+    summary = json.loads((out / "fleet.json").read_text())
+    done = [entry for entry in summary["serials"] if entry["status"] == "done"]
+    for entry in done:
+        kept = json.loads((out / entry["name"] / "entry.json").read_text())
+        assert {name: kept[name] for name in entry} == entry
+    return len(done)
+
+
+def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
+    """Everything in its process group is killed: of each gyro the earlier result or the new one, and nothing else."""
+    seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    out = tmp_path / "out"
+    command = [PROGRAM, "fleet", tmp_path / "d", "--out", out, "--jobs", "2"]
+    for k in range(3):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    begun = time.monotonic()
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    length_s = time.monotonic() - begun
+    assert _agrees(out) == 3
+    for kill in range(KILLS):
+        for k in range(3):
+            gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=10 * kill + k + 10)
+        job = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        time.sleep(draw.uniform(0.3, 1.0) * length_s)
+        os.killpg(job.pid, draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))
+        job.wait()
+        _agrees(out)
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    assert _agrees(out) == 3
+    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), MARKER, *SUMMARY}
+    assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}

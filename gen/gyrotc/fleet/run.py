@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ..outputs import Lock
-from ..outputs.places import check_apart, final_place
+from ..outputs import KINDS, Lock
+from ..outputs.places import check_apart, check_contents, final_place
 from .aside import clean_units
 from .entry import Entry
 from .fingerprint import program_of
-from .manifest import Fleet
+from .manifest import SUMMARY, Fleet
 from .page import write_summary
 from .pool import on_dask, on_processes
 from .unit import Task, done_before
@@ -41,11 +41,12 @@ def run_fleet(
         told: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
-        InputError: A scheduler is named and Dask is not installed, or cannot be reached; or another fleet is being
-            written to `out`.
+        InputError: A scheduler is named and Dask is not installed, or cannot be reached; `out` is, holds or lies in
+            a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
     place = final_place(out)
     check_apart(out, place, [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)])  # noqa: PTH112 (never raises)
+    check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
     place.mkdir(parents=True, exist_ok=True)
     lock = Lock(place / "fleet.json", "fleet")
     try:
