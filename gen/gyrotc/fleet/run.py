@@ -45,7 +45,8 @@ def run_fleet(
             a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
     place = final_place(out)
-    check_apart(out, place, [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)])  # noqa: PTH112 (never raises)
+    folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
+    check_apart(out, place, folders, whole=True)
     check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
     place.mkdir(parents=True, exist_ok=True)
     lock = Lock(place / "fleet.json", "fleet")
