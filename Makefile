@@ -4,13 +4,14 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 override PYTHON := .venv/bin/python
 override GYROTC := .venv/bin/gyrotc
-override FUZZERS := map check open step restore
+override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.
-unexport DATA AXIS SECONDS SEED GYROTC_REAL_DATA
+unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA
 override export SET_DATA := $(value DATA)
 override export SET_AXIS := $(value AXIS)
 override export SET_SECONDS := $(or $(value SECONDS),20)
+override export SET_STORM := $(or $(value STORM),1000000)
 override export SET_SEED := $(value SEED)
 override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
@@ -68,16 +69,19 @@ cov:
 	@tools/setup.sh test
 	@$(PYTHON) tools/coverage.py
 
-## a fuzzer for each function family and arithmetic, SECONDS=20 each; what they learn is kept in build/corpus
+## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC, SEED=1
 fuzz:
-	@[[ $$SET_SECONDS =~ ^[1-9][0-9]{0,5}$$ ]] || { echo "make fuzz: SECONDS=$$SET_SECONDS is no number of seconds" >&2; exit 2; }
+	@for word in "SECONDS=$$SET_SECONDS" "STORM=$$SET_STORM" "SEED=$${SET_SEED:-1}"; do \
+	  [[ $$word =~ ^[A-Z]+=[1-9][0-9]{0,9}$$ ]] || { echo "make fuzz: $$word is no number from 1 on" >&2; exit 2; }; \
+	done
 	@tools/setup.sh test
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
 	@for target in $(addsuffix _f32,$(FUZZERS)) $(addsuffix _q31,$(FUZZERS)); do \
 	  mkdir -p build/corpus/$$target && echo "fuzz_$$target" && \
 	  build/fuzz/fuzz_$$target -max_total_time="$$SET_SECONDS" -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
-	    -print_final_stats=1 build/corpus/$$target || exit 1; \
+	    -print_final_stats=1 build/corpus/$$target $$(ls -d tests/fuzz/corpus/$$target 2>/dev/null) || exit 1; \
 	done
+	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric "$$SET_STORM" "$${SET_SEED:-1}" || exit 1; done
 
 ## the pictures of a report and of a diagnosis in README.md, by a headless browser
 picture: demo

@@ -139,17 +139,22 @@ typedef struct {
 #define GTC_SAVE_WORDS (26 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
- * no flushed subnormals that the table needs), checksum over its values, its known answers.
- * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE (checksum) or GTC_E_SELF_TEST.
+ * no flushed subnormals that the table needs), checksum over its values, every word within its range
+ * (docs/FORMAT.md, section 3), its known answers.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: a word outside its range), GTC_E_IMAGE (checksum) or
+ * GTC_E_SELF_TEST.
  * Cost: n_probes + 2 evaluations of the map and about 40 operations for each word of the table. */
 GTC_MUST_CHECK int gtc_f32_check(const gtc_f32_table_t *table);
 GTC_MUST_CHECK int gtc_q31_check(const gtc_q31_table_t *table);
 
 /* Makes a table from a binary image (gtc_<id>.bin) in flash: a new calibration without a new
  * executable. `table` receives pointers into `words`, which must stay in place. `expected_id` is
- * GTC_<ID>_ID of the emitted header. Nothing is written unless the whole image is sound.
+ * GTC_<ID>_ID of the emitted header. Nothing is written unless the whole image is sound: with a table
+ * that was opened no function traps or reads outside, whoever made the image. Who made it, a CRC does
+ * not say: the numbers are still to be those of this gyro.
  * Returns 0, GTC_E_ARG, GTC_E_IMAGE (magic, byte order, length, CRC, sizes), GTC_E_LAYOUT (another
- * layout, or it needs what was not compiled in) or GTC_E_ID. Cost: about 40 operations a word. */
+ * layout, it needs what was not compiled in, or a word lies outside its range) or GTC_E_ID.
+ * Cost: about 50 operations a word. */
 GTC_MUST_CHECK int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words,
                                 uint_least32_t n_words, uint_least32_t expected_id);
 GTC_MUST_CHECK int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words,
@@ -162,15 +167,16 @@ GTC_MUST_CHECK int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp,
                                int_least32_t slope, int_least32_t *bias);
 
 /* Starts a state. samples_per_block = block_s of the emitted header / sample period of this
- * target, 1 ... 2^20. Returns 0, GTC_E_ARG or GTC_E_LAYOUT. */
+ * target, 1 ... 2^20. Returns 0, GTC_E_ARG or GTC_E_LAYOUT (as check). Cost: some operations a word. */
 GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table,
                                 uint_least32_t samples_per_block);
 GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table,
                                 uint_least32_t samples_per_block);
 
 /* One sample: channels[0] is the temperature, further ones (n_channels of the table) are the
- * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit). A missing, stuck
- * or impossible temperature is held, never an error.
+ * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit; f32: what lies
+ * beyond 1e9 counts as missing). A missing, stuck or impossible
+ * temperature is held, never an error.
  * Returns the status of the correction in force, with GTC_HELD if this sample was not believed;
  * GTC_E_ARG for a NULL pointer.
  * Cost: about 30 operations; the call that opens a block also makes the correction (one

@@ -89,12 +89,14 @@ int FN(check)(const TABLE *table)
 
     if (table == NULL) {
         status = GTC_E_ARG;
-    } else if (!FN(is_usable)(table)) {
+    } else if (!FN(is_readable)(table)) {
         status = GTC_E_LAYOUT;
     } else if (!FN(primitives_work)()) {
         status = GTC_E_SELF_TEST;
     } else if (FN(crc)(table) != table->crc) {
         status = GTC_E_IMAGE;
+    } else if (!FN(is_usable)(table)) {
+        status = GTC_E_LAYOUT;
     } else if (!FN(probes_agree)(table)) {
         status = GTC_E_SELF_TEST;
     } else {

@@ -29,6 +29,7 @@
 #define NUM_ZERO 0.0F
 #define NUM_PLAUSIBLE_MIN (-90.0F) /* C */
 #define NUM_PLAUSIBLE_MAX 200.0F
+#define CHANNEL_MAX 1.0e9F /* magnitude of a sample of an auxiliary channel; sums of a block stay finite */
 #define NUM_MISSING_BITS 0x7FC00000UL /* no finite number has these */
 #define ARITHMETIC 1U /* in the second word of an image */
 

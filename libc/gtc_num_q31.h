@@ -26,6 +26,7 @@
 #define NUM_ZERO 0
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
+#define CHANNEL_MAX 2147483647 /* every sample of an auxiliary channel but the mark of a missing one */
 #define NUM_MISSING_BITS 0x80000000UL
 #define ARITHMETIC 2U /* in the second word of an image */
 
@@ -351,7 +352,7 @@ static inline int_least32_t FN(lesser)(int_least32_t a, int_least32_t b)
     return (a < b) ? a : b;
 }
 
-/* Where x is on the way between two different positions, in 2^-24; 0 before `from`. */
+/* Where x is on the way between two different positions, in 2^-24; 0 before `from`, 1 behind `to`. */
 static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, int_least32_t to)
 {
     int_least32_t way = x - from;
@@ -360,6 +361,9 @@ static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, in
     if (whole < 0) {
         way = -way;
         whole = -whole;
+    }
+    if (way >= whole) {
+        return FULL_SHARE; /* no share is larger, and a narrow region's would not fit */
     }
     return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
 }

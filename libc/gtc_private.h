@@ -89,7 +89,11 @@ extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
 void gtc_f32_nothing(gtc_f32_state_t *state, uint_least32_t i, float x);
 void gtc_q31_nothing(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
 
-/* 1 if this build of the runtime can use the table, else 0. */
+/* 1 if the table is of this layout and its counts say where its arrays end, else 0. */
+int gtc_f32_is_readable(const gtc_f32_table_t *table);
+int gtc_q31_is_readable(const gtc_q31_table_t *table);
+
+/* 1 if this build of the runtime can use the table: no function meets a run-time error with it; else 0. */
 int gtc_f32_is_usable(const gtc_f32_table_t *table);
 int gtc_q31_is_usable(const gtc_q31_table_t *table);
 

@@ -18,7 +18,8 @@ static void FN(auxiliary_take)(STATE *state, uint_least32_t i, NUM x)
     NUM *const mean = &state->term[i][0];
     NUM *const base = &state->term[i][1];
 
-    if (FN(is_missing)(x) != 0) {
+    /* False for a NaN, too. Before the first believed temperature no block ends that could empty the sum. */
+    if ((!((x >= -CHANNEL_MAX) && (x <= CHANNEL_MAX))) || (state->channel_valid[i] >= state->samples_per_block)) {
         return;
     }
     if (FN(is_missing)(*mean) != 0) {

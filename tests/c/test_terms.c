@@ -207,6 +207,34 @@ TEST(times_without_power_add_up)
     CHECK_INT(6, a.off_blocks);
 }
 
+/* No block ends before the first believed temperature; the sum of the channel must not grow for ever. */
+TEST(a_channel_is_not_summed_without_end_where_the_temperature_is_missing)
+{
+    state_t state = started_with(&TERMS);
+
+    (void)samples(&state, MISSING, C(13.0), 100);
+    CHECK_INT(N, state.channel_valid[3]);
+    CHECK_INT(GTC_WARMING, sample(&state, C(15.0), C(12.0)));
+}
+
+#if !TEST_Q31
+/* A sum of such samples could be infinite, and the correction no number. */
+TEST(a_sample_of_a_channel_that_no_sensor_gives_is_a_missing_one)
+{
+    state_t a = started_with(&TERMS);
+    state_t b = started_with(&TERMS);
+    int k;
+
+    (void)samples(&a, C(15.0), C(12.0), (int)N);
+    (void)samples(&b, C(15.0), C(12.0), (int)N);
+    for (k = 0; k < 40; k++) {
+        (void)sample(&a, C(15.0), ((k % 2) != 0) ? 3.0e38F : -3.0e38F);
+        (void)sample(&b, C(15.0), MISSING);
+        CHECK(same(bias_of(&a), bias_of(&b)));
+    }
+}
+#endif
+
 #if TEST_Q31
 /* Differences within a block of up to 2^32. */
 TEST(an_auxiliary_channel_has_the_mean_of_its_extremes)
@@ -266,6 +294,10 @@ int main(void)
     RUN(tables_with_terms_pass_their_self_test);
     RUN(at_rest_memories_and_plays_come_to_rest_and_warm_up_fades);
     RUN(an_auxiliary_channel_is_added_and_held_when_it_is_missing);
+    RUN(a_channel_is_not_summed_without_end_where_the_temperature_is_missing);
+#if !TEST_Q31
+    RUN(a_sample_of_a_channel_that_no_sensor_gives_is_a_missing_one);
+#endif
     RUN(without_a_first_auxiliary_sample_nothing_is_added);
     RUN(a_play_moves_only_when_the_temperature_has_gone_its_way);
     RUN(holds_and_fallback_step_the_terms_too);

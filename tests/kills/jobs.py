@@ -130,9 +130,9 @@ def commands(root: Path) -> list[Case]:
 
 def _command(*arguments: object) -> Job:
     def job() -> None:
-        from gyrotc.cli import main
+        from gyrotc.cli import _status
 
         sys.argv = ["gyrotc", *(str(a) for a in arguments)]
-        main()
+        raise SystemExit(_status())  # `main` leaves at once: the calls could not be counted
 
     return job

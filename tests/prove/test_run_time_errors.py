@@ -28,6 +28,7 @@ class Part:
     """An analysis: its C file, the table it is about, how precise, which functions by contract.
 
     `checks` are proved besides; `left` is the number of alarms in fixed point that docs/proof.md argues by hand.
+    `shape`: instead of the emitted table any that `init` accepts, of so many networks and with such a last term.
     """
 
     file: str
@@ -37,8 +38,10 @@ class Part:
     contracts: dict[str, str] = field(default_factory=dict)
     checks: int = 0
     left: int = 0
+    shape: tuple[int, str] | None = None
 
 
+_RELATED = {"f32": "gtc_f32_cell", "q31": "gtc_q31_position"}
 _TERMS = {"f32": "gtc_f32_follow,gtc_f32_mean", "q31": "gtc_q31_follow,gtc_q31_mean"}
 PARTS = {
     "map": Part("map", precision=7, checks=1),
@@ -57,6 +60,10 @@ PARTS = {
     "memory": Part("follow", "terms", left=2),
     "memories, play, warm-up": Part("terms", "terms", precision=7, contracts=_TERMS, checks=1),
     "harmonic, channels": Part("terms", "bank", precision=7, contracts=_TERMS),
+    "map of any table": Part("map", precision=7, contracts=_RELATED, checks=1, shape=(1, "warm_up")),
+    "map of any bank": Part("map", precision=7, contracts=_RELATED, checks=1, left=3, shape=(2, "warm_up")),
+    "terms of any table": Part("terms", precision=7, contracts=_TERMS, shape=(1, "warm_up")),
+    "channels of any table": Part("terms", precision=7, contracts=_TERMS, shape=(1, "auxiliary")),
 }
 
 
@@ -65,6 +72,10 @@ def _analysed(c: Path, part: Part, numeric: str, machine: str) -> str:
     if part.contracts:
         options += ["-eva-use-spec", part.contracts[numeric]]
     define = "-DF32" if numeric == "f32" else "-DQ31"
+    if part.shape:
+        networks, term = part.shape
+        define += f" -DANY_TABLE -DSHAPE_NETWORKS={networks}U -DSHAPE_LAST=term_{term}"
+        define += " -DGTC_WITH_BANK=1 -DGTC_OPEN_TERMS=1"
     command = ["frama-c", *OPTIONS, *options, "-machdep", machine, f"-cpp-extra-args=-I{c} -I{HERE} {define}"]
     files = [str(HERE / f"{part.file}.c"), str(c / "gtc_rlg_0042.c")]
     done = subprocess.run([*command, *files], capture_output=True, text=True, check=False)

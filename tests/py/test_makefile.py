@@ -80,8 +80,9 @@ def test_values_reach_programs_as_they_are(value: str, house: Path) -> None:
 @pytest.mark.parametrize("value", [*HOSTILE, "-1", "0", "1e3", "20 30"])
 def test_a_fuzzing_time_that_is_none_is_refused(value: str, house: Path) -> None:
     """libFuzzer would take it for 0, which is for ever."""
-    status, calls = make(house, "fuzz", f"SECONDS={value}")
-    assert status == 2 and calls == []
+    for name in ("SECONDS", "STORM", "SEED"):
+        status, calls = make(house, "fuzz", f"{name}={value}")
+        assert status == 2 and calls == []
 
 
 def test_values_left_out_are_the_defaults(house: Path) -> None:

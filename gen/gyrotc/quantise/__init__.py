@@ -16,6 +16,7 @@ from ..model import Model
 from ..table import Numeric, Table
 from . import f32, q31
 from .probes import with_probes
+from .words import outside
 
 __all__ = ["NUMERICS", "Table", "quantise"]
 
@@ -50,7 +51,11 @@ class _Known:
 def _quantised(known: _Known, numeric: str) -> Table:
     """Kept for the next stages of the same job, which ask again."""
     model = known.model
-    table = with_probes(model, _MAKERS[numeric](model))
+    table = _MAKERS[numeric](model)
+    refused = outside(table)
+    if refused is not None:
+        raise CheckFailed(f"{numeric}: the runtime would refuse the table: {refused}")
+    table = with_probes(model, table)
     floor = model.noise_floor_dph
     if floor and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
         worst = max(table.bound_parts_dph, key=lambda part: table.bound_parts_dph[part])

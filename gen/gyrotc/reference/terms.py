@@ -36,12 +36,16 @@ class Effect:
     remarks: int
 
 
+_CHANNEL_MAX = np.float32(1e9)  # magnitude of a sample of an auxiliary channel in float32
+
+
 class Operations(Protocol):
     """Operations of one arithmetic on single numbers."""
 
     zero: Any
 
-    def is_missing(self, x: Any) -> bool: ...
+    def is_missing(self, x: Any) -> bool:
+        """Whether a sample of an auxiliary channel is none."""
 
     def settle(self, x: Any) -> Any: ...
 
@@ -67,7 +71,7 @@ class _F32:
     zero = np.float32(0.0)
 
     def is_missing(self, x: Any) -> bool:
-        return not np.isfinite(x)
+        return not abs(x) <= _CHANNEL_MAX
 
     def settle(self, x: Any) -> Any:
         return x

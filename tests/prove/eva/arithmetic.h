@@ -29,6 +29,12 @@ typedef int_least64_t wide_t;
 #define ANY_PLAUSIBLE() (int_least32_t)Frama_C_long_interval(LOWEST, HIGHEST)
 #endif
 
+#if defined(ANY_TABLE)
+#undef THE_TABLE
+#define THE_TABLE any
+static NAME(table_t) any; /* any_table.h */
+#endif
+
 #define MAX_BLOCK 1048576UL /* samples_per_block at most; `init` refuses more */
 
 /* Any number at all, in KINDS parts that are analysed apart: those that are one, and those that mark a missing

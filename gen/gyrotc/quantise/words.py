@@ -1,0 +1,152 @@
+"""Whether the runtime takes a table: every word in its range, and what relates several words.
+
+The ranges are read from the runtime's own text, libc/gtc_limits.inl, so that the generator cannot emit what
+`gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_usable*;
+tests/py/test_words.py holds both sides against each other.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..amalgamate import runtime_folders
+from ..table import ARRAYS, AUXILIARY, Table
+
+__all__ = ["outside"]
+
+_ROW = re.compile(r"RANGE\((.*?)\),(?:\s*/\* ([^*]*?) \*/)?$")
+_NAME = re.compile(r"^#define (GTC_\w+) (\d+)U?\b", re.MULTILINE)
+_N_WHOLE, _N_NUMBERS = 16, 10
+_REACH = np.float32(8.0)  # half ranges to which a normalised input may go
+_WIDTH = np.float32(2.0**-100)
+_SUM = 2**30
+_SPAN = 2**26 - 1
+_LAST_POSITION = 65535
+_LARGEST = 2**31 - 1
+
+Limits = list[tuple[str, float, float]]  # of words in order: name, least, most
+
+
+def outside(table: Table) -> str | None:
+    """The first word or condition that the runtime refuses, in words; None if it takes the table."""
+    return next(_refused(table), None)
+
+
+def _refused(table: Table) -> Iterator[str]:
+    whole, numbers, network, center, term, sigma = _limits(table.numeric)
+    header = table.header[2:]
+    yield from _beyond(header[:7] + header[17:], whole)
+    if table.networks.size == 0:
+        return
+    yield from _beyond(table.numbers(header[7:17]), numbers)
+    records = table.networks.reshape(-1, ARRAYS["networks"])
+    if int(records[:, 0].sum(dtype=np.uint64)) != table.n_centers:
+        yield "networks that do not share out the centers"
+    yield from _each(table, records[:, 1:], network)
+    yield from _each(table, table.centers.reshape(-1, ARRAYS["centers"]), center)
+    yield from _terms(table, term)
+    yield from _each(table, table.sigma.reshape(-1, 1), sigma)
+    yield from _regions(table, records)
+    yield from (_f32 if table.numeric == "f32" else _q31)(table, records)
+
+
+def _beyond(found: Any, limits: Limits) -> Iterator[str]:
+    for value, (name, least, most) in zip(found, limits, strict=True):
+        if not least <= float(value) <= most:
+            yield f"{name} is {float(value):g}, not in {least:g} ... {most:g}"
+
+
+def _each(table: Table, records: NDArray[np.uint32], limits: Limits) -> Iterator[str]:
+    for record in records:
+        yield from _beyond(table.numbers(record), limits)
+
+
+def _terms(table: Table, limits: Limits) -> Iterator[str]:
+    width = ARRAYS["terms"] - 2
+    for record in table.terms.reshape(-1, ARRAYS["terms"]):
+        kind, channel = int(record[0]), int(record[1])
+        if not 1 <= kind <= len(limits) // width:
+            yield f"kind of a term is {kind}"
+        elif channel >= table.n_channels or (channel != 0) != (kind == AUXILIARY):
+            yield f"channel of a term is {channel}"
+        else:
+            yield from _beyond(table.numbers(record[2:]), limits[(kind - 1) * width : kind * width])
+
+
+def _regions(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
+    for record in records:
+        edges = table.numbers(record[4:])
+        for low, high in (edges[:2], edges[2:]):
+            wide = high - low >= _WIDTH if table.numeric == "f32" else low < high
+            if not (wide or (len(records) == 1 and low <= high)):
+                yield "region of a network has no width"
+
+
+def _f32(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
+    center, *gains = table.numbers(table.scale)
+    edges = table.numbers(table.envelope).reshape(2, 2)
+    for axis, ((low, high), gain, offset) in enumerate(
+        zip(edges, gains, (center, np.float32(0.0)), strict=True)
+    ):
+        if not (high - low >= _WIDTH or table.envelope[2 * axis] == table.envelope[2 * axis + 1]):
+            yield "envelope is reversed or too narrow"
+        with np.errstate(all="ignore"):
+            reach = [(edge - offset) * gain for edge in (low, high)]
+        if not all(-_REACH <= z <= _REACH for z in reach):
+            yield "envelope reaches beyond 8 half ranges of the model's scale"
+
+
+def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
+    gains = table.numbers(table.scale).tolist()[:2]
+    edges = table.numbers(table.envelope).reshape(2, 2).tolist()
+    for (low, high), gain in zip(edges, gains, strict=True):
+        span = high - low
+        if not (0 <= span <= _SPAN and (span * 32 * gain) >> 32 <= _LAST_POSITION):
+            yield "envelope is reversed, too wide, or its positions end beyond 65535"
+    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])
+    last = centers[:, [0, 2]] * _LAST_POSITION + centers[:, [1, 3]]
+    if np.any(np.abs(last) > _LARGEST):
+        yield "argument of a Gaussian leaves 32 bits"
+    first = 0
+    for record in records:
+        own = slice(first, first + int(record[0]))
+        first = own.stop
+        total = int(np.abs(table.numbers(record[1:4])).sum() + np.abs(centers[own, 4]).sum())
+        if total > _SUM:
+            yield f"magnitudes of a network's weights make {total}, more than {_SUM}"
+
+
+@functools.cache
+def _limits(numeric: str) -> tuple[Limits, Limits, Limits, Limits, Limits, Limits]:
+    """Rows of libc/gtc_limits.inl for one arithmetic: whole numbers, numbers, network, center, terms, sigma."""
+    include, libc = runtime_folders()
+    headers = [(include / name).read_text(encoding="ascii") for name in ("gtc_config.h", "gtc_table.h")]
+    names = dict(_NAME.findall("".join(headers)))
+    first = 0 if numeric == "f32" else 2
+    rows: Limits = []
+    for line in (libc / "gtc_limits.inl").read_text(encoding="ascii").splitlines():
+        if match := _ROW.search(line):
+            values = [_number(text, names) for text in match[1].split(",")]
+            rows.append((match[2] or "what a term does not use", values[first], values[first + 1]))
+    sizes = [_N_WHOLE, _N_NUMBERS, ARRAYS["networks"] - 1, ARRAYS["centers"], 5 * (ARRAYS["terms"] - 2), 1]
+    ends = np.cumsum(sizes).tolist()
+    assert ends[-1] == len(rows), "libc/gtc_limits.inl has other rows than a table has words"
+    parts = [rows[end - size : end] for size, end in zip(sizes, ends, strict=True)]
+    return parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
+
+
+def _number(text: str, names: dict[str, str]) -> float:
+    """Value of a sum of constants of C."""
+    total, sign = 0.0, 1.0
+    for word in text.split():
+        if word in "+-":
+            sign = 1.0 if word == "+" else -1.0
+        else:
+            total += sign * float(names.get(word, word.rstrip("UF")))
+    return total

@@ -1,0 +1,123 @@
+/* gtc_limits.inl - the legal range of every word of a table, in the numbers included before.
+ *
+ * This is the one text of them. A table with a word outside of its range, or one that does not meet the
+ * conditions of gtc_usable.inl, is refused by gtc_<n>_open(), gtc_<n>_check() and gtc_<n>_init(); with any other
+ * table no function of the runtime meets a run-time error (docs/proof.md). The generator reads this file and
+ * emits no other table; docs/FORMAT.md, section 3, says it to users. Units stand in gtc_table.h.
+ *
+ * MISRA 8.9 throughout: the ranges stand together, not each in the one function that uses it.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+#define N_WHOLE 16U    /* whole numbers of a table's header ... */
+#define FIRST_COUNT 7U /* ... of which the counts are the last */
+#define N_NUMBERS 10U  /* other numbers of the header */
+#define N_KINDS 5U     /* of terms */
+
+typedef struct {
+    NUM least;
+    NUM most;
+} FN(range_t);
+
+/* Whole numbers, in the order of an image. */
+static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
+    /*    float32: least, most         fixed point: least, most */
+    RANGE(GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS),     /* quantity */
+    RANGE(GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H), /* unit */
+    RANGE(0U, 4294967295U,             0U, 4294967295U),             /* id */
+    RANGE(2U, GTC_MAX_SLOPE_BLOCKS,    2U, GTC_MAX_SLOPE_BLOCKS),    /* slope_blocks */
+    RANGE(1U, 100000U,                 1U, 100000U),                 /* hold_blocks */
+    RANGE(0U, 2147483647U,             0U, 2147483647U),             /* stuck_samples */
+    RANGE(0U, 0U,                      0U, 60U),                     /* bias_frac_bits */
+    RANGE(1U, 16U,                     1U, 16U),                     /* n_networks */
+    RANGE(0U, 512U,                    0U, 512U),                    /* n_centers */
+    RANGE(1U, GTC_MAX_TERMS + 1,       1U, GTC_MAX_TERMS + 1),       /* n_channels */
+    RANGE(0U, GTC_MAX_TERMS,           0U, GTC_MAX_TERMS),           /* n_terms */
+    RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: T */
+    RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: slope */
+    RANGE(0U, 256U,                    0U, 256U),                    /* sigma_cells: T */
+    RANGE(0U, 256U,                    0U, 256U),                    /* sigma_cells: slope */
+    RANGE(0U, 4096U,                   0U, 4096U),                   /* n_probes */
+};
+
+/* Numbers between them. */
+static const FN(range_t) FN(number_limits)[N_NUMBERS] = {
+    RANGE(0.0F, 1.0e6F,                0, 2147483647),               /* max_step */
+    RANGE(0.0F, 1.0e8F,                0, 2147483647),               /* max_slope */
+    RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* fallback */
+    RANGE(-200.0F, 400.0F,             0, 2147483647),               /* scale: center of T; q31: gain of T */
+    RANGE(0.0F, 1.0e12F,               0, 2147483647),               /* scale: gain of T; q31: gain of slope */
+    RANGE(0.0F, 1.0e12F,               0, 32),                       /* scale: gain of slope; q31: bits of narrow squares */
+    RANGE(-200.0F, 400.0F,             -13107200, 26214400),         /* envelope: T min */
+    RANGE(-200.0F, 400.0F,             -13107200, 26214400),         /* envelope: T max */
+    RANGE(-1.0e5F, 1.0e5F,             -1073741824, 1073741824),     /* envelope: slope min */
+    RANGE(-1.0e5F, 1.0e5F,             -1073741824, 1073741824),     /* envelope: slope max */
+};
+
+/* A network, behind its number of centers, which the conditions limit. */
+static const FN(range_t) FN(network_limits)[GTC_NETWORK_WORDS - 1U] = {
+    RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: w0 */
+    RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: linear T */
+    RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: linear slope */
+    RANGE(-200.0F, 400.0F,             0, 65535),                    /* network: region T0 */
+    RANGE(-200.0F, 400.0F,             0, 65535),                    /* network: region T1 */
+    RANGE(-1.0e5F, 1.0e5F,             0, 65535),                    /* network: region slope0 */
+    RANGE(-1.0e5F, 1.0e5F,             0, 65535),                    /* network: region slope1 */
+};
+
+static const FN(range_t) FN(center_limits)[GTC_CENTER_WORDS] = {
+    RANGE(-1.0e9F, 1.0e9F,             0, 65535),                    /* center: T; q31: s of T */
+    RANGE(0.0F, 1.0e4F,                -2147483647, 2147483647),     /* center: gain of T; q31: k of T */
+    RANGE(-1.0e9F, 1.0e9F,             0, 65535),                    /* center: slope; q31: s of slope */
+    RANGE(0.0F, 1.0e4F,                -2147483647, 2147483647),     /* center: gain of slope; q31: k of slope */
+    RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* center: weight */
+};
+
+/* Parameters of the kinds of terms; kind - 1 is the row. What a kind does not use is 0. */
+static const FN(range_t) FN(term_limits)[N_KINDS][GTC_TERM_WORDS - 2U] = {
+    {
+        RANGE(0.0F, 1.0F,              0, 2147483647),               /* memory: gain */
+        RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* memory: amplitude */
+        RANGE(0.0F, 1.0e9F,            0, 2147483647),               /* memory: rate */
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+    {
+        RANGE(0.0F, 1.0e9F,            0, 2130706432),               /* play: width */
+        RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* play: amplitude */
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+    {
+        RANGE(0.0F, 1.0e9F,            0, 2147483647),               /* warm-up: gain */
+        RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* warm-up: amplitude */
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+    {
+        RANGE(0.0F, 1.0e4F,            0, 2147483647),               /* harmonic: frequency */
+        RANGE(-1.0F, 1.0F,             -2147483647 - 1, 2147483647), /* harmonic: phase */
+        RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* harmonic: amplitude */
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+    {
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* auxiliary: slope */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* auxiliary: reference */
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+};
+
+static const FN(range_t) FN(sigma_limits)[1] = {
+    RANGE(0.0F, 7.5e6F,                0, 2147483647),               /* sigma */
+};

@@ -1,0 +1,104 @@
+/* any_table.h - with -DANY_TABLE the table is any that `init` and `check` accept: words anywhere in libc/gtc_limits.inl.
+ *
+ * Counts are those of a small table: SHAPE_NETWORKS networks of two centers each, four terms (or three, with a channel
+ * each), grids of 3 x 2 cells. Intervals cannot say the conditions on several words; the files that need them take
+ * functions by contract. Included behind gtc.c, whose limits it reads.
+ */
+#ifndef ANY_TABLE_H_INCLUDED
+#define ANY_TABLE_H_INCLUDED
+
+#if defined(ANY_TABLE)
+
+#if defined(F32)
+#define ANY_IN(range) Frama_C_float_interval((range).least, (range).most)
+#define MEMBER_OF(member) ((member).value)
+#else
+#define ANY_IN(range) (int_least32_t)Frama_C_long_interval((range).least, (range).most)
+#define MEMBER_OF(member) (member)
+#endif
+#define CODE_OF(kind) NAME(kind)
+#define ANY_WHOLE(row) Frama_C_unsigned_long_interval(NAME(whole_limits)[row][0], NAME(whole_limits)[row][1])
+
+static gtc_word_t any_networks[SHAPE_NETWORKS * GTC_NETWORK_WORDS];
+static gtc_word_t any_centers[SHAPE_NETWORKS * 2U * GTC_CENTER_WORDS];
+static gtc_word_t any_terms[GTC_MAX_TERMS * GTC_TERM_WORDS];
+static gtc_word_t any_coverage[1];
+
+static void any_words(gtc_word_t *words, const NAME(range_t) *limits, unsigned n)
+{
+    unsigned i;
+    /*@ loop unroll 8; */
+    for (i = 0; i < n; i++) {
+        NUMBER(words[i]) = ANY_IN(limits[i]);
+    }
+}
+
+static void any_members(void)
+{
+    unsigned i;
+    any.layout = GTC_TABLE_LAYOUT;
+    any.slope_blocks = ANY_WHOLE(3);
+    any.hold_blocks = ANY_WHOLE(4);
+    any.stuck_samples = ANY_WHOLE(5);
+    any.bias_frac_bits = ANY_WHOLE(6);
+    MEMBER_OF(any.max_step) = ANY_IN(NAME(number_limits)[0]);
+    MEMBER_OF(any.max_slope) = ANY_IN(NAME(number_limits)[1]);
+    MEMBER_OF(any.fallback) = ANY_IN(NAME(number_limits)[2]);
+    /*@ loop unroll 3; */
+    for (i = 0; i < 3U; i++) {
+        MEMBER_OF(any.scale[i]) = ANY_IN(NAME(number_limits)[3U + i]);
+    }
+    /*@ loop unroll 4; */
+    for (i = 0; i < 4U; i++) {
+        MEMBER_OF(any.envelope[i]) = ANY_IN(NAME(number_limits)[6U + i]);
+    }
+}
+
+static void any_arrays(void)
+{
+    unsigned i;
+    /*@ loop unroll SHAPE_NETWORKS; */
+    for (i = 0; i < SHAPE_NETWORKS; i++) {
+        any_networks[i * GTC_NETWORK_WORDS].bits = 2U;
+        any_words(&any_networks[(i * GTC_NETWORK_WORDS) + 1U], NAME(network_limits), GTC_NETWORK_WORDS - 1U);
+    }
+    /*@ loop unroll SHAPE_NETWORKS * 2; */
+    for (i = 0; i < (SHAPE_NETWORKS * 2U); i++) {
+        any_words(&any_centers[i * GTC_CENTER_WORDS], NAME(center_limits), GTC_CENTER_WORDS);
+    }
+    any_coverage[0].bits = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    any.networks = any_networks;
+    any.centers = any_centers;
+    any.coverage = any_coverage;
+    any.coverage_cells[0] = 3U;
+    any.coverage_cells[1] = 2U;
+    any.n_networks = SHAPE_NETWORKS;
+    any.n_centers = SHAPE_NETWORKS * 2U;
+    any.n_channels = 2U;
+}
+
+static void any_record(unsigned i, const struct NAME(term_code) *code)
+{
+    any_terms[i * GTC_TERM_WORDS].bits = code->kind;
+    any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (code->kind == GTC_TERM_AUXILIARY) ? 1U : 0U;
+    any_words(&any_terms[(i * GTC_TERM_WORDS) + 2U], NAME(term_limits)[code->kind - 1U], GTC_TERM_WORDS - 2U);
+    any.term_code[i] = code;
+}
+
+static void any_table(void)
+{
+    any_members();
+    any_arrays();
+    any_record(0, &NAME(term_memory));
+    any_record(1, &NAME(term_play));
+    any_record(2, &NAME(term_harmonic));
+    any_record(3, &CODE_OF(SHAPE_LAST));
+    any.terms = any_terms;
+    any.n_terms = 4U;
+}
+
+#else
+#define any_table() ((void)0)
+#endif
+
+#endif
