@@ -7,6 +7,7 @@ Reads the tables from the C source and from the image, computes the equation of 
 of the table and with the numbers of the model, and compares the two within the bound that the emitted header
 prints; banks of networks with their hand-over. The emitted known answers are judged by the model, too. The bound
 leaves out extension terms: their records are compared word by word with what the model's parameters give.
+The checksum of the model and the hashes in `c/emission.json` must hold.
 Exit status: 0 all agrees, 1 something differs (each is printed), 2 a file cannot be read.
 """
 
@@ -60,6 +61,7 @@ class Model:
 
     def __init__(self, path: Path) -> None:
         self.raw = json.loads(path.read_text(encoding="utf-8"))
+        self.checksum = self.raw.pop("checksum", None)  # of all other fields: the hash
         canonical = json.dumps(self.raw, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         self.hash = hashlib.sha256(canonical.encode("ascii")).hexdigest()
         self.per_block = self.raw["block_s"] / 60.0
@@ -459,6 +461,15 @@ def known_answers(folder: Path, name: str, image: Image) -> Iterator[list[int]]:
     yield from ([*pair, bits, status] for pair, (status, bits) in zip(inputs, answers[1:], strict=False))
 
 
+def check_record(c: Path, model: Model, record: dict[str, Any]) -> Iterator[str]:
+    """The record of the emission: of this model, and of files with these hashes."""
+    if record["model_hash"] != model.hash:
+        yield "emission.json names another model's hash"
+    for name, digest in record["files"].items():
+        if hashlib.sha256((c / name).read_bytes()).hexdigest() != digest:
+            yield f"{name} is not the file that emission.json names"
+
+
 def check(folder: Path) -> list[str]:
     """Everything that is wrong with an emitted folder."""
     model = Model(folder / "model.json")
@@ -466,8 +477,12 @@ def check(folder: Path) -> list[str]:
     c = folder / "c"
     header = (c / f"gtc_{name}.h").read_text(encoding="ascii")
     wrong = [] if model.hash in header else ["the header names another model's hash"]
-    zero_at = re.search(r"Make again: .* --zero-at (\S+)", header)
-    model.shift = model.bias(float(zero_at[1]), 0.0) if zero_at else 0.0
+    if model.checksum != model.hash:
+        wrong.append("the checksum of model.json is not that of its other fields")
+    record = json.loads((c / "emission.json").read_text(encoding="ascii"))
+    wrong += check_record(c, model, record)
+    zero_at = record["zero_at_c"]
+    model.shift = 0.0 if zero_at is None else model.bias(zero_at, 0.0)
     for image in images_of(c, name):
         printed = re.search(rf"\* {image.numeric}: .*\|error\| <= (\S+) deg/h", header)
         if printed is None:

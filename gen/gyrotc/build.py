@@ -192,6 +192,9 @@ def _failures(
         if entry["status"] == "fail":
             reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
             yield f"{entry['name']} {entry['numeric']}: {reason}"
+    for file in verification["emitted"]:
+        if file["status"] == "fail":
+            yield f"{file['file']}: {file['verdict']}"
     if evaluation["mismatches"]:
         yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
     for check in held["limits"] if held else ():

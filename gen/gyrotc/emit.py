@@ -7,10 +7,10 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .amalgamate import amalgamate, runtime_folders
+from .emission import RECORD, Options, read_options, record_text
 from .errors import CheckFailed, InputError
 from .model import Model
 from .outputs import result_folder
@@ -34,18 +35,10 @@ __all__ = [
     "board_test_text",
     "emit",
     "emit_texts",
-    "emitted_model",
     "emitted_tables",
     "quantise_all",
     "write_texts",
 ]
-
-
-_MADE_BY = re.compile(
-    r"^ \* Make again:  gyrotc emit model\.json --out \.(?: --numeric [a-z0-9,]+)?"
-    r"(?: --zero-at (-?[0-9]+(?:\.[0-9]+)?(?:e[+-][0-9]+)?))?$",
-    re.MULTILINE,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,33 +91,10 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
     """The tables that an emitted folder must hold: made again from the model, with the same options.
 
     Raises:
-        InputError: There is no emitted code of this model.
+        InputError: There is no emitted code, or its record is damaged.
     """
-    text = _emitted_header(folder, model)
-    declared = re.findall(rf"^extern const gtc_(\w+)_table_t gtc_{model.symbol}_\1;$", text, re.MULTILINE)
-    numerics = tuple(n for n in declared if n in NUMERICS)
-    return quantise_all(emitted_model(folder, model), numerics).tables
-
-
-def emitted_model(folder: Path, model: Model) -> Model:
-    """The model that an emitted folder computes: with `--zero-at`, the shifted one.
-
-    Raises:
-        InputError: There is no emitted code of this model.
-    """
-    found = _MADE_BY.findall(_emitted_header(folder, model))
-    zero_at = found[-1] if found else ""  # an entry of [meta] may look like it, and stands before it
-    return model.zeroed_at(float(zero_at)) if zero_at else model
-
-
-def _emitted_header(folder: Path, model: Model) -> str:
-    header = folder / f"gtc_{model.id}.h"
-    try:
-        return header.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise InputError(
-            str(header), f"cannot be read ({error.strerror})", "a folder that emit wrote"
-        ) from error
+    options = read_options(folder)
+    return quantise_all(options.shifted(model), options.numeric).tables
 
 
 def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
@@ -141,14 +111,25 @@ def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
 
 
 def emit_texts(
-    model: Model, emission: Emission, *, asked: bool = False, zero_at: float | None = None
+    model: Model,
+    emission: Emission,
+    *,
+    asked: bool = False,
+    zero_at: float | None = None,
+    expected: Mapping[str, NDArray[np.uint32]] | None = None,
 ) -> dict[str, bytes]:
-    """All files of `c/` by name."""
+    """All files of `c/` by name.
+
+    Args:
+        model: The model, before `zero_at` shifts it.
+        emission: Its tables.
+        asked: The arithmetics were asked for by name.
+        zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+        expected: Answers of the tables to the vectors, each (status, bits), shape (n, 2), where they are known already.
+    """
     numerics = tuple(emission.tables)
+    options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
     vectors = make_vectors(model, numerics)
-    options = (f" --numeric {','.join(numerics)}" if asked else "") + (
-        f" --zero-at {zero_at!r}" if zero_at is not None else ""
-    )
     first = next(iter(emission.tables.values()))
     values: dict[str, Any] = {
         "id": model.id,
@@ -156,7 +137,7 @@ def emit_texts(
         "serial": model.serial,
         "axis": model.axis,
         "model_hash": model.hash,
-        "options": options,
+        "options": options.text,
         "layout": LAYOUT,
         "numerics": numerics,
         "v": vectors,
@@ -187,9 +168,10 @@ def emit_texts(
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
         texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
-    texts[f"vectors_{model.id}.txt"] = answers_text(
-        {n: answers(t, vectors) for n, t in emission.tables.items()}
-    )
+    if expected is None:
+        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
+    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
+    texts[RECORD] = record_text(model, options, texts)
     return texts
 
 
@@ -237,8 +219,15 @@ def _sizes(emission: Emission) -> Iterator[str]:
     for numeric, table in emission.tables.items():
         yield (
             f"{numeric + ':':<12} {table.table_bytes} bytes of table; "
-            f"|error| <= {table.error_bound_dph:.2e} deg/h against the model (terms excluded)"
+            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
         )
+
+
+def _upwards(bound: float) -> str:
+    """A bound with three digits, never below itself."""
+    with localcontext() as context:
+        context.rounding = ROUND_CEILING
+        return f"{float(f'{Decimal(bound):.2e}'):.2e}"
 
 
 def _example_values(model: Model) -> dict[str, Any]:

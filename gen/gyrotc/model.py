@@ -42,6 +42,7 @@ __all__ = [
 ]
 
 SCHEMA = "gyrotc.model/1"
+CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
 _MAX_FILE_BYTES = 4 * 2**20
 _MAX_CENTERS = 512
@@ -305,7 +306,9 @@ class Model(_Frozen):
         return self.model_dump(mode="json", by_alias=True)
 
     def to_json(self) -> str:
-        return json.dumps(self.to_dict(), indent=1, ensure_ascii=True, allow_nan=False) + "\n"
+        """Text of `model.json`: the object, and last the checksum that `load_model` demands."""
+        content = {**self.to_dict(), CHECKSUM: self.hash}
+        return json.dumps(content, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
 
     @property
     def hash(self) -> str:
@@ -336,11 +339,16 @@ def table_id(serial: str, axis: str | None) -> str:
     return f"{(plain + suffix)[:18]}_{digest[:8]}"
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path, *, stamped: bool = True) -> Model:
     """Reads and checks a `model.json`.
 
+    Args:
+        path: The file, or the folder that holds it.
+        stamped: Demand that the checksum is that of the other fields; False only for `gyrotc stamp`.
+
     Raises:
-        InputError: The file is missing, too large, not JSON, of another schema, or a field is illegal.
+        InputError: The file is missing, too large, not JSON, of another schema, a field is illegal, or the file
+            was changed since gyrotc wrote it.
     """
     path = Path(path)
     if path.is_dir():
@@ -356,12 +364,22 @@ def load_model(path: Path) -> Model:
     if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
         raise InputError(f"{path}, field schema", repr(found), repr(SCHEMA))
+    checksum = raw.pop(CHECKSUM, None)
     try:
-        return Model.from_dict(raw)
+        model = Model.from_dict(raw)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "(whole)"
         raise InputError(f"{path}, field {field}", first["msg"]) from error
+    if stamped and checksum != model.hash:
+        raise InputError(
+            f"{path}, field {CHECKSUM}",
+            "is missing"
+            if checksum is None
+            else "is not that of the other fields: the file was changed or damaged",
+            f"the file as gyrotc wrote it (a change made on purpose: gyrotc stamp {path})",
+        )
+    return model
 
 
 def _refuse_constant(text: str) -> float:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from .emission import RECORD, joint_record_text
 from .emit import emitted_tables
-from .errors import CheckFailed
-from .model import load_model
+from .errors import CheckFailed, InputError
+from .model import Model, load_model
 from .outputs import write_atomically
 from .report import page_environment
+from .signature import check_signature, load_public_key
 from .texts import c_environment
 from .toolchain import all_targets, compile_c, run_program
+from .verify import file_entries
 
-__all__ = ["join_axes"]
+__all__ = ["axes_in", "join_axes", "joint_texts", "verify_axes"]
+
+AXES = ("x", "y", "z")
 
 _HOST = "host-gcc-O2"
 
@@ -29,22 +34,85 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     Raises:
         CheckFailed: The image does not link, or a table does not pass its self-test in it.
     """
-    models = [load_model(folder / axis / "model.json") for axis in axes]
-    numerics = list(emitted_tables(folder / axes[0] / "c", models[0]))
+    models = {axis: load_model(folder / axis / "model.json") for axis in axes}
+    numerics = list(emitted_tables(folder / axes[0] / "c", models[axes[0]]))
     c = folder / "c"
     c.mkdir()
-    for axis, model in zip(axes, models, strict=True):
-        source = folder / axis / "c"
-        for name in ("gtc.h", "gtc.c"):
-            shutil.copyfile(source / name, c / name)
-        for path in [*source.glob(f"gtc_{model.id}*"), *source.glob(f"vectors_{model.id}.*")]:
-            shutil.copyfile(path, c / path.name)
-    main = c_environment().get_template("main_axes.c.j2").render(models=models, n=numerics[0])
-    (c / "main.c").write_text(main, encoding="ascii")
-    _run_together(c, [m.id for m in models])
+    for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
+        (c / name).write_bytes(data)
+    _run_together(c, [m.id for m in models.values()])
     results = [json.loads((folder / axis / "evaluate.json").read_text(encoding="utf-8")) for axis in axes]
-    text = page_environment().get_template("axes.html.j2").render(models=models, results=results)
+    text = (
+        page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
+    )
     write_atomically(folder / "report.html", text)
+
+
+def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Files of every axis's own `c/` by name."""
+    return {
+        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()}
+        for axis in axes
+    }
+
+
+def joint_texts(
+    models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]], numeric: str
+) -> dict[str, bytes]:
+    """All files of the `c/` of a unit by name.
+
+    Args:
+        models: Models by axis.
+        sources: Files of each axis's own `c/` by name.
+        numeric: The arithmetic that `main.c` uses.
+    """
+    runtime = next(
+        (a for a, m in models.items() if len(m.networks) > 1), next(iter(models))
+    )  # with banks for all
+    texts = {name: sources[runtime][name] for name in ("gtc.h", "gtc.c") if name in sources[runtime]}
+    for axis, model in models.items():
+        own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
+        texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
+    main = c_environment().get_template("main_axes.c.j2").render(models=list(models.values()), n=numeric)
+    texts["main.c"] = main.encode("ascii")
+    texts[RECORD] = joint_record_text(models, texts)
+    return texts
+
+
+def axes_in(folder: Path) -> tuple[str, ...]:
+    """Axes of a result that `--axis all` made; none where the folder has a model of its own."""
+    if (folder / "model.json").is_file():
+        return ()
+    return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())
+
+
+def verify_axes(
+    folder: Path,
+    results: Mapping[str, dict[str, Any]],
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
+) -> dict[str, Any]:
+    """The JSON object of `gyrotc verify` for a unit: its axes' results, and the files that stand in `folder/c`.
+
+    These must be those of the axes' own folders, which `results` judges.
+
+    Raises:
+        InputError: There is no emitted folder, or a model cannot be read.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in results}
+    if not (folder / "c").is_dir():
+        raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
+    numeric = next(iter(results.values()))["errors"][0]["numeric"]
+    emitted = file_entries(
+        folder / "c", joint_texts(models, _sources(folder, tuple(results)), numeric), edited
+    )
+    counts = {k: sum(r[k] for r in results.values()) for k in ("passed", "failed", "missing")}
+    counts["failed"] += sum(e["status"] == "fail" for e in emitted)
+    first = next(iter(results.values()))
+    head = {k: first[k] for k in ("schema", "gyrotc_version", "serial")} | {"axis": None}
+    signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
+    counts["failed"] += signed is not None and signed["status"] == "fail"
+    return head | counts | {"emitted": emitted, "signature": signed, "axes": dict(results)}
 
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:

@@ -139,7 +139,7 @@ def bank_with_channels(model: Model) -> Model:
             id="auxiliary", parameters={"slope_dph_per_unit": -0.001, "reference": 0.0}, channel="magnetic_ut"
         ),
     )
-    # Without a noise floor: fixed point costs 1.05 % of the golden one where networks hand over, and is refused.
+    # Without a noise floor: fixed point costs nearly 1 % of the golden one, more than that with other terms.
     return bank_of(model).model_copy(update={"terms": terms, "noise_floor_dph": None})
 
 

@@ -33,6 +33,8 @@ ORDER = [
     "applied",
     "vectors",
     "tabletext",
+    "emission",
+    "signature",
     "emit",
     "confined",
     "toolchain",

@@ -81,7 +81,7 @@ def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
 
 def test_a_flipped_bit_of_the_emitted_answers_fails(copy: Path) -> None:
     flip(copy / "c" / "vectors_rlg_0042.txt", r"\n[0-9a-f]{8} ([0-9a-f]{8})\n", bit=31)
-    result = verify(copy, targets=[FAST])
+    result = verify(copy, targets=[FAST], trust_code=True)
     assert result["failed"] == 1 and result["passed"] >= 1
     assert [e["mismatches"] for e in result["emitted"] if e["status"] == "fail"] == [1]
 
@@ -91,7 +91,7 @@ def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     data = bytearray(path.read_bytes())
     data[40] ^= 16
     path.write_bytes(data)
-    result = verify(copy, targets=[FAST])
+    result = verify(copy, targets=[FAST], trust_code=True)
     assert result["failed"] == 1
     assert {e["file"]: e["mismatches"] for e in result["emitted"]}[path.name] == 1
 

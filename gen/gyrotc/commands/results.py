@@ -85,9 +85,8 @@ def verify_notes(result: dict[str, Any]) -> Iterator[str]:
         for text in [*found, *replayed.get("first_mismatches", ())]:
             if text:
                 yield f"{entry['name']} {entry['numeric']}: {text}"
-    for file in result["emitted"]:
-        if file["status"] == "fail":
-            yield f"{file['file']}: {file['mismatches']} lines or words differ from what the model gives"
+    yield from file_notes(result)
+    yield from _log_notes(result["log"]) if result.get("log") else ()
     for error in result["errors"]:
         for text in error.get("first_mismatches", ()):
             yield f"{error['numeric']}: {text}"
@@ -96,6 +95,45 @@ def verify_notes(result: dict[str, Any]) -> Iterator[str]:
             f"visited; the bound is {error['bound_dph']:.2e}"
             + (" and is EXCEEDED" if error["worst_dph"] > error["bound_dph"] else "")
         )
+
+
+def _log_notes(log: dict[str, Any]) -> Iterator[str]:
+    """What a log holds, to its last line."""
+    found = ", ".join(f"{part['numeric']} from line {part['line']}" for part in log["parts"])
+    yield f"{log['file']}: {log['lines']} lines; compared: {found}; {log['outside']} lines outside of the board test"
+    yield from (f"{log['file']}, outside: {line}" for line in log["first_outside"])
+    for numeric in log["absent"]:
+        yield f"{log['file']}: the board did not test {numeric}"
+
+
+def file_notes(result: dict[str, Any]) -> Iterator[str]:
+    """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
+    files = result["emitted"]
+    for file in files:
+        if file["verdict"] == "foreign":
+            yield f"{file['file']}: foreign; gyrotc did not write it, move it elsewhere"
+        elif file["verdict"] == "missing":
+            yield f"{file['file']}: missing"
+        elif file["verdict"] != "equal":
+            yield f"{file['file']}: {_difference_text(file)}"
+    equal = sum(file["verdict"] == "equal" for file in files)
+    options = result.get("options") or {}
+    shift = f", shifted to 0 at {options['zero_at_c']:g} C" if options.get("zero_at_c") is not None else ""
+    yield f"{equal} of {len(files)} files are, byte for byte, what the model gives{shift}"
+    signed = result.get("signature")
+    if signed:
+        verdict = "good" if signed["status"] == "pass" else f"BAD: {signed['reason']}"
+        yield f"signature {verdict}; key sha256 {signed['key']}"
+
+
+def _difference_text(file: dict[str, Any]) -> str:
+    kind = "word" if "word" in file else "line"
+    if kind not in file:
+        return f"{file['verdict']}; it is {file['found']}"
+    return (
+        f"{file['verdict']}, {file['mismatches']} {kind}s; first at {kind} {file[kind]}: there {file['found']!r}, "
+        f"the model gives {file['expected']!r}"
+    )
 
 
 def summary(result: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..errors import CheckFailed
+from ..errors import CheckFailed, InputError
 from ..outputs import result_folder, write_atomically
 from .base import (
     ERR,
@@ -34,7 +34,7 @@ from .base import (
     tell,
     write_json,
 )
-from .results import evaluation_table, prediction_line, span_lines, verify_notes, verify_table
+from .results import evaluation_table, file_notes, prediction_line, span_lines, verify_notes, verify_table
 from .traces import evaluation_folders
 
 
@@ -138,35 +138,63 @@ def verify(
     exhaustive: Annotated[
         bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
     ] = False,
+    allow_edited: Annotated[
+        list[str] | None,
+        typer.Option("--allow-edited", help="main.c: the example is yours now and may differ."),
+    ] = None,
+    signature: Annotated[
+        Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
+    ] = None,
     trust_code: TrustOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Compile DIR/c for each target and compare bit for bit with the reference.
+    """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
+    for each target and run, every bit compared with the reference. main.c is an example: edit it, and say so.
 
     Example: gyrotc verify result --target all
     """
     from ..dataset import load
     from ..model import load_model
+    from ..triad import axes_in, verify_axes
     from ..verify import verify as run
 
-    recordings = load(dataset, axis=load_model(folder / "model.json").axis) if dataset else None
-    with result_folder(folder, "verify", entries=("verify.json",)) as stage, progress() as say:
-        result = run(
-            folder,
-            targets=target or (),
-            dataset=recordings,
-            log=log,
-            exhaustive=exhaustive,
-            trust_code=trust_code,
-            progress=say,
-        )
-        write_atomically(stage.folder / "verify.json", json_text(result))
+    allowed = allow_edited or ()
+    axes = axes_in(folder)
+    if axes and log is not None:
+        raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
+    results = {}
+    with progress() as say:
+        for part in [folder / axis for axis in axes] or [folder]:
+            axis = load_model(part / "model.json").axis
+            recordings = load(dataset, axis=axis) if dataset else None
+            with result_folder(part, "verify", entries=("verify.json",)) as stage:
+                results[str(axis)] = run(
+                    part,
+                    targets=target or (),
+                    dataset=recordings,
+                    log=log,
+                    exhaustive=exhaustive,
+                    edited=allowed,
+                    signature=signature,
+                    trust_code=trust_code,
+                    progress=say,
+                )
+                write_atomically(stage.folder / "verify.json", json_text(results[str(axis)]))
+    result = next(iter(results.values()))
+    if axes:
+        with result_folder(folder, "verify", entries=("verify.json",)) as stage:
+            result = verify_axes(folder, results, allowed, signature)
+            write_atomically(stage.folder / "verify.json", json_text(result))
     write_json(json_file, result)
-    OUT.print(verify_table(result))
-    for line in verify_notes(result):
+    for one in results.values():
+        OUT.print(verify_table(one))
+        for line in verify_notes(one):
+            tell(line)
+    for line in file_notes(result) if axes else ():
         tell(line)
     if result["failed"]:
-        raise CheckFailed(f"{result['failed']} checks failed; {len(result['targets'])} targets")
+        n_targets = sum(len(one["targets"]) for one in results.values())
+        raise CheckFailed(f"{result['failed']} checks failed; {n_targets} targets")
 
 
 @app.command()

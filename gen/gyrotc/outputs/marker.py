@@ -32,6 +32,7 @@ KINDS = {
     "emit": "result",
     "verify": "result",
     "evaluate": "result",
+    "sign": "result",
     "diagnose": "diagnosis",
     "plan": "plan",
     "compare": "comparison",

@@ -11,6 +11,8 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..table import Numeric, Table
@@ -51,11 +53,17 @@ class _Known:
 def _quantised(known: _Known, numeric: str) -> Table:
     """Kept for the next stages of the same job, which ask again."""
     model = known.model
-    table = _MAKERS[numeric](model)
-    refused = outside(table)
+    try:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            rounded = _MAKERS[numeric](model)
+    except (FloatingPointError, ZeroDivisionError, OverflowError) as error:
+        raise CheckFailed(
+            f"{numeric}: a number of the model leaves the range of this arithmetic ({error})"
+        ) from error
+    refused = outside(rounded)
     if refused is not None:
         raise CheckFailed(f"{numeric}: the runtime would refuse the table: {refused}")
-    table = with_probes(model, table)
+    table = with_probes(model, rounded)
     floor = model.noise_floor_dph
     if floor and table.error_bound_dph > _SHARE_OF_FLOOR * floor:
         worst = max(table.bound_parts_dph, key=lambda part: table.bound_parts_dph[part])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import CheckFailed
 from ..model import Envelope, Model, Network
 from ..table import Table, Words, f32_words
-from .bank import handover_error_dph, regions
+from .bank import Axis, handover_error_dph, regions
 from .common import STEEPEST, max_slope_c, shared
 from .gradient import largest_gradient
 from .terms import f32_terms
@@ -28,7 +28,7 @@ _GAIN = 8.0 * math.sqrt(math.log2(math.e))  # u = 64 log2(e) d²/δ²
 _POLYNOMIAL = 6.7e-9  # of 2^(-f/64), relative
 _TINY = 2.0**-80  # smaller weights could make subnormal products
 _MAX_ABS_Z = 8.0
-_SHARE = 8.0 * _UNIT  # error of a share of a bank: difference, quotient, sum, product
+_SHARE = 4.0 * _UNIT  # relative error of a share of a bank: two differences, their quotient
 
 
 def table_of(model: Model) -> Table:
@@ -54,13 +54,9 @@ def table_of(model: Model) -> Table:
     ]
     parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
     if len(model.networks) > 1:
-        errors = _input_errors(scale, envelope) / _numbers(scale)[1:]
-        parts["hand-over"] = handover_error_dph(
-            model,
-            error_t_c=float(errors[0]),
-            error_r_c_per_min=float(errors[1]) / per_block,
-            share_error=_SHARE,
-        )
+        axes = _axes(envelope, np.concatenate(heads), per_block)
+        parts["hand-over"] = handover_error_dph(model, "f32", axes, share_step=0.0, share_error=_SHARE)
+        parts["blend"] = _blend(model, scale, envelope)
     return Table(
         numeric="f32",
         **shared(model),
@@ -88,6 +84,14 @@ def _flushed(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(values) < _TINY, 0.0, values)
 
 
+def _lost(network: Network, largest: NDArray[np.float64]) -> float:
+    """What the numbers make that were too small for the table, deg/h."""
+    values = np.array([network.w0, network.linear[0] * largest[0], network.linear[1] * largest[1]])
+    small = np.abs([network.w0, *network.linear]) < _TINY
+    weights = np.array(network.weights, dtype=np.float64)
+    return float(np.abs(values[small]).sum() + np.abs(weights[np.abs(weights) < _TINY]).sum())
+
+
 def _head(network: Network) -> Words:
     return f32_words(_flushed(np.array([network.w0, *network.linear])))
 
@@ -105,7 +109,7 @@ def _normalised(scale: Words, temperature: float, slope: float) -> tuple[float, 
 def _check_range(scale: Words, envelope: Words) -> None:
     t0, t1, r0, r1 = _numbers(envelope).tolist()
     for t, r in ((t0, r0), (t1, r1)):
-        if max(map(abs, _normalised(scale, t, r))) > _MAX_ABS_Z:
+        if not all(abs(z) <= _MAX_ABS_Z for z in _normalised(scale, t, r)):  # nor NaN
             raise CheckFailed(
                 f"f32: the envelope reaches beyond {_MAX_ABS_Z:g} half ranges of the model's scale"
             )
@@ -174,6 +178,36 @@ def _region(region: Envelope, per_block: float) -> Words:
     return f32_words([t0, t1, r0 * per_block, r1 * per_block])
 
 
+def _axes(envelope: Words, networks: Words, per_block: float) -> tuple[Axis, Axis]:
+    """Inputs as the table compares them with the edges of regions: C and C per block.
+
+    The envelope, to which both sides clamp, is rounded.
+    """
+    limits = _numbers(envelope).tolist()
+    edges = _numbers(networks.reshape(-1, 8)[:, 4:])
+    t, r = (
+        Axis(
+            factor=factor,
+            offset=0.0,
+            limits=(limits[2 * k], limits[2 * k + 1]),
+            edges=edges[:, 2 * k : 2 * k + 2],
+            moved=2.0 * _UNIT * max(map(abs, limits[2 * k : 2 * k + 2])),
+        )
+        for k, factor in ((0, 1.0), (1, per_block))
+    )
+    return t, r
+
+
+def _blend(model: Model, scale: Words, envelope: Words) -> float:
+    """Roundings of Σ share · network / Σ share: each product, the two sums, the quotient."""
+    largest = _largest(scale, envelope)
+    sizes = [
+        math.fsum(map(abs, (n.w0, n.linear[0] * largest[0], n.linear[1] * largest[1], *n.weights)))
+        for n in model.networks
+    ]
+    return (2.0 * len(sizes) + 2.0) * _UNIT * max(sizes)
+
+
 def _bound(
     network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32], per_block: float
 ) -> dict[str, float]:
@@ -198,7 +232,7 @@ def _bound(
     return {
         "rounded inputs": float(_gradient(network, scale, envelope, per_block, z_error) @ z_error),
         "rounded centers": float(np.sum(weights[:, None] * steep * center_error)),
-        "rounded weights": _UNIT * (start + float(linear @ largest) + total),
+        "rounded weights": _UNIT * (start + float(linear @ largest) + total) + _lost(network, largest),
         "Gaussian": kernel * total,
         "summation": _UNIT * (2.0 * start + float(partial.sum())),
     }

@@ -18,7 +18,7 @@ from ..errors import CheckFailed
 from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
 from ..table import Table
-from .bank import handover_error_dph, regions
+from .bank import Axis, handover_error_dph, regions
 from .common import max_slope_c, shared
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
 from .solve import gram, solve
@@ -29,12 +29,13 @@ __all__ = ["table_of"]
 _INPUT = 65536.0  # units of a temperature in C
 _MAX_SPAN = 2**26
 _FINEST = 28  # largest number of fraction bits of an argument
+_COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
 _LARGEST_ARGUMENT = 2**31 - 1
 _MAX_FACTOR = 65535  # of s
 _SOLVE_POINTS = 256
 _RIDGE = 1e-6
 _GRID_CELLS = 512
-_SHARE = 2.0**-18  # error of a share of a bank
+_SHARE = 2.0**-24  # unit of a share of a bank, which is cut off
 
 Floats = NDArray[np.floating[Any]]
 
@@ -84,6 +85,10 @@ def table_of(model: Model) -> Table:
     felt = [_felt(surface) for surface in surfaces]
     chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
     fraction = min(_fraction(surface) for surface in chosen)
+    if fraction < _COARSEST:
+        raise CheckFailed(
+            "q31: a Gaussian is too narrow for the envelope, or too far from it, for its argument"
+        )
     networks = [
         _fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)
     ]
@@ -92,13 +97,9 @@ def table_of(model: Model) -> Table:
     bounds = [_bound(network, inputs, frac_bits) for network in networks]
     parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
     if len(networks) > 1:
-        # Regions are rounded to positions, too.
-        parts["hand-over"] = handover_error_dph(
-            model,
-            error_t_c=1.5 / inputs[0].per_unit / _INPUT,
-            error_r_c_per_min=1.5 / inputs[1].per_unit / _INPUT / per_block,
-            share_error=_SHARE,
-        )
+        axes = _axes(model, inputs, per_block)
+        parts["hand-over"] = handover_error_dph(model, "q31", axes, share_step=_SHARE, share_error=0.0)
+        parts["blend"] = 2.0**-frac_bits  # the quotient is rounded
     return _table(model, envelope, inputs, networks, frac_bits, parts)
 
 
@@ -268,6 +269,25 @@ def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
         for value in pair:
             edges.append(min(max(round(scale.position(value * unit * _INPUT)), 0), POSITIONS - 1))
     return edges
+
+
+def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
+    """Inputs as the table compares them with the edges of regions: positions.
+
+    An input is moved to the middle of its cell, and by the rounding of the envelope to which both sides clamp.
+    """
+    edges = np.array([_region(region, inputs, model) for region in regions(model)], dtype=np.float64)
+    t, r = (
+        Axis(
+            factor=unit * _INPUT * scale.per_unit,
+            offset=-scale.low * scale.per_unit - 0.5,
+            limits=(0.0, POSITIONS - 1.0),
+            edges=edges[:, 2 * k : 2 * k + 2],
+            moved=0.5 + 0.5 * scale.per_unit,
+        )
+        for k, (scale, unit) in enumerate(zip(inputs, (1.0, per_block), strict=True))
+    )
+    return t, r
 
 
 def _word(value: int) -> int:

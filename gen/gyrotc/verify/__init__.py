@@ -1,8 +1,8 @@
-"""Prove that the emitted C gives, on every target, bit for bit what the reference gives.
+"""Prove that the emitted C is what gyrotc made, and gives on every target bit for bit what the reference gives.
 
-Stage 7 of the house (… → C → **proof** → report). Believes nothing: compiles `DIR/c` for each
-target, runs the board test and compares every result word with what the reference computes from
-`model.json`. The answers and images in `c/` are not trusted either; they must be the same.
+Stage 7 of the house (… → C → **proof** → report). Believes nothing: makes every file of `DIR/c` again from `model.json`
+and compares it byte for byte; only then compiles them for each target, runs the board test and compares every result
+word with what the reference computes.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ import numpy as np
 
 from .. import __version__
 from ..dataset import Dataset
-from ..emit import emitted_model, emitted_tables
+from ..emit import emit_texts
 from ..errors import InputError
 from ..model import Model, load_model
 from ..reference import answers
+from ..signature import check_signature, load_public_key
 from ..toolchain import Target, all_targets
 from ..vectors import Vectors, make_vectors
 from .board import Job, board_entries
-from .emitted import c_hash, check_emitted
+from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
 from .logs import log_entries
 from .recordings import replay_dataset
 
-__all__ = ["verify"]
+__all__ = ["file_entries", "verify"]
 
 SCHEMA = "gyrotc.verify/1"
 Entry = dict[str, Any]
@@ -45,6 +46,8 @@ def verify(
     log: Path | None = None,
     exhaustive: bool = False,
     compiled: bool = True,
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
     trust_code: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -57,7 +60,9 @@ def verify(
         log: Output of a board test that ran elsewhere. Its entries join those of an earlier
             `verify.json` of the same model and code; later calls keep them.
         exhaustive: Visit every input of the fixed-point table besides.
-        compiled: False: no target; images, answers and bounds are checked against the reference alone.
+        compiled: False: no target; files and bounds are checked against model and reference alone.
+        edited: Files of `EDITABLE` that the user made their own: they may differ.
+        signature: Public key with which `folder/c` must be signed.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         progress: Called with the name of each target before it is tried.
 
@@ -66,24 +71,38 @@ def verify(
         CheckFailed: The log is not whole, or of another model.
     """
     say = progress or (lambda _: None)
+    _check_edited(edited)
+    key = load_public_key(signature) if signature is not None else None
     model = load_model(folder / "model.json")
     chosen = _choose(targets) if compiled and (targets or log is None) else []
-    tables = emitted_tables(folder / "c", model)
+    say("comparing files")
+    options, emission = made_again(folder / "c", model)
+    tables = emission.tables
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
     expected = {n: answers(table, vectors) for n, table in tables.items()}
     job = Job(folder / "c", model, tables, expected, trust_code)
+    texts = emit_texts(
+        model,
+        emission,
+        asked=options.numeric is not None,
+        zero_at=options.zero_at_c,
+        expected=job.expected,
+    )
+    emitted = file_entries(job.c_folder, texts, edited)
+    signed = check_signature(job.c_folder, key) if key is not None else None
+    wrong = [e["file"] for e in emitted if e["status"] == "fail"]
+    barred = wrong and not trust_code
     identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
-    entries = log_entries(job, vectors, log) if log is not None else []
-    entries += _test_all(job, chosen, say)
-    if dataset is not None:
+    entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
+    entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
+    if dataset is not None and not barred:
         replay_dataset(job, entries, chosen, dataset, say)
     entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
-    emitted = check_emitted(job)
-    exact = emitted_model(folder / "c", model)
+    exact = options.shifted(model)
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
-    if exhaustive:
+    if exhaustive and not barred:
         errors = [_every_input(job, exact, say) if e["numeric"] == "q31" else e for e in errors]
     return {
         "schema": SCHEMA,
@@ -91,9 +110,12 @@ def verify(
         "serial": model.serial,
         "axis": model.axis,
         **identity,
-        **_counts(entries, [*emitted, *errors], set(targets) - {"all"}),
+        **_counts(entries, [*emitted, *errors, *([signed] if signed else [])], set(targets) - {"all"}),
         "targets": entries,
+        "log": brought,
+        "options": options.model_dump(mode="json"),
         "emitted": emitted,
+        "signature": signed,
         "errors": errors,
         "error_bound_dph": max(e["bound_dph"] for e in errors),
         "worst_error_dph": {
@@ -111,6 +133,23 @@ def _choose(names: Sequence[str]) -> list[Target]:
     if not names:
         return [t for t in known.values() if t.default]
     return [t for t in known.values() if "all" in names or t.name in names]
+
+
+def _check_edited(names: Sequence[str]) -> None:
+    for name in names:
+        if name not in EDITABLE:
+            raise InputError(
+                "--allow-edited", repr(name), f"{', '.join(sorted(EDITABLE))}: the rest is not to be edited"
+            )
+
+
+def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[Entry]:
+    """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
+    more = f" (and {len(wrong) - 1} more files)" if len(wrong) > 1 else ""
+    reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}; --trust-code runs it all the same"
+    entry = {"status": "fail", "error": reason}
+    pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
+    return [{"name": name, "numeric": numeric} | entry for name, numeric in pairs]
 
 
 def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[Entry]:

@@ -18,7 +18,7 @@ from ..toolchain import Target, compile_objects, compiler_version, link, run_pro
 from .boardlog import BoardOutput, compare, read_output
 from .source import board_files, checked_sources
 
-__all__ = ["Job", "board_entries", "checked_output"]
+__all__ = ["Job", "board_entries", "check_identity"]
 
 _CODE = "tT"
 
@@ -83,7 +83,7 @@ def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path,
     run = run_program(target, program)
     text = run.stdout.decode("ascii", "replace")
     # Some simulators print what a program says among their own messages.
-    output = checked_output(text if "begin " in text else run.stderr, job, numeric)
+    output = _output_of(text if "begin " in text else run.stderr, job, numeric)
     if run.returncode != 0:
         raise CheckFailed(f"the program ended with status {run.returncode}: {run.stderr[:200]}")
     comparison = compare(output, job.expected[numeric])
@@ -97,21 +97,26 @@ def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path,
     }
 
 
-def checked_output(text: str, job: Job, numeric: str) -> BoardOutput:
+def _output_of(text: str, job: Job, numeric: str) -> BoardOutput:
     """The part of a board test's output for one arithmetic.
 
     Raises:
         CheckFailed: It is not whole, or of another model.
     """
-    output = next((part for part in read_output(text) if part.numeric == numeric), None)
-    if output is None:
-        raise CheckFailed(f"the output has no part for {numeric}")
+    parts = [part for part in read_output(text) if part.numeric == numeric]
+    if len(parts) != 1:
+        raise CheckFailed(f"the output has {len(parts)} parts for {numeric} instead of one")
+    check_identity(parts[0], job)
+    return parts[0]
+
+
+def check_identity(output: BoardOutput, job: Job) -> None:
+    """Refuses the output of another model."""
     if (output.id, output.model) != (job.model.id, int(job.model.hash[:8], 16)):
         raise CheckFailed(
             f"the output is of table {output.id}, model {output.model:08x}..., "
             f"not of {job.model.id}, model {job.model.hash[:8]}..."
         )
-    return output
 
 
 def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:

@@ -1,14 +1,13 @@
 """What a board test prints, read and compared: results or CRCs of groups, and the cost of the calls.
 
-The text may come from an emulator (which may colour its lines) or from a user's terminal, so lines
-outside `begin` ... `end` are ignored and line ends may be any.
+The text may come from an emulator (which may colour its lines) or from a user's terminal: line ends may be any, and
+what an emulator prints of its own is passed over. Of a log that a user brings every line is accounted for.
 """
 
 from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,15 +15,22 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed
 
-__all__ = ["BoardOutput", "Comparison", "Cost", "compare", "read_output"]
+__all__ = ["BoardLog", "BoardOutput", "Comparison", "Cost", "compare", "read_log", "read_output"]
 
 Words = NDArray[np.uint32]
+Line = tuple[int, str]
 _GROUP = 256
 _SHOWN_MISMATCHES = 5
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _BEGIN = re.compile(
-    r"^begin (?P<id>\S+) (?P<numeric>\w+) (?P<mode>all|crc) (?P<model>[0-9a-f]{8}) (?P<random>[0-9a-f]{8})$"
+    r"begin (?P<id>\S+) (?P<numeric>\w+) (?P<mode>all|crc) (?P<model>[0-9a-f]{8}) (?P<random>[0-9a-f]{8})"
 )
+_RESULT = re.compile(r"[0-9a-f]{8} [0-9a-f]{8}")
+_GROUP_CRC = re.compile(r"[0-9a-f]{8}")
+_END = re.compile(r"end ([0-9a-f]{8})")
+_COST = re.compile(r"cost (?P<what>map|step)(?P<words>( [0-9a-f]{8}){6})")
+# A line that only a part has, whole or torn.
+_LOST = re.compile(r"[0-9a-f]{8}( [0-9a-f]{1,8})?|end [0-9a-f]{8}|cost (map|step) .*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +56,16 @@ class BoardOutput:
     n_results: int
     words: Words
     costs: dict[str, Cost] = field(default_factory=dict)
+    line: int = 1  # of its `begin`
+
+
+@dataclass(frozen=True, slots=True)
+class BoardLog:
+    """A whole log: its parts, the number of its lines, and those that stand outside of a board test, by number."""
+
+    parts: tuple[BoardOutput, ...]
+    lines: int
+    outside: tuple[Line, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,68 +81,124 @@ class Comparison:
 
 
 def read_output(text: str) -> list[BoardOutput]:
-    """The parts of a board test's output, one for each arithmetic.
+    """The parts of a board test's output, one for each arithmetic; whatever stands outside of them is passed over.
 
     Raises:
         CheckFailed: It is not whole: no `begin`, no `end`, a damaged line, another number of results.
     """
-    lines = [line.strip().rstrip(".") for line in _COLOURS.sub("", text).splitlines()]
-    parts = list(_parts(lines))
-    if not parts:
-        tail = next((line for line in reversed(lines) if line), "nothing")
-        raise CheckFailed(f"the output has no line `begin` of a board test (last line: {tail[:80]!r})")
-    return parts
+    return [part for part, _ in _found(_numbered(text))]
 
 
-def _parts(lines: list[str]) -> Iterator[BoardOutput]:
-    board, number = "", 0
-    while number < len(lines):
-        line = lines[number]
-        if line.startswith("board "):
-            board = line[6:]
-        head = _BEGIN.match(line)
-        number += 1
+def read_log(text: str) -> BoardLog:
+    """The same of a log that was recorded elsewhere, every line accounted for.
+
+    From a `begin` (with the `board` before it) to `done` every line must be understood. Outside, a board may print what
+    it likes but for lines that look like results: these have lost their `begin`.
+
+    Raises:
+        CheckFailed: As for `read_output`, or a line that is not understood, or no `done`; names the line.
+    """
+    lines = _numbered(text)
+    outside: list[tuple[int, str]] = []
+    parts: list[BoardOutput] = []
+    running: set[str] = set()  # arithmetics since the last `done`
+    position = 0
+    for part, (start, stop) in [*_found(lines), (None, (len(lines), len(lines)))]:
+        for number, line in lines[position:start]:
+            if running and line == "done":
+                running = set()
+            elif running:
+                raise CheckFailed(f"line {number} is not understood: {line[:80]!r}")
+            elif _LOST.fullmatch(line):
+                raise CheckFailed(
+                    f"line {number} is a part of a board test whose line `begin` is missing or damaged: {line[:80]!r}"
+                )
+            else:
+                outside.append((number, line))
+        if part is not None:
+            if part.numeric in running:
+                raise CheckFailed(
+                    f"line {part.line}: {part.numeric} begins again, and no `done` stands before it"
+                )
+            running.add(part.numeric)
+            parts.append(part)
+        position = stop
+    if running:
+        last = lines[-1]
+        raise CheckFailed(f"the log ends before `done`; line {last[0]} is its last: {last[1][:80]!r}")
+    return BoardLog(tuple(parts), len(text.splitlines()), tuple(outside))
+
+
+def _numbered(text: str) -> list[Line]:
+    """Lines that hold something, by their number from 1 on."""
+    stripped = (line.strip().rstrip(".") for line in _COLOURS.sub("", text).splitlines())
+    return [(number, line) for number, line in enumerate(stripped, 1) if line]
+
+
+def _found(lines: list[Line]) -> list[tuple[BoardOutput, tuple[int, int]]]:
+    """Every part, with the positions in `lines` where it starts and after which it ends."""
+    found: list[tuple[BoardOutput, tuple[int, int]]] = []
+    position = 0
+    while position < len(lines):
+        head = _BEGIN.fullmatch(lines[position][1])
         if head is None:
+            position += 1
             continue
-        stop = next((k for k in range(number, len(lines)) if lines[k].startswith("end ")), None)
-        if stop is None:
-            last = next(text for text in reversed(lines) if text)
-            raise CheckFailed(f"the board test did not run to its end (last output: {last[:80]!r})")
-        words = _words(lines, number, stop, 2 if head["mode"] == "all" else 1)
-        n_results = int(lines[stop][4:], 16)
-        expected = n_results if head["mode"] == "all" else -(-n_results // _GROUP)
-        if len(words) != expected:
-            raise CheckFailed(f"the output holds {len(words)} lines of results, its end says {expected}")
-        costs, number = _costs(lines, stop + 1)
-        yield BoardOutput(
-            id=head["id"],
-            numeric=head["numeric"],
-            model=int(head["model"], 16),
-            random=int(head["random"], 16),
-            board=board,
-            n_results=n_results,
-            words=words if head["mode"] == "all" else words[:, 0],
-            costs=costs,
+        named = position > 0 and lines[position - 1][1].startswith("board ")
+        board = lines[position - 1][1][6:] if named else ""
+        part, stop = _part(lines, position, head, board)
+        found.append((part, (position - named, stop)))
+        position = stop
+    if not found:
+        tail = lines[-1][1] if lines else "nothing"
+        raise CheckFailed(f"the output has no line `begin` of a board test (last line: {tail[:80]!r})")
+    return found
+
+
+def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tuple[BoardOutput, int]:
+    """The part whose `begin` is `lines[start]`, and the position after it."""
+    shape = _RESULT if head["mode"] == "all" else _GROUP_CRC
+    stop = next((k for k in range(start + 1, len(lines)) if shape.fullmatch(lines[k][1]) is None), None)
+    if stop is None:
+        raise CheckFailed(f"the board test did not run to its end (last output: {lines[-1][1][:80]!r})")
+    number, text = lines[stop]
+    end = _END.fullmatch(text)
+    if end is None:
+        raise CheckFailed(
+            f"line {number} is damaged, or the board test did not run to its end: {text[:80]!r}"
         )
+    octets = bytes.fromhex("".join(line for _, line in lines[start + 1 : stop]))
+    words = (
+        np.frombuffer(octets, dtype=">u4").astype(np.uint32).reshape(-1, 2 if head["mode"] == "all" else 1)
+    )
+    n_results = int(end[1], 16)
+    expected = n_results if head["mode"] == "all" else -(-n_results // _GROUP)
+    if len(words) != expected:
+        raise CheckFailed(
+            f"the output holds {len(words)} lines of results, its end in line {number} says {expected}"
+        )
+    costs, after = _costs(lines, stop + 1)
+    part = BoardOutput(
+        id=head["id"],
+        numeric=head["numeric"],
+        model=int(head["model"], 16),
+        random=int(head["random"], 16),
+        board=board,
+        n_results=n_results,
+        words=words if head["mode"] == "all" else words[:, 0],
+        costs=costs,
+        line=lines[start][0],
+    )
+    return part, after
 
 
-def _words(lines: list[str], start: int, stop: int, columns: int) -> Words:
-    shape = re.compile(r"[0-9a-f]{8}" + r" [0-9a-f]{8}" * (columns - 1))
-    for number in range(start, stop):
-        if shape.fullmatch(lines[number]) is None:
-            raise CheckFailed(f"line {number + 1} of the output is damaged: {lines[number][:80]!r}")
-    octets = bytes.fromhex("".join(lines[start:stop]))
-    return np.frombuffer(octets, dtype=">u4").astype(np.uint32).reshape(-1, columns)
-
-
-def _costs(lines: list[str], number: int) -> tuple[dict[str, Cost], int]:
+def _costs(lines: list[Line], position: int) -> tuple[dict[str, Cost], int]:
     costs = {}
-    while number < len(lines) and lines[number].startswith("cost "):
-        _, what, *words = lines[number].split()
-        calls, low, high, sum_high, sum_low, stack = (int(word, 16) for word in words)
-        costs[what] = Cost(calls, low, high, (sum_high << 32) + sum_low, stack)
-        number += 1
-    return costs, number
+    while position < len(lines) and (found := _COST.fullmatch(lines[position][1])) is not None:
+        calls, low, high, sum_high, sum_low, stack = (int(word, 16) for word in found["words"].split())
+        costs[found["what"]] = Cost(calls, low, high, (sum_high << 32) + sum_low, stack)
+        position += 1
+    return costs, position
 
 
 def compare(output: BoardOutput, expected: Words) -> Comparison:

@@ -1,50 +1,135 @@
-"""The emitted files themselves: their identity, and the answers and images that must follow from the model."""
+"""The emitted files themselves: each must be, byte for byte, what the model gives.
+
+`emit_texts` makes the files again in memory; nothing that lies in the folder has a say in what they should be, but for
+the options in its record, and that is compared, too.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
+import stat
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from ..emission import BESIDES, Options, read_options
+from ..emit import Emission, quantise_all
+from ..errors import CheckFailed, InputError
+from ..model import Model
 
-from ..emit import answers_text
-from .board import Job
+__all__ = ["EDITABLE", "c_hash", "file_entries", "made_again"]
 
-__all__ = ["c_hash", "check_emitted"]
+#: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
+EDITABLE = frozenset({"main.c"})
+_SHOWN = 160  # characters of a line
+_BEYOND = 2**16  # bytes that are read of a file beyond its right length
+
+Entry = dict[str, Any]
 
 
 def c_hash(c_folder: Path) -> str:
     """SHA-256 over names and contents of the emitted files."""
     digest = hashlib.sha256()
-    for path in sorted(p for p in c_folder.iterdir() if p.is_file()):
+    for path in sorted(p for p in c_folder.iterdir() if p.is_file() and p.name not in BESIDES):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return digest.hexdigest()
 
 
-def check_emitted(job: Job) -> list[dict[str, Any]]:
-    """The emitted answers and images against the reference and the tables: one entry for each file."""
-    found = {f"vectors_{job.model.id}.txt": _wrong_answers(job)}
-    for k, table in enumerate(job.tables.values()):
-        suffix = "" if k == 0 else f"_{table.numeric}"
-        name = f"gtc_{job.model.id}{suffix}.bin"
-        found[name] = _wrong_words(job.c_folder / name, table.words)
-    return [{"file": f, "status": "fail" if n else "pass", "mismatches": n} for f, n in found.items()]
+def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
+    """Options and tables of an emitted folder. Where its record is damaged, those of `gyrotc emit` without options:
+    the record is then among the files that differ.
+
+    Raises:
+        InputError: There is no emitted folder.
+        CheckFailed: `emit` refuses the model.
+    """
+    if not c_folder.is_dir():
+        raise InputError(str(c_folder), "is not there", "a folder that emit wrote")
+    try:
+        options = read_options(c_folder)
+        return options, quantise_all(options.shifted(model), options.numeric)
+    except (InputError, CheckFailed):
+        options = Options()
+        return options, quantise_all(model, None)
 
 
-def _wrong_answers(job: Job) -> int:
-    path = job.c_folder / f"vectors_{job.model.id}.txt"
-    data, expected = path.read_bytes() if path.is_file() else b"", answers_text(job.expected)
-    if data == expected:
-        return 0
-    lines, right = data.splitlines(), expected.splitlines()
-    differing = sum(a != b for a, b in zip(lines, right, strict=False))
-    return max(1, differing + abs(len(lines) - len(right)))
+def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()) -> list[Entry]:
+    """One entry for each file that should be there or is.
+
+    Args:
+        c_folder: The emitted folder.
+        texts: What must lie there, by name.
+        edited: Names of `EDITABLE` that may differ, but not be missing.
+
+    Returns:
+        `file`, `verdict` (`equal`, `differs`, `missing`, `foreign`, or `edited` where that is allowed), `status`,
+        `mismatches` (lines or words that differ; 1 for what has none), and where it differs the first place with what
+        stands there and what should.
+    """
+    return list(_entries(c_folder, texts, edited))
 
 
-def _wrong_words(path: Path, words: list[int]) -> int:
-    data = path.read_bytes() if path.is_file() else b""
-    got = np.frombuffer(data[: len(data) // 4 * 4], dtype="<u4")
-    if len(data) != 4 * len(words):
-        return max(1, abs(got.size - len(words)))
-    return int(np.count_nonzero(got != np.array(words, dtype=np.uint32)))
+def _entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str]) -> Iterator[Entry]:
+    there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
+    for name, data in sorted(texts.items()):
+        if name not in there:
+            yield _failed(name, "missing")
+            continue
+        found = _content(c_folder / name, len(data))
+        if found == data:
+            yield {"file": name, "verdict": "equal", "status": "pass", "mismatches": 0}
+        elif found is not None and name in edited:
+            yield {"file": name, "verdict": "edited", "status": "pass"} | _difference(name, found, data)
+        else:
+            yield _failed(name, "differs") | _difference(name, found, data)
+    for name in sorted(there - set(texts) - BESIDES):
+        yield _failed(name, "foreign")
+
+
+def _failed(name: str, verdict: str) -> Entry:
+    return {"file": name, "verdict": verdict, "status": "fail", "mismatches": 1}
+
+
+def _content(path: Path, length: int) -> bytes | None:
+    """Bytes of a regular file, as many as are needed to compare; None for anything else, which is not opened."""
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return None
+        with path.open("rb") as file:
+            return file.read(length + _BEYOND)
+    except OSError:
+        return None
+
+
+def _difference(name: str, found: bytes | None, data: bytes) -> Entry:
+    """How much differs, and the first place: a line, or a word of an image."""
+    if found is None:
+        return {"found": "no regular file that can be read"}
+    if name.endswith(".bin"):
+        kind, got, want = "word", _words(found), _words(data)
+    else:
+        kind, got, want = "line", _lines(found), _lines(data)
+    pairs = zip(got, want, strict=False)
+    wrong = [number for number, (a, b) in enumerate(pairs, 1) if a != b]
+    first = wrong[0] if wrong else min(len(got), len(want)) + 1
+    places = {"found": got, "expected": want}
+    return {
+        "mismatches": len(wrong) + abs(len(got) - len(want)),
+        kind: first,
+        **{side: parts[first - 1] if first <= len(parts) else "nothing" for side, parts in places.items()},
+    }
+
+
+def _words(data: bytes) -> list[str]:
+    """Words of an image in the order of its bytes."""
+    return [data[start : start + 4].hex() for start in range(0, len(data), 4)]
+
+
+def _lines(data: bytes) -> list[str]:
+    """Lines as printable text; what is no ASCII, and a carriage return, shows as an escape."""
+    return [_shown(line) for line in data.split(b"\n")]
+
+
+def _shown(line: bytes) -> str:
+    return line.decode("latin-1").encode("unicode_escape").decode("ascii")[:_SHOWN]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,18 +10,24 @@ from typing import Any
 from ..errors import CheckFailed, InputError
 from ..reference import answers
 from ..vectors import Vectors
-from .board import Job, checked_output
-from .boardlog import BoardOutput, compare, read_output
+from .board import Job, check_identity
+from .boardlog import BoardOutput, Comparison, compare, read_log
 
 __all__ = ["log_entries"]
 
+_SHOWN = 5  # lines outside of a board test, differences
 
-def log_entries(job: Job, vectors: Vectors, log: Path) -> list[dict[str, Any]]:
-    """Entries of `verify.json`, one for each arithmetic that the board tested.
+Entry = dict[str, Any]
+
+
+def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[Entry], Entry]:
+    """Entries of `verify.json`, one for each board and arithmetic, and what the log holds in all.
+
+    All parts of an arithmetic are compared; an entry passes only if each of them does.
 
     Raises:
         InputError: The file cannot be read.
-        CheckFailed: It does not hold a whole board test of this model.
+        CheckFailed: It does not hold whole board tests of this model alone; names the line.
     """
     try:
         text = log.read_text(encoding="ascii", errors="replace")
@@ -29,28 +36,60 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> list[dict[str, Any]]:
             str(log), f"cannot be read ({error.strerror})", "the output of board_test.c"
         ) from error
     try:
-        parts = [checked_output(text, job, part.numeric) for part in read_output(text)]
-        return [_entry(job, vectors, log, part) for part in parts]
+        found = read_log(text)
+        compared = [(part, _compared(job, vectors, part)) for part in found.parts]
     except CheckFailed as error:
         raise CheckFailed(f"{log}: {error}") from error
+    groups: dict[tuple[str, str], list[tuple[BoardOutput, Comparison]]] = {}
+    for part, comparison in compared:
+        groups.setdefault((part.board or log.stem, part.numeric), []).append((part, comparison))
+    whole = {
+        "file": log.name,
+        "lines": found.lines,
+        "parts": [
+            {"line": p.line, "numeric": p.numeric, "vectors": c.vectors, "mismatches": c.mismatches}
+            for p, c in compared
+        ],
+        "absent": [n for n in job.tables if all(p.numeric != n for p, _ in compared)],
+        "outside": len(found.outside),
+        "first_outside": [f"line {number}: {line[:80]}" for number, line in found.outside[:_SHOWN]],
+    }
+    return [_entry(job, log, name, parts) for (name, _), parts in groups.items()], whole
 
 
-def _entry(job: Job, vectors: Vectors, log: Path, output: BoardOutput) -> dict[str, Any]:
-    table = job.tables.get(output.numeric)
+def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> Comparison:
+    """A part against the reference."""
+    check_identity(part, job)
+    table = job.tables.get(part.numeric)
     if table is None:
-        raise CheckFailed(f"no {output.numeric} table was emitted")
-    comparison = compare(output, answers(table, replace(vectors, n_random=output.random)))
-    entry: dict[str, Any] = {
-        "name": output.board or log.stem,
-        "status": "fail" if comparison.mismatches else "pass",
+        raise CheckFailed(f"line {part.line}: no {part.numeric} table was emitted")
+    fixed = len(job.expected[part.numeric]) - vectors.n_random
+    if part.n_results != fixed + part.random:
+        raise CheckFailed(
+            f"line {part.line}: {part.random} random vectors were asked for, which makes {fixed + part.random} "
+            f"results; the board test made {part.n_results}"
+        )
+    return compare(part, answers(table, replace(vectors, n_random=part.random)))
+
+
+def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, Comparison]]) -> Entry:
+    """What one board showed of one arithmetic; the cost of the calls is that of the last part."""
+    mismatches = sum(c.mismatches for _, c in parts)
+    several = len(parts) > 1
+    first = [f"part at line {p.line}, {text}" if several else text for p, c in parts for text in c.first]
+    output = parts[-1][0]
+    entry: Entry = {
+        "name": name,
+        "status": "fail" if mismatches else "pass",
         "numeric": output.numeric,
         "compiler": "not known",
         "flags": "not known",
         "log": log.name,
-        "table_bytes": table.table_bytes,
-        "vectors": comparison.vectors,
-        "mismatches": comparison.mismatches,
-        "first_mismatches": list(comparison.first),
+        "parts": len(parts),
+        "table_bytes": job.tables[output.numeric].table_bytes,
+        "vectors": sum(c.vectors for _, c in parts),
+        "mismatches": mismatches,
+        "first_mismatches": first[:_SHOWN],
     }
     for what, cost in output.costs.items():
         prefix = "" if what == "map" else f"{what}_"

@@ -5,8 +5,8 @@
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target
- * f32:         84 bytes of table; |error| <= 5.93e-06 deg/h against the model (terms excluded)
- * q31:         84 bytes of table; |error| <= 9.71e-05 deg/h against the model (terms excluded)
+ * f32:         84 bytes of table; |error| <= 5.94e-06 deg/h against the model (terms excluded)
+ * q31:         84 bytes of table; |error| <= 9.72e-05 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 f68b9baa4528dcaebdda8da77596e4744b2d348c40108c9809db48ae82642cbb

@@ -5,8 +5,8 @@
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target
- * f32:         168 bytes of table; |error| <= 3.80e-05 deg/h against the model (terms excluded)
- * q31:         168 bytes of table; |error| <= 1.69e-03 deg/h against the model (terms excluded)
+ * f32:         168 bytes of table; |error| <= 1.72e-05 deg/h against the model (terms excluded)
+ * q31:         168 bytes of table; |error| <= 1.33e-03 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 0374aec108631ddcb9a02445533048310f123884a4bd4516573b7ad2a976a4e3
