@@ -2,9 +2,18 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-PYTHON := .venv/bin/python
-GYROTC := .venv/bin/gyrotc
-FUZZERS := map check open image step restore
+override PYTHON := .venv/bin/python
+override GYROTC := .venv/bin/gyrotc
+override FUZZERS := map check open image step restore
+# What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
+# the shell from reading it, and unexport keeps make from expanding it for the environment.
+unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA
+override export SET_DATA := $(value DATA)
+override export SET_AXIS := $(value AXIS)
+override export SET_SECONDS := $(or $(value SECONDS),20)
+override export SET_STORM := $(or $(value STORM),1000000)
+override export SET_SEED := $(value SEED)
+override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -19,7 +28,7 @@ setup:
 ## the main job: data -> verified C and a report in build/demo (DATA=folder [AXIS=x] for your own recordings)
 demo: setup
 ifdef DATA
-	@$(GYROTC) build "$(DATA)" --out build/demo --any-serial $(if $(AXIS),--axis $(AXIS))
+	@$(GYROTC) build --out build/demo --any-serial $${SET_AXIS:+"--axis=$$SET_AXIS"} -- "$$SET_DATA"
 else
 	@$(GYROTC) simulate paper --seed 1 --out build/demo-data
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
@@ -62,25 +71,28 @@ cov:
 
 ## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC; 20,000 damaged files; SEED=1
 fuzz:
+	@for word in "SECONDS=$$SET_SECONDS" "STORM=$$SET_STORM" "SEED=$${SET_SEED:-1}"; do \
+	  [[ $$word =~ ^[A-Z]+=[1-9][0-9]{0,9}$$ ]] || { echo "make fuzz: $$word is no number from 1 on" >&2; exit 2; }; \
+	done
 	@tools/setup.sh test
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang && cmake --build build/fuzz -j2
 	@for target in $(addsuffix _f32,$(FUZZERS)) $(addsuffix _q31,$(FUZZERS)); do \
 	  mkdir -p build/corpus/$$target && echo "fuzz_$$target" && \
-	  build/fuzz/fuzz_$$target -max_total_time=$(or $(SECONDS),20) -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
+	  build/fuzz/fuzz_$$target -max_total_time="$$SET_SECONDS" -max_len=4096 -artifact_prefix=build/ -verbosity=0 \
 	    -print_final_stats=1 build/corpus/$$target $$(ls -d tests/fuzz/corpus/$$target 2>/dev/null) || exit 1; \
 	done
-	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric $(or $(STORM),1000000) $(or $(SEED),1) || exit 1; done
-	@$(PYTHON) tests/py/mutants.py --count 20000 --seed "$${SEED:-1}"
+	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric "$$SET_STORM" "$${SET_SEED:-1}" || exit 1; done
+	@$(PYTHON) tests/py/mutants.py --count 20000 --seed "$${SET_SEED:-1}"
 
 ## the pictures of a report and of a diagnosis in README.md, by a headless browser
 picture: demo
 	@tools/setup.sh picture
 	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1240 \
-	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/report.html" >/dev/null 2>&1
+	  --screenshot=docs/report.png "file://$$PWD/build/demo/report.html" >/dev/null 2>&1
 	@$(GYROTC) simulate thermal-gradient --seed 3 --out build/picture-data
 	@$(GYROTC) diagnose build/picture-data --out build/picture >/dev/null
 	@chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir=build/browser --window-size=1120,1020 \
-	  --screenshot=docs/diagnosis.png "file://$(CURDIR)/build/picture/report.html" >/dev/null 2>&1
+	  --screenshot=docs/diagnosis.png "file://$$PWD/build/picture/report.html" >/dev/null 2>&1
 	@rm -rf build/browser
 
 ## the paper's table and figures again: docs/paper.md
@@ -89,8 +101,8 @@ paper: setup
 
 ## measured recordings with their last span left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
 real: setup
-	@$(PYTHON) tools/real.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
-	@$(PYTHON) tools/real_diagnosis.py "$${GYROTC_REAL_DATA:-../shared/data/real}" docs build/real
+	@$(PYTHON) tools/real.py "$$SET_REAL" docs build/real
+	@$(PYTHON) tools/real_diagnosis.py "$$SET_REAL" docs build/real
 
 ## training beside its peers (in build/bench), cost of the runtime in emulators: docs/results.md
 bench:
@@ -105,11 +117,11 @@ fleet: setup
 
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results/kills.json
 kills: setup
-	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $(if $(SEED),--seed $(SEED))
+	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup
-	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $(if $(SEED),--seed $(SEED))
+	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## remove what was built (not .venv)
 clean:

@@ -8,6 +8,8 @@
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
 #   tools/setup.sh picture    besides, the browser of `make picture`
 #
+# No release's number stands in a package's name here: what belongs to one version of a compiler is asked of that compiler.
+# Without the packages of `demo` nothing works; any other that this release does not have is named, and what needs it is skipped.
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -15,10 +17,10 @@ level=${1:-demo}
 
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
 test=(clang cmake cppcheck gcc-arm-none-eabi qemu-system-arm gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
-      libclang-rt-14-dev clang-tidy lcov pkg-config openssl)
+      clang-tidy lcov pkg-config openssl)
 check=(gcc-aarch64-linux-gnu gcc-avr avr-libc)
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
-         gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386 lib32gcc-12-dev
+         gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386
          gcc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc simavr)
 prove=(frama-c-base gappa z3)
 
@@ -32,28 +34,54 @@ case $level in
   *) echo "setup: unknown level '$level' (demo, test, check, targets, prove, picture)" >&2; exit 2 ;;
 esac
 
-install_missing() {
-  local missing=() p
-  for p in "${packages[@]}"; do
-    dpkg-query -W -f='${Status}' "$p" 2>/dev/null | grep -q 'install ok installed' || missing+=("$p")
-  done
-  [ ${#missing[@]} -eq 0 ] && return 0
-  echo "setup: installing system packages: ${missing[*]}"
-  local as=()
-  if [ "$(id -u)" != 0 ]; then
-    command -v sudo >/dev/null || { echo "setup: not root and no sudo: install these packages by hand: ${missing[*]}" >&2; exit 2; }
-    if [ -t 0 ]; then
-      read -r -p "setup: use sudo apt-get for this? [y/N] " answer
-      [ "$answer" = y ] || { echo "setup: stopped; install by hand: ${missing[*]}" >&2; exit 2; }
-    fi
-    as=(sudo)
+installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'install ok installed'; }
+
+# Names of the packages that belong to the compilers installed by now: the sanitizers of clang, the 32-bit part of gcc
+# (gcc-multilib would bring it too, but is in conflict with the cross compilers).
+belonging() {
+  case $level in demo | picture) return 0 ;; esac
+  if command -v clang >/dev/null; then echo "libclang-rt-$(clang -dumpversion | cut -d. -f1)-dev"; fi
+  if [ "$level" = targets ]; then echo "lib32gcc-$(gcc -dumpversion | cut -d. -f1)-dev"; fi
+}
+
+as=()
+updated=""
+become_root() {
+  [ "$(id -u)" != 0 ] && [ ${#as[@]} -eq 0 ] || return 0
+  command -v sudo >/dev/null || { echo "setup: not root and no sudo: install these packages by hand: $*" >&2; exit 2; }
+  if [ -t 0 ]; then
+    read -r -p "setup: use sudo apt-get for this? [y/N] " answer
+    [ "$answer" = y ] || { echo "setup: stopped; install by hand: $*" >&2; exit 2; }
   fi
-  "${as[@]}" apt-get update -qq
-  DEBIAN_FRONTEND=noninteractive "${as[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+  as=(sudo)
+}
+
+# install_missing PACKAGE...: a package outside `base` that the release does not have is told and left out.
+install_missing() {
+  local missing=() known=() p
+  for p in "$@"; do installed "$p" || missing+=("$p"); done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  if [ -z "$updated" ]; then
+    become_root "${missing[@]}"
+    "${as[@]}" apt-get update -qq
+    updated=1
+  fi
+  for p in "${missing[@]}"; do
+    if [[ " ${base[*]} " == *" $p "* ]] || apt-cache show "$p" >/dev/null 2>&1; then
+      known+=("$p")
+    else
+      echo "setup: this release has no package $p: what needs it is skipped" >&2
+    fi
+  done
+  [ ${#known[@]} -eq 0 ] && return 0
+  echo "setup: installing system packages: ${known[*]}"
+  DEBIAN_FRONTEND=noninteractive "${as[@]}" apt-get install -y -qq --no-install-recommends "${known[@]}" >/dev/null
 }
 
 if command -v dpkg-query >/dev/null && command -v apt-get >/dev/null; then
-  install_missing
+  install_missing "${packages[@]}"
+  mapfile -t more < <(belonging)
+  install_missing "${more[@]}"
 else
   echo "setup: no apt-get here; needed are: ${packages[*]} (or what your system calls them)" >&2
 fi

@@ -25,7 +25,7 @@ from .report import write_report
 from .triad import join_axes
 from .verify import verify
 
-__all__ = ["Built", "build"]
+__all__ = ["Built", "build", "build_into"]
 
 Progress = Callable[[str], None]
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
@@ -110,6 +110,22 @@ def build(
                 built.append(_build_axis(dataset, part.folder, options, order, _of_axis(name, say)))
         join_axes(stage.folder, axes)
         return built
+
+
+def build_into(
+    work: Path,
+    dataset: Dataset,
+    options: FitOptions,
+    *,
+    numerics: Sequence[str] | None = None,
+    limits: Limits | None = None,
+) -> Built:
+    """The main job for one axis, into a folder that is there; the caller sees to it that it appears whole.
+
+    Raises:
+        CheckFailed: Every arithmetic is refused.
+    """
+    return _build_axis(dataset, work, options, _Order(numerics, False, limits, None), lambda _: None)
 
 
 def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:

@@ -1,10 +1,11 @@
-"""The tests of `make prove`: Frama-C, Gappa, Z3 and some minutes are required.
+"""The tests of `make prove`: Frama-C, Gappa, Z3 and some minutes. What needs a tool that is not there is skipped.
 
 `--results docs` writes what they found into the documentation.
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from prove_page import section  # noqa: E402
 from results import Results, machine, write  # noqa: E402
 
 _FOUND = Results()
+_SKIPPED: set[str] = set()  # tools that are not here
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -30,8 +32,19 @@ def results() -> Results:
     return _FOUND
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "tool(name): skipped where this program is not installed")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    for mark in item.iter_markers("tool"):
+        if shutil.which(mark.args[0]) is None:
+            _SKIPPED.add(mark.args[0])
+            pytest.skip(f"{mark.args[0]} is not installed")
+
+
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """Only a session in which everything passed leaves results."""
+    """Only a session in which everything passed, and nothing was skipped, leaves results."""
     docs = session.config.getoption("--results")
-    if docs is not None and exitstatus == 0:
+    if docs is not None and exitstatus == 0 and not _SKIPPED:
         write(docs, "prove", {"schema": "gyrotc.prove/1", "machine": machine(), **_FOUND.lists}, section)

@@ -30,6 +30,7 @@ def _z3(text: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.tool("gappa")
 @pytest.mark.parametrize("name", CLAIMS)
 def test_bound_is_proved(name: str, results: Results) -> None:
     done = _gappa((HERE / "gappa" / f"{name}.gappa").read_text())
@@ -38,6 +39,7 @@ def test_bound_is_proved(name: str, results: Results) -> None:
     results.add("rounding", {"claim": claim, "tool": tool, "proved": "for all arguments"})
 
 
+@pytest.mark.tool("gappa")
 @pytest.mark.parametrize(
     ("name", "bound", "too_small"),
     [
@@ -51,12 +53,14 @@ def test_a_bound_too_small_is_not_proved(name: str, bound: str, too_small: str) 
     assert _gappa(text.replace(bound, too_small)).returncode != 0
 
 
+@pytest.mark.tool("z3")
 def test_the_shifts_round_down_for_every_word(results: Results) -> None:
     assert _z3((HERE / "smt" / "rounding_shift.smt2").read_text()) == ["unsat", "unsat"]
     claim = "fixed point: the shifts of 64-bit sums are floor(x / 2^n), every x, n = 0 ... 62"
     results.add("rounding", {"claim": claim, "tool": "Z3", "proved": "for all arguments"})
 
 
+@pytest.mark.tool("z3")
 @pytest.mark.parametrize(
     ("statement", "wrong", "which"),
     [

@@ -17,6 +17,8 @@ from gyrotc.model import load_model
 from models import bank_with_channels, with_memories
 from results import Results
 
+pytestmark = pytest.mark.tool("frama-c")
+
 HERE = Path(__file__).resolve().parent / "eva"
 OPTIONS = ["-eva", "-warn-signed-overflow", "-warn-signed-downcast", "-warn-special-float", "none"]
 

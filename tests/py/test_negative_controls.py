@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,11 @@ def test_fast_math_is_refused_by_the_compiler_and_caught_where_it_hides(folder: 
 
 def test_natural_expressions_are_caught_where_float_is_computed_in_double(folder: Path) -> None:
     """s390x evaluates float expressions in double: one expression rounds once where two statements round twice."""
+    compiler = "s390x-linux-gnu-gcc"
+    command = [compiler, "-std=c99", "-dM", "-E", "-x", "c", "/dev/null"]
+    macros = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    if "#define __FLT_EVAL_METHOD__ 1" not in macros:  # gcc 14 computes in float there
+        pytest.skip(f"this {compiler} computes float expressions in float")
     natural_expressions(folder)
     entry = _entry(job_of(folder), with_flags("s390x", "-Wno-unused-variable"), "f32")
     assert ran_and_differed(entry), entry

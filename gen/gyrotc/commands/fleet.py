@@ -32,13 +32,13 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..fleet import load_manifest, run_fleet, write_summary
+    from ..fleet import load_manifest, run_fleet, summary_of
 
     wanted = load_manifest(manifest)
     with progress() as say:
         say(f"{len(wanted.units)} gyros")
         entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=_tell_entry)
-    summary = write_summary(out, entries)
+    summary = summary_of(entries)
     write_json(json_file, summary)
     for outlier in summary["outliers"]:
         tell(
@@ -62,4 +62,6 @@ def _tell_entry(entry: dict[str, Any]) -> None:
         )
     if entry["status"] != "done":
         text += f"; {entry['reason']}"
+    if entry.get("aside"):
+        text += f"; its earlier result had been changed and is now {entry['aside']}"
     tell(text)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from ..dataset import axes_of
-from ..errors import InputError
+from ..errors import GyrotcError, InputError
 from ..fitting import FitOptions
 from ..inputs import read_toml, refuse_above
 from ..limits import Limits, load_limits
+from ..outputs import KINDS, read_marker
+from ..train import NETWORK_METHODS
 
-__all__ = ["Fleet", "Unit", "load_manifest"]
+__all__ = ["SUMMARY", "Fleet", "Unit", "load_manifest", "printable"]
+
+#: Files of a summary, beside the folders of the units.
+SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +32,24 @@ class Unit:
     axis: str | None
 
     @property
+    def folder(self) -> str:
+        """Name of its result folder: as the user calls the data set, also where that is a link."""
+        name = os.path.basename(os.path.abspath(self.dataset))  # noqa: PTH100, PTH119 (no links followed)
+        return name + (f"-{self.axis}" if self.axis else "")
+
+    @property
     def name(self) -> str:
-        """Name of its result folder."""
-        return self.dataset.resolve().name + (f"-{self.axis}" if self.axis else "")
+        """Name of its result folder as it is shown."""
+        return printable(self.folder)
+
+    @property
+    def refused(self) -> str:
+        """Why no result folder may have this name; empty if it may."""
+        if self.folder.casefold() in SUMMARY:
+            return "is the name of a file of the summary; give the data set another name"
+        if not self.folder.strip("-xyz") or self.folder.startswith("."):
+            return "a name that is empty or begins with a dot is no name for a result"
+        return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,33 +63,40 @@ class Fleet:
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 _Place = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00-\x1f]+$")]
+_Axis = Literal["x", "y", "z", "all"] | None
 
 
 class _UnitEntry(_Part):
     dataset: _Place
-    axis: Literal["x", "y", "z", "all"] | None = None
+    axis: _Axis = None
+
+
+def _method(name: str) -> str:
+    if name not in NETWORK_METHODS:
+        raise ValueError("one of " + ", ".join(NETWORK_METHODS))
+    return name
 
 
 class _Options(_Part):
-    method: str = "mrbf"
+    method: Annotated[str, AfterValidator(_method)] = "mrbf"
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     centers: Annotated[int, Field(ge=0, le=512)] | None = None
-    rho: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    rho: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
     block_s: Annotated[float, Field(ge=0.001, le=3600.0)] = 10.0
     average_s: Annotated[float, Field(ge=0.001, le=1e6)] = 100.0
 
 
 class _Manifest(_Part):
     schema_: Annotated[Literal[1], Field(alias="schema")]
-    datasets: tuple[_Place, ...] = ()  # patterns of folders
-    axis: Literal["x", "y", "z", "all"] | None = None  # of those
-    unit: tuple[_UnitEntry, ...] = ()
+    datasets: list[_Place] = []  # patterns of folders
+    axis: _Axis = None  # of those
+    unit: list[_UnitEntry] = []
     options: _Options = _Options()
-    numeric: tuple[Literal["f32", "q31"], ...] | None = None
+    numeric: Annotated[list[Literal["f32", "q31"]], Field(min_length=1)] | None = None
     limits: _Place | None = None
 
 
@@ -79,7 +107,7 @@ def load_manifest(path: Path) -> Fleet:
         InputError: It cannot be read, a field is wrong, nothing is named, or two results would have one name.
     """
     if path.is_dir():
-        folders = [folder for folder in sorted(path.iterdir()) if _has_recordings(folder)]
+        folders = [folder for folder in _listed(path) if _has_recordings(folder)]
         return _distinct(
             path, Fleet(tuple(Unit(folder, None) for folder in folders), FitOptions(), None, None)
         )
@@ -91,7 +119,8 @@ def load_manifest(path: Path) -> Fleet:
     units = tuple(unit for folder, axis in named for unit in _units(folder, axis))
     limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
     options = FitOptions(**manifest.options.model_dump())
-    return _distinct(path, Fleet(units, options, manifest.numeric, limits))
+    numerics = tuple(manifest.numeric) if manifest.numeric else None
+    return _distinct(path, Fleet(units, options, numerics, limits))
 
 
 def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
@@ -100,7 +129,7 @@ def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
     if axis == "all":
         try:
             axes = axes_of(folder) or (None,)
-        except InputError:
+        except (GyrotcError, OSError):
             axes = (None,)
     yield from (Unit(folder, name) for name in axes)
 
@@ -123,7 +152,7 @@ def _wrong_field(path: Path, error: ValidationError) -> InputError:
     return InputError(where, repr(detail["input"]), detail["msg"])
 
 
-def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
+def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
     for pattern in patterns:
         if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
             raise InputError(
@@ -131,13 +160,8 @@ def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
             )
         try:
             found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
-        except (
-            IndexError,
-            NotImplementedError,
-            ValueError,
-            OSError,
-            RecursionError,
-        ) as error:  # ".", "a**", a name that no folder can have
+        except (IndexError, ValueError, OSError, RecursionError, NotImplementedError) as error:
+            # ".", "a**", a name that no folder can have
             expected = "a pattern below the manifest's folder, e.g. 2026-*"
             raise InputError(f"{path}, field datasets", repr(pattern)[:80], expected) from error
         if not found:
@@ -145,12 +169,44 @@ def _matching(path: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
         yield from found
 
 
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(
+            str(folder), f"cannot be read ({error.strerror})", "a folder of data sets"
+        ) from error
+
+
 def _has_recordings(folder: Path) -> bool:
-    if not folder.is_dir() or folder.name.startswith("."):
+    """Whether a folder is a data set. One that cannot be read may be one: its job will say what is wrong."""
+    if folder.name.startswith("."):
         return False
-    return (folder / "dataset.toml").is_file() or any(
-        file.suffix.lower() in (".csv", ".parquet") for file in folder.iterdir()
-    )
+    try:
+        if not folder.is_dir():
+            return False
+        if _is_result(folder):
+            return False
+        return (folder / "dataset.toml").is_file() or any(
+            file.suffix.lower() in (".csv", ".parquet") for file in folder.iterdir()
+        )
+    except OSError:
+        return True
+
+
+def _is_result(folder: Path) -> bool:
+    """Whether gyrotc made it of recordings: also a fleet's folder holds CSV files."""
+    try:
+        marker = read_marker(folder)
+    except InputError:
+        return False
+    return marker is not None and marker.kind != KINDS["simulate"]
+
+
+def printable(text: str) -> str:
+    r"""A name as it can be shown and written as UTF-8: bytes that are no character and controls as ``\x..``."""
+    known = os.fsencode(text).decode("utf-8", "backslashreplace")
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in known)
 
 
 def _distinct(path: Path, fleet: Fleet) -> Fleet:

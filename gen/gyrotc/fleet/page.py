@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,10 +16,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .. import __version__
-from ..outputs import write_atomically
+from ..outputs import result_folder, write_atomically
 from ..plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from ..report import page_environment
 from ..texts import csv_cell
+from .entry import INTERNAL
+from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
 
 __all__ = ["summary_of", "write_summary"]
@@ -31,7 +34,7 @@ _COLUMNS = (
 
 def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The JSON object of `fleet.json`."""
-    done = [entry for entry in entries if entry["status"] == "done"]
+    counts = Counter(entry["status"] for entry in entries)
     figured = [entry for entry in entries if "model_hash" in entry]
     return {
         "schema": "gyrotc.fleet/1",
@@ -39,24 +42,30 @@ def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "serial": None,
         "axis": None,
         "units": len(entries),
-        "done": len(done),
-        "failed": len(entries) - len(done),
+        "done": counts["done"],
+        "failed": counts["failed"],
+        "unfinished": counts["unfinished"],
         "figures": {f: spread(figured, f) for f in (*FIGURES, "centers", "table_bytes")},
         "outliers": [asdict(outlier) for outlier in outliers(figured)],
-        "serials": [{k: v for k, v in entry.items() if k not in ("key", "kept")} for entry in entries],
+        "serials": [{k: v for k, v in entry.items() if k not in INTERNAL} for entry in entries],
     }
 
 
 def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns the object of the first."""
+    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns the object of the first.
+
+    Raises:
+        InputError: There are files of these names that gyrotc did not write.
+    """
     summary = summary_of(entries)
-    write_atomically(out / "fleet.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
-    write_atomically(out / "fleet.csv", _table(entries))
     names = {outlier["name"] for outlier in summary["outliers"]}
     picture = _picture([e for e in entries if e.get("after_rms_dph")], names)
     template = page_environment().get_template("fleet.html.j2")
     page = template.render(summary=summary, apart=names, picture=picture)
-    write_atomically(out / "fleet.html", page)
+    texts = (json.dumps(summary, indent=1, allow_nan=False) + "\n", _table(entries), page)
+    with result_folder(out, "fleet", entries=SUMMARY) as stage:
+        for name, text in zip(SUMMARY, texts, strict=True):
+            write_atomically(stage.folder / name, text)
     return summary
 
 

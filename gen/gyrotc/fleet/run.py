@@ -1,24 +1,25 @@
-"""The jobs of a fleet on the processes of this machine, or on a Dask cluster."""
+"""A fleet: what is done stays, the rest is done, and the summary agrees with the units at every moment."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any
 
-from ..errors import InputError
-from .manifest import Fleet
-from .unit import Entry, Task, do_unit, done_before
+from ..outputs import KINDS, Lock
+from ..outputs.places import check_apart, check_contents, final_place
+from .aside import clean_units
+from .entry import Entry
+from .fingerprint import program_of
+from .manifest import SUMMARY, Fleet
+from .page import write_summary
+from .pool import on_dask, on_processes
+from .unit import Task, done_before
 
 __all__ = ["run_fleet"]
 
 Told = Callable[[Entry], None]
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def run_fleet(
@@ -30,31 +31,60 @@ def run_fleet(
     full: bool = False,
     told: Told | None = None,
 ) -> list[Entry]:
-    """Does every unit that is not done yet; one entry each, in the manifest's order.
+    """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
 
     Args:
-        out: A folder for each unit goes into it.
+        out: A folder for each unit goes into it, and the files of the summary.
         jobs: Processes on this machine.
         scheduler: Address of a Dask scheduler to use instead; its workers see the same folders.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
         told: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
-        InputError: A scheduler is named and Dask is not installed, or cannot be reached.
+        InputError: A scheduler is named and Dask is not installed, or cannot be reached; `out` is, holds or lies in
+            a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
-    say = told or (lambda _: None)
-    out.mkdir(parents=True, exist_ok=True)
-    tasks = [Task(unit, fleet, out / unit.name, full) for unit in fleet.units]
-    entries: dict[str, Entry] = {}
-    for task in tasks:
+    place = final_place(out)
+    folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
+    check_apart(out, place, folders, whole=True)
+    check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
+    place.mkdir(parents=True, exist_ok=True)
+    lock = Lock(place / "fleet.json", "fleet")
+    try:
+        return _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
+    finally:
+        lock.release()
+
+
+def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told) -> list[Entry]:
+    clean_units(out, [unit.folder for unit in fleet.units])
+    program = program_of()
+    tasks = [Task(unit, fleet, out / unit.folder, full, program) for unit in fleet.units]
+    entries: dict[int, Entry] = {}
+    for number, task in enumerate(tasks):
         if known := done_before(task):
-            entries[task.unit.name] = known | {"kept": True}
-            say(entries[task.unit.name])
-    waiting = [task for task in tasks if task.unit.name not in entries]
-    for entry in _on_dask(scheduler, waiting) if scheduler else _on_processes(jobs, waiting):
-        entries[entry["name"]] = entry
+            entries[number] = known | {"kept": True}
+            say(entries[number])
+    waiting = [number for number in range(len(tasks)) if number not in entries]
+    if waiting and (out / "fleet.json").exists():
+        # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
+        write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
+    left = [tasks[number] for number in waiting]
+    for k, entry in on_dask(scheduler, left) if scheduler else on_processes(jobs, left):
+        entries[waiting[k]] = entry
         say(entry)
-    return list(_one_of_each_serial([entries[task.unit.name] for task in tasks]))
+    found = list(_one_of_each_serial([entries[number] for number in range(len(tasks))]))
+    write_summary(out, found)
+    return found
+
+
+def _unfinished(task: Task) -> Entry:
+    return {
+        "name": task.unit.name,
+        "axis": task.unit.axis,
+        "status": "unfinished",
+        "reason": "the fleet was stopped before it: give the command again",
+    }
 
 
 def _one_of_each_serial(entries: Sequence[Entry]) -> Iterator[Entry]:
@@ -67,52 +97,3 @@ def _one_of_each_serial(entries: Sequence[Entry]) -> Iterator[Entry]:
         reason = f"serial {entry['serial']} is also that of another data set"
         others = f"; {entry['reason']}" if "reason" in entry else ""
         yield entry | {"status": "failed", "reason": reason + others}
-
-
-def _on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[Entry]:
-    """A process that dies takes the pool with it; what it had not done is then done one by one, each in its own."""
-    left = {task.unit.name: task for task in tasks}
-    try:
-        with _pool(jobs) as pool:
-            for future in as_completed([pool.submit(do_unit, task) for task in tasks]):
-                entry: dict[str, Any] = future.result()
-                del left[entry["name"]]
-                yield entry
-    except BrokenProcessPool:
-        for task in left.values():
-            yield _alone(task)
-
-
-def _alone(task: Task) -> Entry:
-    try:
-        with _pool(1) as pool:
-            return pool.submit(do_unit, task).result()
-    except BrokenProcessPool:
-        unit = task.unit
-        reason = "its process died (out of memory?)"
-        return {
-            "name": unit.name, "dataset": str(unit.dataset), "axis": unit.axis, "status": "failed",
-            "reason": reason,
-        }  # fmt: skip
-
-
-def _pool(jobs: int) -> ProcessPoolExecutor:
-    """Fresh processes with one thread each: a serial is too small to share."""
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
-    return ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-
-
-def _on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[Entry]:
-    try:
-        from distributed import Client
-        from distributed import as_completed as completed
-    except ImportError as error:
-        raise InputError("--scheduler", "Dask is not installed here", "pip install distributed") from error
-    try:
-        client = Client(scheduler, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise InputError("--scheduler", f"{scheduler}: {error}", "the address of a Dask scheduler") from error
-    with client:
-        for future in completed(client.map(do_unit, tasks, pure=False)):
-            yield future.result()

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
-from ..build import build
-from ..dataset import load
+from ..build import build_into
+from ..dataset import Dataset, load
 from ..emit import emit
-from ..errors import GyrotcError
+from ..errors import CheckFailed, GyrotcError, InputError
 from ..evaluate import evaluate
 from ..fitting import fit_dataset
-from ..inputs import read_json
 from ..limits import held_against
 from ..model import Model, load_model
-from ..outputs import result_folder, write_atomically
+from ..outputs import KINDS, result_folder, write_atomically
 from ..verify import verify
-from .manifest import Fleet, Unit
+from .aside import set_aside
+from .entry import Entry, kept_entry, write_entry
+from .fingerprint import digest_of, inputs_of, program_of
+from .manifest import Fleet, Unit, printable
 
-__all__ = ["ENTRY", "Task", "do_unit", "done_before"]
-
-ENTRY = "entry.json"
-Entry = dict[str, Any]
+__all__ = ["Task", "do_unit", "done_before", "failed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,91 +33,117 @@ class Task:
     fleet: Fleet
     out: Path
     full: bool
+    program: str  # hash of the program that asks for it
 
-    @property
     def key(self) -> str:
-        """Changes with the recordings' names, sizes and times, the options, the limits and the program."""
-        files = sorted(p for p in self.unit.dataset.rglob("*") if p.is_file())
-        facts = [(p.name, p.stat().st_size, p.stat().st_mtime_ns) for p in files]
+        """Changes with the contents of the recordings, the options, the limits and the program."""
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
-        job = [
-            __version__,
-            self.unit.axis,
-            asdict(self.fleet.options),
-            self.fleet.numerics,
-            limits,
-            self.full,
-        ]
-        return hashlib.sha256(json.dumps([job, facts]).encode()).hexdigest()
+        options = [self.unit.axis, asdict(self.fleet.options), self.fleet.numerics, limits, self.full]
+        return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 
 def done_before(task: Task) -> Entry | None:
-    """The entry of an earlier call that still holds; None if the job must be done."""
+    """The entry of an earlier call that still holds; None if the job must be done.
+
+    It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
+    """
     try:
-        entry: Entry = read_json(task.out / ENTRY, "the entry of a gyro")
-        return entry if entry["key"] == task.key else None
-    except (GyrotcError, OSError, KeyError, TypeError):
+        entry = None if task.unit.refused else kept_entry(task.out, task.key())
+    except OSError:
         return None
+    return entry and entry | _who(task)
 
 
 def do_unit(task: Task) -> Entry:
     """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
-    name = {"name": task.unit.name, "dataset": str(task.unit.dataset), "axis": task.unit.axis}
     try:
-        entry = name | _built(task)
+        if task.unit.refused:
+            raise InputError(task.unit.name, task.unit.refused)
+        if task.program != program_of():
+            raise CheckFailed("the gyrotc of this worker is not the one that asks")
+        return _built(task)
     except GyrotcError as error:
-        return name | {"status": "failed", "reason": str(error)}
+        return failed(task, str(error))
+    except OSError as error:
+        return failed(task, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:  # a fault of the program itself must not stop the other serials either
-        return name | {"status": "failed", "reason": f"{type(error).__name__}: {error}"}
-    _add(task, ENTRY, entry)
-    return entry
+        return failed(task, f"{type(error).__name__}: {error}")
 
 
-def _add(task: Task, name: str, content: Entry) -> None:
-    """One more file of the unit's result."""
-    with result_folder(task.out, "fleet", kind="", entries=(name,)) as stage:
-        write_atomically(stage.folder / name, json.dumps(content, indent=1, allow_nan=False) + "\n")
+def failed(task: Task, reason: str) -> Entry:
+    """The entry of a job that came to nothing; an earlier result of the gyro stays as it was."""
+    try:
+        stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
+    except OSError:
+        stays = ""
+    return _who(task) | {"status": "failed", "reason": printable(reason) + stays}
+
+
+def _who(task: Task) -> Entry:
+    return {
+        "name": task.unit.name,
+        "dataset": printable(str(task.unit.dataset)),
+        "axis": task.unit.axis,
+    }
 
 
 def _built(task: Task) -> Entry:
-    key = task.key  # of the recordings as they are before they are read
-    if task.full:
-        [result] = build(
-            task.unit.dataset, task.out, task.fleet.options, axis=task.unit.axis, numerics=task.fleet.numerics
+    """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
+    key = task.key()
+    dataset = load(task.unit.dataset, axis=task.unit.axis)
+    aside = set_aside(task.out)
+    with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        model, evaluation, verification, held = (_whole if task.full else _quick)(
+            task.fleet, dataset, stage.folder
         )
-        model, evaluation, verification = load_model(task.out), result.evaluation, result.verification
-    else:
-        model, evaluation, verification = _quick(task)
-    faults = [f"{verification['failed']} checks failed"] if verification["failed"] else []
+        if task.key() != key:
+            raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
+        faults = _faults(evaluation, verification, held)
+        status = {"status": "failed", "reason": "; ".join(faults)} if faults else {"status": "done"}
+        figures = {"serial": model.serial} | _figures(model, evaluation, verification)
+        entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
+    return entry | {"aside": aside} if aside else entry
+
+
+def _faults(evaluation: Entry, verification: Entry, held: Entry | None) -> list[str]:
+    found = [f"{verification['failed']} checks failed"] if verification["failed"] else []
     if evaluation["mismatches"]:
-        faults.append(f"{evaluation['mismatches']} steps differ from the reference")
-    if task.fleet.limits:
-        held = held_against(task.fleet.limits, model, evaluation, verification)
-        _add(task, "limits.json", held)
-        faults += [
-            f"{c['limit']} {c['bound']} is not met: {c['measured']}" for c in held["limits"] if not c["met"]
-        ]
-    status = {"status": "failed", "reason": "; ".join(faults)} if faults else {"status": "done"}
-    return status | {"key": key, "serial": model.serial} | _figures(model, evaluation, verification)
+        found.append(f"{evaluation['mismatches']} steps differ from the reference")
+    for check in held["limits"] if held else ():
+        if not check["met"]:
+            found.append(f"{check['limit']} {check['bound']} is not met: {check['measured']}")
+    return found
 
 
-def _quick(task: Task) -> tuple[Model, Entry, Entry]:
+_Made = tuple[Model, Entry, Entry, "Entry | None"]
+
+
+def _whole(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
+    result = build_into(work, dataset, fleet.options, numerics=fleet.numerics, limits=fleet.limits)
+    return load_model(work), result.evaluation, result.verification, result.limits
+
+
+def _quick(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
     """Without a compiler: what the C code gives is taken from the reference."""
-    fleet = task.fleet
-    with result_folder(task.out, "build", inputs=[task.unit.dataset]) as stage:
-        work = stage.folder
-        dataset = load(task.unit.dataset, axis=task.unit.axis)
-        fitted = fit_dataset(dataset, fleet.options)
-        fitted.model.save(work / "model.json")
-        write_atomically(work / "training.json", json.dumps(fitted.training, allow_nan=False) + "\n")
-        emit(fitted.model, work, numerics=fleet.numerics)
-        verification = verify(work, compiled=False)
-        evaluation = evaluate(
-            work, dataset, average_s=fleet.options.average_s, training=fitted.training, compiled=False
-        )
-        for name, result in (("verify", verification), ("evaluate", evaluation)):
-            write_atomically(work / f"{name}.json", json.dumps(result, allow_nan=False) + "\n")
-    return fitted.model, evaluation, verification
+    fitted = fit_dataset(dataset, fleet.options)
+    fitted.model.save(work / "model.json")
+    _write(work / "training.json", fitted.training)
+    emit(fitted.model, work, numerics=fleet.numerics)
+    verification = verify(work, compiled=False)
+    _write(work / "verify.json", verification)
+    evaluation = evaluate(
+        work, dataset, average_s=fleet.options.average_s, training=fitted.training, compiled=False
+    )
+    _write(work / "evaluate.json", evaluation)
+    held = held_against(fleet.limits, fitted.model, evaluation, verification) if fleet.limits else None
+    if held:
+        _write(work / "limits.json", held)
+    return fitted.model, evaluation, verification, held
+
+
+def _write(path: Path, result: dict[str, Any]) -> None:
+    write_atomically(path, json.dumps(result, allow_nan=False) + "\n")
 
 
 def _figures(model: Model, evaluation: Entry, verification: Entry) -> Entry:

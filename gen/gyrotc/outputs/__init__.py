@@ -7,7 +7,7 @@ A folder is written beside its place and put there in one step (`result_folder`)
 from __future__ import annotations
 
 from .files import check_replaceable, write_atomically
-from .folder import Stage, result_folder, write_result
+from .folder import Stage, clean, leftovers, result_folder, write_result
 from .interrupts import Interrupted, deferred, die_of, raise_on_signals
 from .lock import Lock
 from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
@@ -21,9 +21,11 @@ __all__ = [
     "Marker",
     "Stage",
     "check_replaceable",
+    "clean",
     "deferred",
     "die_of",
     "faults",
+    "leftovers",
     "raise_on_signals",
     "read_marker",
     "result_folder",

@@ -19,7 +19,7 @@ from .marker import KINDS, MARKER, OWN, Marker, faults, read_marker, remove_list
 from .places import check_apart, check_contents, check_serial, final_place, prefix_of
 from .update import Update, write_marker
 
-__all__ = ["Stage", "result_folder", "write_result"]
+__all__ = ["Stage", "clean", "leftovers", "result_folder", "write_result"]
 
 _open: list[_Job] = []
 _ASIDE = ".old"
@@ -259,11 +259,27 @@ class _Job:
         for part in marker.parts if marker else ():
             place = self.place / part
             if place.parent.is_dir():
-                lock = Lock(place, "clean")
-                try:
-                    _clean_beside(place)
-                finally:
-                    lock.release()
+                clean(place)
+
+
+def leftovers(folder: Path) -> set[str]:
+    """Names in a folder beside which jobs, at work or dead, left something."""
+    names = [path.name[1:] for path in folder.iterdir() if path.name.startswith(".")]
+    parted = (name.partition(prefix_of(Path())[1:]) for name in names)
+    return {name for name, found, _ in parted if found} | {n[:-5] for n in names if n.endswith(".lock")}
+
+
+def clean(place: Path) -> None:
+    """Removes what dead jobs left beside a place.
+
+    Raises:
+        InputError: A job is writing there.
+    """
+    lock = Lock(place, "clean")
+    try:
+        _clean_beside(place)
+    finally:
+        lock.release()
 
 
 def _clean_beside(place: Path) -> None:

@@ -1,0 +1,429 @@
+"""One gyro cannot stop a fleet, and what counts as done is what is there, whole and of these very recordings."""
+
+from __future__ import annotations
+
+import csv
+import ctypes
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gyrotc.errors import InputError
+from gyrotc.fitting import FitOptions
+from gyrotc.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
+from gyrotc.fleet.fingerprint import inputs_of, program_of
+from gyrotc.fleet.manifest import SUMMARY
+from gyrotc.fleet.unit import Task, do_unit, done_before
+from gyrotc.limits import load_limits
+from gyrotc.outputs import MARKER, Lock, faults
+from recordings import columns, toml, write_csv
+
+PROGRAM = Path(sys.executable).with_name("gyrotc")
+KILLS = int(os.environ.get("GYROTC_KILLS", "3"))
+HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
+
+
+def gyro(folder: Path, serial: str, *, seed: int = 1) -> None:
+    """An hour of a small gyro."""
+    rows = columns(360, seed=seed)
+    write_csv(folder / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
+    (folder / "dataset.toml").write_text(toml('file = "run-01.csv"', head=HEAD.format(serial)))
+
+
+@pytest.fixture
+def task(tmp_path: Path) -> Task:
+    """One gyro, not done yet."""
+    gyro(tmp_path / "data" / "RLG-1", "RLG-1")
+    fleet = Fleet((Unit(tmp_path / "data" / "RLG-1", None),), FitOptions(), ("f32",), None)
+    return Task(fleet.units[0], fleet, tmp_path / "out" / "RLG-1", False, program_of())
+
+
+def test_done_is_done_until_a_byte_of_a_recording_changes(task: Task) -> None:
+    assert done_before(task) is None
+    made = do_unit(task)
+    assert made["status"] == "done", made
+    assert done_before(task) == made
+    path = task.unit.dataset / "run-01.csv"
+    data, facts = bytearray(path.read_bytes()), path.stat()
+    data[-2] = ord("1") if data[-2] != ord("1") else ord("2")
+    path.write_bytes(data)
+    os.utime(path, ns=(facts.st_atime_ns, facts.st_mtime_ns))
+    assert (path.stat().st_size, path.stat().st_mtime_ns) == (facts.st_size, facts.st_mtime_ns)
+    assert done_before(task) is None, "another recording of the same size and time"
+
+
+def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_path: Path) -> None:
+    do_unit(task)
+    (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\ncenters = 20\n")
+    others = {
+        "options": FitOptions(seed=1),
+        "numerics": None,
+        "limits": load_limits(tmp_path / "limits.toml"),
+    }
+    for name, value in others.items():
+        assert done_before(replace(task, fleet=replace(task.fleet, **{name: value}))) is None, name
+    assert done_before(replace(task, full=True)) is None
+    assert done_before(replace(task, program="0" * 64)) is None
+    stranger = do_unit(replace(task, program="0" * 64))
+    assert stranger["status"] == "failed" and "not the one that asks" in stranger["reason"]
+    assert done_before(task) is not None
+
+
+def _edit(name: str, old: str, new: str) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        text = (folder / name).read_text()
+        assert old in text
+        (folder / name).write_text(text.replace(old, new, 1))
+
+    return change
+
+
+TAMPERED: dict[str, Callable[[Path], object]] = {
+    "a weight": _edit("c/gtc_rlg_1.c", "0x", "0X"),
+    "the model": _edit("model.json", '"RLG-1"', '"RLG-2"'),
+    "a figure of the entry": _edit("entry.json", '"after_rms_dph": ', '"after_rms_dph": 1'),
+    "its status": _edit("entry.json", '"status": "done"', '"status": "dune"'),
+    "a type of the entry": _edit("entry.json", '"findings": [', '"findings": [1, '),
+    "deep nesting": lambda folder: (folder / "entry.json").write_text("[" * 100_000),
+    "the marker": _edit(".gyrotc-result.json", '"schema"', '"scheme"'),
+    "a list of the marker": _edit(".gyrotc-result.json", '"model.json"', '"mode1.json"'),
+    "an empty entry": lambda folder: (folder / "entry.json").write_text(""),
+    "half the files": lambda folder: [p.unlink() for p in sorted((folder / "c").iterdir())[::2]],
+    "the evaluation": lambda folder: (folder / "evaluate.json").unlink(),
+}
+
+
+def _stable(folder: Path) -> dict[str, bytes]:
+    """Files of a result but those that tell how long it took, or hold hashes of these."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {
+        path.name: path.read_bytes()
+        for path in files
+        if path.name not in ("training.json", "entry.json", MARKER)
+    }
+
+
+@pytest.mark.parametrize("case", TAMPERED)
+def test_a_tampered_result_is_not_done(case: str, task: Task) -> None:
+    do_unit(task)
+    before = _stable(task.out)
+    TAMPERED[case](task.out)
+    assert done_before(task) is None
+    damaged = {path.relative_to(task.out): path.read_bytes() for path in task.out.rglob("*.*")}
+    again = do_unit(task)
+    if case == "a list of the marker":  # model.json is then a file that gyrotc did not write
+        assert again["status"] == "failed" and "model.json" in again["reason"]
+        return
+    assert again["status"] == "done"
+    assert _stable(task.out) == before
+    if "aside" in again:  # nobody's file is lost
+        aside = task.out.with_name(again["aside"])
+        assert {path.relative_to(aside): path.read_bytes() for path in aside.rglob("*.*")} == damaged
+    else:
+        assert case in ("half the files", "the evaluation")
+    assert {p.name for p in task.out.parent.iterdir()} <= {"RLG-1", "RLG-1.changed-1"}
+
+
+def test_a_foreign_file_in_a_result_stays_and_stops_its_gyro_alone(task: Task) -> None:
+    do_unit(task)
+    (task.out / "notes.txt").write_text("mine")
+    assert done_before(task) is not None
+    other = replace(task, fleet=replace(task.fleet, options=FitOptions(seed=1)))
+    entry = do_unit(other)
+    assert entry["status"] == "failed" and "notes.txt" in entry["reason"]
+    assert "its folder holds an earlier result" in entry["reason"]
+    assert done_before(task) is not None and (task.out / "notes.txt").read_text() == "mine"
+
+
+def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
+    told = []
+
+    def meanwhile(_jobs: int, tasks: list[Task]) -> Any:
+        with pytest.raises(InputError, match="another job writes there: gyrotc fleet, process") as caught:
+            run_fleet(fleet, out)
+        told.append(caught.value)
+        yield 0, do_unit(tasks[0])
+
+    monkeypatch.setattr(run, "on_processes", meanwhile)
+    assert run_fleet(fleet, out)[0]["status"] == "done"
+    assert told and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
+
+
+@pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
+def test_recordings_are_never_the_place_for_results(place: str, tmp_path: Path) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    with pytest.raises(InputError, match="the data set"):
+        run_fleet(load_manifest(tmp_path / "d"), tmp_path / place)
+    assert {path.name for path in (tmp_path / "d" / "RLG-1").iterdir()} == {"run-01.csv", "dataset.toml"}
+
+
+def test_a_result_is_no_data_set(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    data = task.unit.dataset.parent
+    run_fleet(load_manifest(data), data / "out")
+    assert [unit.name for unit in load_manifest(data).units] == ["RLG-1"]
+
+
+def test_a_summary_of_somebody_else_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "fleet.csv").write_text("aircraft,pilot\n")
+    with pytest.raises(InputError, match=r"fleet\.csv"):
+        run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out")
+    assert (tmp_path / "out" / "fleet.csv").read_text() == "aircraft,pilot\n"
+    assert not (tmp_path / "out" / "RLG-1").exists(), "refused before any work"
+
+
+def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    out = task.out.parent
+    run_fleet(task.fleet, out)
+    before = {path.name for path in out.iterdir()}
+    shutil.copytree(task.out, out / ".RLG-1.gyrotc-part-01234567")
+    (out / ".RLG-1.lock").touch()
+    busy = Lock(out / "RLG-1", "verify")
+    assert run_fleet(task.fleet, out)[0]["kept"]
+    busy.release()
+    assert run_fleet(task.fleet, out)[0]["kept"]
+    assert {path.name for path in out.iterdir()} == before
+
+
+def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:
+    (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\ncenters = 20\n")
+    limited = replace(task, fleet=replace(task.fleet, limits=load_limits(tmp_path / "limits.toml")))
+    assert do_unit(limited)["status"] == "done"
+    (limited.out / "limits.json").unlink()
+    assert done_before(limited) is None
+
+
+def test_recordings_that_change_while_they_are_read_are_refused(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gyrotc.fleet import unit
+
+    def load(folder: Path, **given: Any) -> Any:
+        dataset = whole(folder, **given)
+        with (folder / "run-01.csv").open("a") as file:
+            file.write("1e9,20.0,-20.0\n")
+        return dataset
+
+    whole = unit.load
+    monkeypatch.setattr(unit, "load", load)
+    entry = do_unit(task)
+    assert entry["status"] == "failed" and "changed while they were read" in entry["reason"]
+    assert not task.out.exists()
+
+
+def test_inputs_are_every_regular_file_once(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "run.csv").write_text("1")
+    (tmp_path / "data" / "here").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "data" / "round").symlink_to(tmp_path / "data")
+    (tmp_path / "data" / "gone.csv").symlink_to(tmp_path / "nothing")
+    os.mkfifo(tmp_path / "data" / "pipe.csv")
+    before = inputs_of(tmp_path / "data")
+    assert list(before) == ["here/run.csv"]
+    (tmp_path / "elsewhere" / "run.csv").write_text("2")
+    assert inputs_of(tmp_path / "data") != before
+
+
+def _without_rights() -> None:
+    """Root reads everything: take that from a child process (prctl(PR_CAPBSET_DROP), linux/capability.h)."""
+    if os.geteuid() == 0:
+        for capability in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+            ctypes.CDLL(None).prctl(24, capability, 0, 0, 0)
+
+
+def test_strange_folders_concern_themselves_alone(tmp_path: Path) -> None:
+    data, out = tmp_path / "data", tmp_path / "out"
+    names = ["RLG-1", "fleet.json", "Fleet.CSV", "locked", os.fsdecode(b"RLG-\xff"), "two\nlines"]
+    for k, name in enumerate(names):
+        gyro(data / name, f"S-{k}", seed=k)
+    (data / "locked").chmod(0)
+    done = subprocess.run(
+        [PROGRAM, "fleet", data, "--out", out, "--jobs", "1"],
+        capture_output=True, check=False, preexec_fn=_without_rights,
+    )  # fmt: skip
+    (data / "locked").chmod(0o755)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr == b"gyrotc: 3 of 6 gyros failed\n"
+    summary = json.loads((out / "fleet.json").read_text("utf-8"))
+    rows = {entry["name"]: entry for entry in summary["serials"]}
+    assert {name for name, entry in rows.items() if entry["status"] == "done"} == {
+        "RLG-1", r"RLG-\xff", r"two\nlines",
+    }  # fmt: skip
+    assert "Permission denied" in rows["locked"]["reason"] or "cannot be read" in rows["locked"]["reason"]
+    for name in ("fleet.json", "Fleet.CSV"):
+        assert "name of a file of the summary" in rows[name]["reason"]
+    assert len(list(csv.DictReader((out / "fleet.csv").open(encoding="utf-8")))) == 6
+    assert r"RLG-\xff" in (out / "fleet.html").read_text("utf-8")
+    assert len(done.stdout.splitlines()) == 7, "a line for each, whatever its name"
+
+
+def test_names_that_are_no_names(tmp_path: Path) -> None:
+    for dataset in ("/", "..", str(tmp_path / "a" / ".hidden")):
+        unit = Unit(Path(dataset), None)
+        assert bool(unit.refused) == (dataset != "..")
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    (tmp_path / "fleet.toml").write_text(
+        'schema = 1\naxis = "all"\n[[unit]]\ndataset = "loop"\naxis = "all"\n'
+    )
+    assert [unit.name for unit in load_manifest(tmp_path / "fleet.toml").units] == ["loop"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'datasets = ["a\\u0000b"]',
+        "datasets = [1]",
+        'datasets = [""]',
+        'numeric = []\ndatasets = ["*"]',
+        'datasets = ["*"]\n[options]\nmethod = "magic"',
+        'datasets = ["*"]\n[options]\nmethod = "poly"',
+        'datasets = ["*"]\n[options]\nseed = true',
+        'datasets = ["*"]\n[options]\nblock_s = "10"',
+        'datasets = ["*"]\n[options]\nblock_s = nan',
+        'datasets = ["*"]\n[options]\nrho = 1.0',
+    ],
+)
+def test_wrong_types_in_a_manifest_are_refused(line: str, tmp_path: Path) -> None:
+    gyro(tmp_path / "RLG-1", "RLG-1")
+    (tmp_path / "fleet.toml").write_text(f"schema = 1\n{line}\n")
+    with pytest.raises(InputError, match=r"fleet\.toml"):
+        load_manifest(tmp_path / "fleet.toml")
+
+
+def _dies(task: Any) -> dict[str, Any]:
+    """Stands in for a job: of those in `dying` the process is killed, as by a system out of memory."""
+    if task.unit.name in task.fleet.numerics:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"name": task.unit.name, "axis": None, "status": "done"}
+
+
+def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "do_unit", _dies)
+    units = tuple(Unit(tmp_path / f"RLG-{k}", None) for k in range(4))
+    fleet = Fleet(units, FitOptions(), ("RLG-1",), None)
+    entries = run_fleet(fleet, tmp_path / "out", jobs=1)
+    assert [entry["name"] for entry in entries] == [unit.name for unit in units]
+    died = {entry["name"] for entry in entries if "its process died" in entry.get("reason", "")}
+    assert died == {"RLG-1"}
+    assert sum(entry["status"] == "done" for entry in entries) == 3
+
+
+def test_a_summary_never_speaks_of_what_is_being_done_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fleet that is stopped anywhere leaves a summary that says so."""
+    for k in range(2):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
+    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+    run_fleet(fleet, out)
+    assert json.loads((out / "fleet.json").read_text())["done"] == 2
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1", seed=5)
+
+    def stopped(_jobs: int, tasks: list[Task]) -> Any:
+        assert [task.unit.name for task in tasks] == ["RLG-1"]
+        do_unit(tasks[0])
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(run, "on_processes", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_fleet(fleet, out)
+    summary = json.loads((out / "fleet.json").read_text())
+    assert [entry["status"] for entry in summary["serials"]] == ["done", "unfinished"]
+    assert (summary["done"], summary["failed"], summary["unfinished"]) == (1, 0, 1)
+    for name in ("fleet.csv", "fleet.html"):
+        assert "unfinished" in (out / name).read_text()
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no /proc here")
+def test_no_process_outlives_its_fleet(tmp_path: Path) -> None:
+    for k in range(40):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    job = subprocess.Popen(
+        [PROGRAM, "fleet", tmp_path / "d", "--out", tmp_path / "out", "--jobs", "2"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    while not list((tmp_path / "out").glob("RLG-*/entry.json")):
+        assert job.poll() is None
+        time.sleep(0.02)
+    children = [
+        int(c) for t in Path(f"/proc/{job.pid}/task").iterdir() for c in (t / "children").read_text().split()
+    ]
+    assert len(children) >= 2
+    job.kill()
+    job.wait()
+    end = time.monotonic() + 60.0
+    while any(_alive(pid) for pid in children):
+        assert time.monotonic() < end, "a process goes on writing for a fleet that is gone"
+        time.sleep(0.05)
+
+
+def _agrees(out: Path) -> int:
+    """Every unit is whole, and what the summary says of a gyro as done is what lies in its folder; how many are."""
+    for folder in out.glob("RLG-*"):
+        assert faults(folder) == [], folder
+    if not (out / "fleet.json").exists():
+        return 0
+    summary = json.loads((out / "fleet.json").read_text())
+    done = [entry for entry in summary["serials"] if entry["status"] == "done"]
+    for entry in done:
+        kept = json.loads((out / entry["name"] / "entry.json").read_text())
+        assert {name: kept[name] for name in entry} == entry
+    return len(done)
+
+
+def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
+    """Everything in its process group is killed: of each gyro the earlier result or the new one, and nothing else."""
+    seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    out = tmp_path / "out"
+    command = [PROGRAM, "fleet", tmp_path / "d", "--out", out, "--jobs", "2"]
+    for k in range(3):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    begun = time.monotonic()
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    length_s = time.monotonic() - begun
+    assert _agrees(out) == 3
+    for kill in range(KILLS):
+        for k in range(3):
+            gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=10 * kill + k + 10)
+        job = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        time.sleep(draw.uniform(0.3, 1.0) * length_s)
+        os.killpg(job.pid, draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))
+        job.wait()
+        _agrees(out)
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    assert _agrees(out) == 3
+    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), MARKER, *SUMMARY}
+    assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}
