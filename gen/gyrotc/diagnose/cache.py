@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import inspect
 import os
 import pickle
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from ..outputs import write_atomically
 from .bank import Bank, build
+from .catalogue import diagnosed
 from .records import Records
 
 __all__ = ["bank_of", "folder"]
@@ -47,19 +49,19 @@ def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _:
     return bank
 
 
-@functools.cache
 def _code() -> str:
-    """Hash of the modules that make a bank: a new version of one makes new banks."""
+    """Hash of the modules that make a bank, those of the causes among them: a new version makes new banks."""
     here = Path(__file__).parent
-    names = sorted([*here.glob("*.py"), *(here.parent / "terms").glob("*.py")])
-    digest = hashlib.sha256()
-    for name in names:
-        if (
-            name.stem in ("bank", "baseline", "catalogue", "noise", "others", "records")
-            or name.parent.name == "terms"
-        ):
-            digest.update(name.read_bytes())
-    return digest.hexdigest()
+    makers = ("bank", "baseline", "catalogue", "noise", "others", "records")
+    shared = ("memory", "operators", "search")
+    names = [here / f"{n}.py" for n in makers] + [here.parent / "terms" / f"{n}.py" for n in shared]
+    names += [Path(inspect.getfile(t.features)) for t in diagnosed().values() if t.features is not None]
+    return hashlib.sha256(b"".join(_content(name) for name in names)).hexdigest()
+
+
+@functools.cache
+def _content(path: Path) -> bytes:
+    return path.read_bytes()
 
 
 def _trim() -> None:
