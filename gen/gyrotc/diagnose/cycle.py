@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from .. import terms
-from ..terms import search as terms_search
-from ..terms.search import Reach
+from ..terms.search import Reach, SingleCycle
 from .attribute import Attribution, Rival
 from .catalogue import Candidate, columns_of, diagnosed, searched, shape_parameter
 from .records import Records
@@ -205,7 +204,7 @@ def cycle_of(records: Records) -> Cycle:
     return Cycle(tried, chosen, causes, rivals, rms, p_value, fits.rest, explained)
 
 
-def _memories() -> dict[str, terms_search.Cycle]:
+def _memories() -> dict[str, SingleCycle]:
     """Causes that are looked for in a single cycle."""
     found = {id: searched(id).cycle for id in diagnosed()}
     return {id: cycle for id, cycle in found.items() if cycle is not None}

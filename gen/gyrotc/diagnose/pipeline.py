@@ -154,7 +154,8 @@ def needs_finer(search: Search) -> bool:
     gains = Gains(search)
     bank: Bank = search.bank
     finer = gains.whiten(bank.finer)
-    of_map = [p for p in gains.added() if _of_map(p.members[0])]
+    added = [p for p in gains.added() if p.members[0].role == "columns"]
+    of_map = [p for p in added if _of_map(p.members[0])]
     waves = []
     if of_map:
         best = max(of_map, key=lambda p: p.gain).members[0]

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..table import ARRAYS, MISSING_Q31, Table
-from ..terms.recursion import Floating, Operations, Recursion, TableKind, recursion_of
+from ..terms.arithmetic import Floating, Operations
+from ..terms.recursion import Recursion, TableKind, recursion_of
 from . import f32, q31
 
 __all__ = ["recursions"]

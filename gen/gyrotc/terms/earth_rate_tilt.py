@@ -40,9 +40,9 @@ TERM = Term(
     source="Earth rate 15.041 deg/h seen by a misaligned east axis",
     parameters=(
         Parameter("latitude_deg", "deg", -90.0, 90.0, logarithmic=False, default=45.0),
+        Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
         Parameter("twist_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
         Parameter("tilt_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
-        Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
     ),
     words=Words(
         name="The fixture turns the axis through Earth rate",

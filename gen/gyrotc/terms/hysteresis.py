@@ -12,7 +12,7 @@ import numpy as np
 from .base import Array, Features, History, Parameter, Scene, Term, Values
 from .operators import play
 from .recursion import TableKind
-from .search import Cycle, Search, geometric
+from .search import Search, SingleCycle, geometric
 from .tabled import Tabled
 from .words import Telling, Words
 
@@ -71,7 +71,7 @@ TERM = Term(
         over=_WIDTH.name,
         imitates=True,
         shown=(4.0, 12.0),
-        cycle=Cycle(points=24, usual=False),
+        cycle=SingleCycle(points=24, usual=False),
     ),
     table=Tabled(TableKind.PLAY, _record),
     bias=_bias,

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .base import Parameter
 
-__all__ = ["Cycle", "Reach", "Search", "anywhere", "geometric"]
+__all__ = ["Reach", "Search", "SingleCycle", "anywhere", "geometric"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Reach:
 
 
 @dataclass(frozen=True, slots=True)
-class Cycle:
+class SingleCycle:
     """How a memory is looked for in a single chamber cycle.
 
     Attributes:
@@ -73,7 +73,7 @@ class Search:
     planned: bool = True
     shown: tuple[float, ...] = ()
     rival_every: int = 1
-    cycle: Cycle | None = None
+    cycle: SingleCycle | None = None
 
 
 def anywhere(reach: Reach) -> list[Mapping[str, float]]:

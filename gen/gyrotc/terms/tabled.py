@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Context, Decimal
 
-from .recursion import FLOAT64, Recursion, TableKind, recursion_of
+from .arithmetic import FLOAT64
+from .recursion import Recursion, TableKind, recursion_of
 
 __all__ = ["Tabled", "blocks_per_tau", "memory_gain", "octaves_per_block", "turns"]
 

@@ -15,7 +15,7 @@ from .base import Array, Features, History, Parameter, Scene, Term, Values
 from .memory import RATES, lagged
 from .operators import first_order
 from .recursion import TableKind
-from .search import Cycle, Search, geometric
+from .search import Search, SingleCycle, geometric
 from .tabled import Tabled, memory_gain
 from .words import Words
 
@@ -69,7 +69,7 @@ TERM = Term(
         twice=True,
         imitates=True,
         shown=(300.0, 1500.0),
-        cycle=Cycle(points=48, usual=True),
+        cycle=SingleCycle(points=48, usual=True),
     ),
     table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
