@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.dataset import Rows, Run, load
+from gyrotc.diagnose import diagnose
 from gyrotc.diagnose.replay import Effect, Played, play_runs, samples
 from gyrotc.fitting import FrontEnd, front_end
 from gyrotc.frontend import missed_before
 from gyrotc.model import Model
 from gyrotc.quantise import quantise
 from gyrotc.reference import evaluate_map
+from gyrotc.simulate import simulate
 from gyrotc.terms import CATALOGUE
 from gyrotc.verify.replay import history_of
 from numpy.typing import NDArray
@@ -160,3 +162,32 @@ def test_the_replay_is_what_the_target_does(
 def _numbers(time_s: Array, first_s: float, front: FrontEnd) -> NDArray[np.int64]:
     """Numbers of the blocks that begin at these times."""
     return np.rint((time_s - first_s) / front.block_s).astype(np.int64)
+
+
+SCENARIO = """
+extends = "supply-voltage"
+[[set]]
+role = "train"
+started = 2026-03-02T08:00:00Z
+profiles = ["cold start 60 C", "slow staircase", "fast full range"]
+[[set]]
+role = "exam"
+started = 2026-03-16T08:00:00Z
+profiles = ["nested loops"]
+"""
+
+
+def test_a_gap_in_every_run_costs_an_extension_next_to_nothing(tmp_path: Path) -> None:
+    """200 s without rows: with a channel of 0 in their place the extension made five times its gain of new error."""
+    (tmp_path / "short.toml").write_text(SCENARIO)
+    simulate(tmp_path / "short.toml", seed=3, out=tmp_path / "data")
+    left = []
+    for gap in (0, 20):
+        for path in (tmp_path / "data").glob("run-*.csv"):
+            lines = path.read_text().splitlines(keepends=True)
+            middle = len(lines) // 2
+            path.write_text("".join(lines[:middle] + lines[middle + gap :]))
+        result = diagnose(load(tmp_path / "data")).result
+        assert (result["verdict"], result["extended"]["terms"]) == ("explained", ["auxiliary"])
+        left.append(result["extended"]["gain"]["exam_rms_after_dph"])
+    assert left[1] < 1.02 * left[0]
