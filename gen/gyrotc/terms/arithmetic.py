@@ -67,7 +67,7 @@ class Floating:
         return np.array(x, dtype=np.float64)
 
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
-        return ~(np.abs(x) <= _CHANNEL_MAX)
+        return np.asarray(~(np.abs(x) <= _CHANNEL_MAX))
 
     def settle(self, x: Any) -> Any:
         return x
