@@ -27,7 +27,6 @@ __all__ = ["diagnose_into", "extended_scenario", "save"]
 Progress = Callable[[str], None]
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
-_NO_PARAMETERS = ("map_too_coarse",)
 
 
 def diagnose_into(
@@ -75,7 +74,7 @@ def extended_scenario(result: dict[str, Any]) -> str | None:
 
     Profiles are the packaged ones: who knows the chamber's programme puts it in their place.
     """
-    causes = [c for c in result["causes"] if c["family"] != "noise" and c["id"] not in _NO_PARAMETERS]
+    causes = [c for c in result["causes"] if c["family"] != "noise" and c["parameters"]]
     if not causes:
         return None
     lines = [

@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from .diagnose import Diagnosis
 from .diagnose.attribute import Attribution
+from .diagnose.catalogue import diagnosed
 from .diagnose.compare import Discrepancy, Ensemble
 from .diagnose.cycle import Cycle
 from .diagnose.records import Records, centred_slope
 from .diagnose.refine import Refined
 from .diagnose.search import Found
-from .diagnose.words import WORDS
 from .metrics import Averages
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
+from .terms import CATALOGUE
 from .texts import picture_text
 
 __all__ = ["draw"]
@@ -271,14 +272,14 @@ def _likelihood(cause: Refined) -> str | None:
         ax.set_ylim(bottom=max(-40.0, float((gain - gain.max()).min()) * 1.05))
         ax.set_xlabel(name)
         ax.set_ylabel("2 Δ log likelihood")
-        ax.set_title(WORDS[cause.candidate.id].name, fontsize=8, loc="left")
+        ax.set_title(CATALOGUE[cause.candidate.id].words.name, fontsize=8, loc="left")
         return svg(figure)
 
 
 def _considered(attribution: Attribution, *, named: bool) -> str:
     """Best score of every cause before any was taken, and what is left after the named ones."""
     first, last = _best_scores(attribution.first), _best_scores(attribution.last)
-    ids = [i for i in WORDS if i in first]
+    ids = [i for i in diagnosed() if i in first]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 0.9 + 0.34 * len(ids)), layout="constrained")
         ax = figure.subplots()

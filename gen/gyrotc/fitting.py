@@ -95,7 +95,7 @@ def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
 
 def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
-    used = blocks.valid & (blocks.rows > 0) & np.isfinite(blocks.temperature_c)
+    used = blocks.used
     n = int(used.sum())
     return TrainingData(
         temperature_c=blocks.temperature_c[used].astype(np.float64),

@@ -27,6 +27,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from .errors import InputError
 from .inputs import read_json
 from .outputs import write_atomically
+from .terms import CATALOGUE
+from .terms import Term as Cause
+from .terms.tabled import Tabled
 
 __all__ = [
     "SCHEMA",
@@ -49,7 +52,7 @@ _MAX_CENTERS = 512
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
-_TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
+_TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)")
 
 Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
 CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -129,30 +132,37 @@ class Network(_Frozen):
 class Term(_Frozen):
     """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel."""
 
-    id: Literal[
-        "cavity_lag", "thermal_gradient", "hysteresis", "warm_up", "path_length_periodicity", "auxiliary"
-    ]
+    id: str
     parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]]
     channel: str | None = None
 
     @model_validator(mode="after")
-    def _known_parameters(self) -> Term:
-        names = {
-            "cavity_lag": {"tau_s"},
-            "thermal_gradient": {"tau_s", "amplitude_dph_per_c"},
-            "hysteresis": {"width_c", "amplitude_dph_per_c"},
-            "warm_up": {"tau_s", "amplitude_dph"},
-            "path_length_periodicity": {"period_c", "amplitude_dph", "phase_rad"},
-            "auxiliary": {"slope_dph_per_unit", "reference"},
-        }[self.id]
+    def _known(self) -> Term:
+        cause = CATALOGUE.get(self.id)
+        if cause is None or cause.table is None:
+            held = ", ".join(i for i, c in CATALOGUE.items() if c.table is not None)
+            raise ValueError(f"no term {self.id!r}; a table can hold {held}")
+        names = {p.name for p in cause.parameters}
         if set(self.parameters) != names:
             raise ValueError(f"term {self.id} takes the parameters {', '.join(sorted(names))}")
-        positive = [n for n in ("tau_s", "width_c", "period_c") if n in names]
-        if any(self.parameters[n] <= 0.0 for n in positive):
-            raise ValueError(f"{positive[0]} of term {self.id} must be above 0")
-        if (self.id == "auxiliary") != (self.channel is not None):
+        for parameter in cause.nonlinear():
+            if parameter.low > 0.0 and self.parameters[parameter.name] <= 0.0:
+                raise ValueError(f"{parameter.name} of term {self.id} must be above 0")
+        if cause.needs.channel != (self.channel is not None):
             raise ValueError("a channel belongs to an auxiliary term and to no other")
         return self
+
+    @property
+    def cause(self) -> Cause:
+        """What the catalogue knows of it."""
+        return CATALOGUE[self.id]
+
+    @property
+    def table(self) -> Tabled:
+        """How it stands in a table."""
+        table = self.cause.table
+        assert table is not None
+        return table
 
 
 class DataFile(_Frozen):
@@ -202,8 +212,9 @@ class Model(_Frozen):
         regions = [n.region is not None for n in self.networks]
         if len(regions) > 1 and not all(regions):
             raise ValueError("every network of a bank needs a region")
-        if sum(t.id == "cavity_lag" for t in self.terms) > 1:
-            raise ValueError("cavity_lag can be there only once")
+        moved = [t.id for t in self.terms if t.cause.kind == "input"]
+        if len(moved) > 1:
+            raise ValueError(f"{moved[1]} can be there only once: the map sees one temperature")
         return self
 
     @property

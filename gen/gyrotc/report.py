@@ -20,6 +20,7 @@ from .model import Model, load_model
 from .outputs import result_folder, write_atomically
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 from .stored import read_result
+from .terms import CATALOGUE
 from .texts import file_stem, html_environment
 
 __all__ = ["page_environment", "page_from", "write_page", "write_report"]
@@ -74,8 +75,13 @@ def write_page(folder: Path, text: str) -> Path:
 
 @functools.cache
 def page_environment() -> jinja2.Environment:
-    """Where pages come from, compiled once in a process; filters `sci` and `number` print figures."""
-    return html_environment(sci=_sci, number=_number, plain=_plain)
+    """Where pages come from, compiled once in a process.
+
+    Filters `sci` and `number` print figures; the test `moved_input` tells causes that change what the map sees.
+    """
+    environment = html_environment(sci=_sci, number=_number, plain=_plain)
+    environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
+    return environment
 
 
 @contextmanager

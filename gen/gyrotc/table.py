@@ -15,14 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "ARRAYS",
-    "AUXILIARY",
-    "HARMONIC",
     "LAYOUT",
     "MAGIC",
-    "MEMORY",
     "MISSING_Q31",
-    "PLAY",
-    "WARM_UP",
     "Numeric",
     "Table",
     "Words",
@@ -38,9 +33,6 @@ _INPUT_BITS = 16  # q31: temperatures in 2^-16 C
 
 #: Arrays of a table in the order of the image, with the words of one record (0: not in records).
 ARRAYS = {"networks": 8, "centers": 5, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4}
-
-#: Kinds of terms, as in gtc_table.h.
-MEMORY, PLAY, WARM_UP, HARMONIC, AUXILIARY = 1, 2, 3, 4, 5
 
 Numeric = Literal["f32", "q31"]
 Words = NDArray[np.uint32]

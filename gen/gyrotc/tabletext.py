@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from .model import Model
 from .table import LAYOUT, Table
+from .terms.recursion import TableKind
 from .texts import CText, c_code
 
 __all__ = ["TableText", "table_text"]
@@ -24,7 +25,6 @@ _ARRAY_COMMENTS = {
     "sigma": "1 sigma of the compensated bias, a row for each cell of slope",
     "probes": "known answers: T, slope, bias, status",
 }
-_TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 _HEAD_WORDS = 3  # magic, layout and arithmetic, length
 
 
@@ -87,7 +87,7 @@ def table_text(table: Table, model: Model) -> TableText:
             arrays.append(_array(table.numeric, name, body, counts, comments.get(name, [])))
         members.append(_member(name, f"{table.numeric}_{name}" if length else "NULL"))
     members.append(_member("crc", f"0x{next(words):08x}UL"))
-    codes = [f"gtc_{table.numeric}_term_{_TERM_CODES[k]}" for k in kinds]
+    codes = [f"gtc_{table.numeric}_term_{TableKind(k).name.lower()}" for k in kinds]
     filled = ", ".join([f"&{c}" for c in codes] or ["NULL"])
     members.append(_member("term_code", f"{{ {filled} }}"))
     return TableText(

@@ -9,20 +9,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..errors import InputError
+from ..terms import CATALOGUE
 
 __all__ = ["limits_of", "pair_of", "plan_parts"]
 
-_SHORT = {
-    "cavity_lag": "lag",
-    "thermal_gradient": "gradient",
-    "time_misalignment": "shift",
-    "hysteresis": "hyster.",
-    "warm_up": "warm-up",
-    "turn_on_offset": "offsets",
-    "ageing": "ageing",
-    "path_length_periodicity": "period",
-    "map_too_coarse": "map",
-}
 _NEVER = 90.0
 _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next to nothing
 
@@ -101,7 +91,7 @@ def _limits(result: dict[str, Any]) -> Table:
 
 def _over(id: str, limit: dict[str, Any]) -> str:
     points = limit["over"]
-    if id in ("cavity_lag", "time_misalignment"):
+    if CATALOGUE[id].kind == "input":
         return "shortest that shows in this gyro"
     if not points:
         return ""
@@ -111,16 +101,16 @@ def _over(id: str, limit: dict[str, Any]) -> str:
 
 def _separability(result: dict[str, Any]) -> Table:
     rows = result["separability"]
-    others = [i for i in _SHORT if any(i in row["d"] for row in rows)]
+    others = [i for i in CATALOGUE if any(i in row["d"] for row in rows)]
     title = "d at which a cause (row) is told from another (column); detection itself takes d = 6"
-    table = _table(title, "cause", *(_SHORT[o] for o in others))
+    table = _table(title, "cause", *(CATALOGUE[o].words.short for o in others))
     for row in rows:
         at = "" if row["value"] is None else f" {row['value']:.4g}"
         cells = []
         for o in others:
             d = row["d"].get(o)
             cells.append("" if d is None else "." if d < _ALONE else ">30" if d > 30.0 else f"{d:.1f}")
-        table.add_row(_SHORT[row["id"]] + at, *cells)
+        table.add_row(CATALOGUE[row["id"]].words.short + at, *cells)
     table.caption = ".: the other cannot mimic it"
     table.caption_justify = "left"
     return table

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..terms import CATALOGUE
+
 __all__ = ["VERDICTS", "next_steps"]
 
 VERDICTS: dict[str, str] = {
@@ -30,12 +32,6 @@ _STEPS = {
     "not_testable": "Record ramps over the product's range of temperature, up and down, at two rates at least.",
 }
 
-_RECORDING = {
-    "warm_up": "note the time of power-on of every run (power_on_s)",
-    "turn_on_offset": "record three runs or more, each with its own power-on",
-    "ageing": "record on three dates or more and note them (started)",
-}
-
 
 def next_steps(
     verdict: str, causes: Sequence[Mapping[str, Any]], untestable: Sequence[str], *, shipped: bool
@@ -54,9 +50,9 @@ def next_steps(
         steps.append(f"Against it: {'; '.join(remedies)}.")
     elif verdict != "ambiguous":
         steps.append(_STEPS[verdict])
-    if any(c["id"] == "time_misalignment" for c in causes):
-        steps.append("Mend the clocks or filters of the recording; no term on the target stands for them.")
-    missing = [_RECORDING[i] for i in untestable if i in _RECORDING]
+    named = [CATALOGUE[c["id"]].words for c in causes if c["id"] in CATALOGUE]
+    steps += dict.fromkeys(words.advice for words in named if words.advice)
+    missing = [text for i in untestable if (text := CATALOGUE[i].words.recording)]
     if missing and verdict != "not_testable":
         steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
     return steps

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .catalogue import Candidate
+from ..terms import CATALOGUE
+from .catalogue import Candidate, searched
 from .contest import Contest, contest
 from .likelihood import Gains, Point
 from .misfit import misfit
@@ -166,13 +167,11 @@ def choose(search: Search, count: int) -> tuple[Refined, ...]:
 
 
 def _allowed(point: Point) -> bool:
-    """Pairs that make sense: not two of a kind, except gradients or periods far apart, and one static cause."""
+    """Pairs that make sense: one shape of the map; two of a kind only where that may be, and far apart."""
     a, b = point.members
-    if {a.id, b.id} == {"path_length_periodicity", "map_too_coarse"}:
-        return False
     if a.id != b.id:
-        return True
-    if a.id not in ("thermal_gradient", "path_length_periodicity") or a.channel != b.channel:
+        return not all(CATALOGUE[m.id].family == "static_map" for m in point.members)
+    if not searched(a.id).twice or a.channel != b.channel:
         return a.channel != b.channel
     x, y = (next(iter(m.values.values())) for m in (a, b))
     return bool(abs(np.log(x / y)) > 0.7)

@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import terms
+from ..terms import CATALOGUE
+from ..terms.operators import first_order, play
 from .baseline import LEVELS, MapBasis, fine_columns, make_basis
-from .catalogue import Candidate, Role, columns_of, grid, testable
+from .catalogue import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
 from .noise import COLOURS, Whitener
 from .others import shapes_of
 from .records import Records, centred_slope
 
-__all__ = ["Bank", "Group", "Other", "build", "proportional_map", "replaced_map"]
+__all__ = ["Bank", "Group", "Other", "build", "direction_of", "proportional_map", "replaced_map"]
 
 Array = NDArray[np.float64]
 
@@ -164,8 +165,7 @@ def _finer(records: Records, static: Array, level: int) -> Array:
 
 def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]]:
     """Columns of every candidate that adds columns, and of the dictionary of the lack-of-fit test."""
-    span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
-    longest = max(float(np.ptp(r.history.time_s)) for r in records.runs)
+    reach = reach_of(records)
     groups: list[Group] = []
     columns: list[Array] = []
     untestable: dict[str, str] = {}
@@ -177,15 +177,15 @@ def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]
         columns.append(block)
         at += block.shape[1]
 
-    for cause, term in terms.CATALOGUE.items():
-        if term.kind not in ("add", "random", "static") or cause in ("auxiliary", "earth_rate_tilt"):
+    for cause, term in diagnosed().items():
+        if term.kind == "input" or term.needs.channel:
             continue
         reason = testable(records, cause)
         if reason:
             untestable[cause] = reason
             continue
-        for values in grid(cause, span, longest):
-            if cause == "map_too_coarse":
+        for values in searched(cause).grid(reach):
+            if term.kind == "static":
                 add(Candidate(cause, {}, "variance"), fine_columns(records))
             else:
                 role: Role = "variance" if term.kind == "random" else "columns"
@@ -202,25 +202,36 @@ def _dictionary(records: Records) -> Array:
     t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
     out = []
     for tau in _DICTIONARY_LAGS_S:
-        late = columns_of(records, "thermal_gradient", {"tau_s": tau})[:, 0]
+        late = _late(records, tau)[:, 0]
         out += [late * (t - t.mean()), np.abs(late)]
     nodes = np.arange(t.min(), t.max() + _TEXTURE_C, _TEXTURE_C)
     texture = np.maximum(0.0, 1.0 - np.abs(t[:, None] - nodes) / _TEXTURE_C)
-    direction = columns_of(records, "hysteresis", {"width_c": _DIRECTION_C})
-    memory = columns_of(records, "thermal_gradient", {"tau_s": _MODULATING_S})
+    direction = direction_of(records, _DIRECTION_C)
+    memory = _late(records, _MODULATING_S)
     out += list((texture * direction).T) + list((texture * memory).T)
     if len(records.runs) < 3:
-        out += list(columns_of(records, "turn_on_offset", {}).T)
+        out += list(np.eye(len(records.runs)).repeat([k.size for k in records.kept], axis=1))
     return np.column_stack(out)
 
 
+def _late(records: Records, tau_s: float) -> Array:
+    """How much a first-order memory of the temperature differs from it, C, shape (N, 1)."""
+    return records.columns(
+        lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None]
+    )
+
+
+def direction_of(records: Records, width_c: float) -> Array:
+    """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
+    return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])
+
+
 def _inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], Array, NDArray[np.bool_]]:
-    """Map of the changed inputs for every candidate of kind "input" or "record" that has features."""
-    span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
-    longest = max(float(np.ptp(r.history.time_s)) for r in records.runs)
+    """Map of the changed inputs for every candidate of kind "input"."""
+    reach = reach_of(records)
     candidates, maps, knowns = [], [], []
-    for cause in ("cavity_lag", "time_misalignment"):
-        for values in grid(cause, span, longest):
+    for cause in (i for i, term in diagnosed().items() if term.kind == "input"):
+        for values in searched(cause).grid(reach):
             candidates.append(Candidate(cause, dict(values), "input"))
             block, known = replaced_map(records, basis, candidates[-1])
             maps.append(block)
@@ -246,14 +257,14 @@ def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | N
 
 def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
     """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
-    features = terms.CATALOGUE[candidate.id].features
+    features = CATALOGUE[candidate.id].features
     assert features is not None
     out = []
     for k, run in enumerate(records.runs):
         seen = features(run.history, candidate.values)
         temperature, slope = seen.columns[:, 0], seen.columns[:, 1]
         known = np.ones(records.kept[k].size, dtype=bool)
-        if candidate.id == "time_misalignment":
+        if CATALOGUE[candidate.id].unseen_s is not None:
             slope = centred_slope(replace(run.history, temperature_c=temperature))
             known = records.average_run(k, seen.known.astype(float)) > 0.999
         out.append((temperature, slope, known))

@@ -12,6 +12,7 @@ import contextlib
 import functools
 import hashlib
 import importlib
+import inspect
 import io
 import os
 import pickle
@@ -25,7 +26,7 @@ from ..inputs import read_input
 from ..outputs import write_atomically
 from .bank import Bank, Group, Other, build
 from .baseline import MapBasis
-from .catalogue import Candidate
+from .catalogue import Candidate, diagnosed
 from .records import Records
 
 __all__ = ["bank_of", "folder"]
@@ -122,19 +123,19 @@ class _Reader(pickle.Unpickler):
         raise pickle.UnpicklingError(f"{module}.{name} has no place in a bank")
 
 
-@functools.cache
 def _code() -> str:
-    """Hash of the modules that make a bank: a new version of one makes new banks."""
+    """Hash of the modules that make a bank, those of the causes among them: a new version makes new banks."""
     here = Path(__file__).parent
-    names = sorted([*here.glob("*.py"), *(here.parent / "terms").glob("*.py")])
-    digest = hashlib.sha256()
-    for name in names:
-        if (
-            name.stem in ("bank", "baseline", "catalogue", "noise", "others", "records")
-            or name.parent.name == "terms"
-        ):
-            digest.update(name.read_bytes())
-    return digest.hexdigest()
+    makers = ("bank", "baseline", "catalogue", "noise", "others", "records")
+    shared = ("memory", "operators", "search")
+    names = [here / f"{n}.py" for n in makers] + [here.parent / "terms" / f"{n}.py" for n in shared]
+    names += [Path(inspect.getfile(t.features)) for t in diagnosed().values() if t.features is not None]
+    return hashlib.sha256(b"".join(_content(name) for name in names)).hexdigest()
+
+
+@functools.cache
+def _content(path: Path) -> bytes:
+    return path.read_bytes()
 
 
 def _trim() -> None:

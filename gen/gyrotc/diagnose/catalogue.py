@@ -8,31 +8,25 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import terms
+from ..terms import CATALOGUE, Term
 from ..terms.base import History, Parameter, Values
+from ..terms.search import Reach, Search
 from .records import Records
 
-__all__ = ["PENALTY", "Candidate", "Role", "columns_of", "grid", "shape_parameter", "testable"]
+__all__ = [
+    "Candidate",
+    "Role",
+    "columns_of",
+    "diagnosed",
+    "planned",
+    "reach_of",
+    "searched",
+    "shape_parameter",
+    "testable",
+]
 
 Array = NDArray[np.float64]
 Role = Literal["columns", "input", "variance", "structure"]
-
-PENALTY: dict[str, int] = {
-    "cavity_lag": 2,
-    "time_misalignment": 2,
-    "thermal_gradient": 2,
-    "hysteresis": 2,
-    "warm_up": 2,
-    "turn_on_offset": 1,
-    "ageing": 1,
-    "map_too_coarse": 1,
-    "path_length_periodicity": 3,
-    "auxiliary": 1,
-}
-"""Free parameters that a cause adds to the model: its share of the information criterion."""
-
-_POINTS = {"cavity_lag": 22, "thermal_gradient": 24, "hysteresis": 20, "warm_up": 12}
-_SHIFT_S, _SHIFTS = 50.0, 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,46 +47,38 @@ class Candidate:
     channel: str | None = None
 
 
+def diagnosed() -> dict[str, Term]:
+    """The causes of the catalogue that diagnosis looks for, in the order in which results list them."""
+    return {id: term for id, term in CATALOGUE.items() if term.search is not None}
+
+
+def planned() -> list[str]:
+    """Those of which a profile without rates says something."""
+    return [id for id in diagnosed() if searched(id).planned]
+
+
+def searched(cause: str) -> Search:
+    """How diagnosis looks for a cause."""
+    search = CATALOGUE[cause].search
+    assert search is not None
+    return search
+
+
 def shape_parameter(cause: str) -> Parameter | None:
     """The parameter over which a cause is searched, if it has one."""
-    if cause in ("ageing", "map_too_coarse"):
-        return None
-    shape = terms.CATALOGUE[cause].nonlinear()
-    return shape[0] if shape else None
+    over = searched(cause).over
+    return next((p for p in CATALOGUE[cause].parameters if p.name == over), None)
 
 
-def grid(cause: str, span_c: float, longest_s: float) -> list[Values]:
-    """Grid of the nonlinear parameter: fine enough that less than 1 % of a signature's energy falls between points.
-
-    Args:
-        cause: Id.
-        span_c: Range of the recorded temperatures, C.
-        longest_s: Length of the longest run, s.
-    """
-    parameter = shape_parameter(cause)
-    if cause == "ageing":
-        return [{"d0_day": float("inf")}, {"d0_day": 2.0}]
-    if cause == "map_too_coarse" or parameter is None:
-        return [{}]
-    low, high = parameter.low, parameter.high
-    if cause == "time_misalignment":
-        steps = _SHIFT_S * np.arange(1, _SHIFTS + 1)
-        return [{parameter.name: float(s)} for s in np.concatenate([-steps[::-1], steps])]
-    if cause == "path_length_periodicity":
-        high = min(high, 0.7 * span_c)
-        if high <= low:
-            return []
-        waves = np.arange(1.0 / high, 1.0 / low, 1.0 / (3.0 * span_c))
-        return [{parameter.name: float(1.0 / w)} for w in waves]
-    high = min(high, 0.45 * span_c) if cause == "hysteresis" else min(high, 0.5 * longest_s)
-    if high <= low:
-        return []
-    return [{parameter.name: float(v)} for v in np.geomspace(low, high, _POINTS[cause])]
+def reach_of(records: Records) -> Reach:
+    """What these recordings can show of a cause."""
+    span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
+    return Reach(span, max(float(np.ptp(r.history.time_s)) for r in records.runs))
 
 
 def columns_of(records: Records, cause: str, values: Values) -> Array:
     """Block means of the columns that a cause adds, shape (N, k)."""
-    features = terms.CATALOGUE[cause].features
+    features = CATALOGUE[cause].features
     assert features is not None
 
     def rows(history: History) -> Array:
@@ -103,7 +89,7 @@ def columns_of(records: Records, cause: str, values: Values) -> Array:
 
 def testable(records: Records, cause: str) -> str:
     """Why a cause cannot be tested on these recordings; empty if it can."""
-    needs = terms.CATALOGUE[cause].needs
+    needs = CATALOGUE[cause].needs
     histories = [run.history for run in records.runs]
     if len(histories) < needs.runs:
         return f"needs {needs.runs} runs, there are {len(histories)}"

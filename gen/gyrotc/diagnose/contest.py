@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..terms import CATALOGUE
 from .bank import Other, proportional_map
-from .catalogue import PENALTY
+from .catalogue import searched
 from .detect import ratio_of
 from .likelihood import Gains
 from .refine import Refined
@@ -42,7 +43,7 @@ def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[s
     ring = _Ring(gains, causes)
     every = range(len(causes))
     own = max(ring.criterion(every), *(ring.instead(k, ids) for k, ids in enumerate(rivals)))
-    local = any(c.candidate.id == "map_too_coarse" for c in causes)
+    local = any(CATALOGUE[c.candidate.id].kind == "static" for c in causes)
     shapes = gains.search.bank.other_groups
     found = []
     for count in every:
@@ -76,7 +77,9 @@ class _Ring:
         """Of a set of causes; one with a common variance of many weights is weighed as such."""
         random = [k for k in kept if self.causes[k].candidate.role == "variance"][-1:]
         held = self.held([k for k in kept if k not in random])
-        total = _energy(held, self.y) - self.price * sum(PENALTY[self.causes[k].candidate.id] for k in kept)
+        total = _energy(held, self.y) - self.price * sum(
+            searched(self.causes[k].candidate.id).price for k in kept
+        )
         return total + sum(_common(held, self.white[k], self.y) for k in random)
 
     def instead(self, k: int, ids: Sequence[str]) -> float:
@@ -91,7 +94,7 @@ class _Ring:
         power = np.einsum("ij,ij->j", rest, rest)
         own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
         energy = np.where(own, (rest.T @ self.y) ** 2 / np.where(own, power, 1.0), 0.0)
-        return self.criterion(kept) + float(energy.max()) - self.price * max(PENALTY[i] for i in ids)
+        return self.criterion(kept) + float(energy.max()) - self.price * max(searched(i).price for i in ids)
 
     def strongest(self, kept: Sequence[int], shapes: Sequence[Other]) -> Contest:
         """The other shape that adds most to a model."""

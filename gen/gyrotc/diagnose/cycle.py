@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from .. import terms
+from ..terms.search import Reach, SingleCycle
 from .attribute import Attribution, Rival
-from .catalogue import Candidate, columns_of, shape_parameter
+from .catalogue import Candidate, columns_of, diagnosed, searched, shape_parameter
 from .records import Records
 from .refine import Interval, Refined
 
@@ -29,7 +30,6 @@ Array = NDArray[np.float64]
 
 _FEW_PASSES = 3  # of any temperature, in all runs together
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
-_POINTS = {"thermal_gradient": 48, "hysteresis": 24}
 _HALF_95 = 3.84
 _EQUIVALENT = 8.0
 _PRICE = 2  # parameters of a state: time constant (or width) and amplitude
@@ -119,8 +119,8 @@ class _Fits:
         self.static = np.linalg.qr(static / np.linalg.norm(static, axis=0))[0]
         self.y = records.target()
         self.rest = self._less_map(self.y)
-        self.span_c = float(np.ptp(t))
-        self.longest_s = max(float(np.ptp(r.history.time_s[r.usable])) for r in records.runs)
+        longest_s = max(float(np.ptp(r.history.time_s[r.usable])) for r in records.runs)
+        self.reach = Reach(float(np.ptp(t)), longest_s)
 
     def _less_map(self, x: Array) -> Array:
         return np.asarray(x - self.static @ (self.static.T @ x))
@@ -129,11 +129,11 @@ class _Fits:
     def grid(self) -> dict[str, list[Candidate]]:
         """States by kind, by ascending parameter."""
         found = {}
-        for id, count in _POINTS.items():
+        for id, cycle in _memories().items():
             parameter = shape_parameter(id)
             assert parameter is not None
-            most = 0.45 * self.span_c if id == "hysteresis" else 0.5 * self.longest_s
-            values = np.geomspace(parameter.low, min(parameter.high, most), count)
+            top = min(parameter.high, self.reach.most(parameter.unit))
+            values = np.geomspace(parameter.low, top, cycle.points)
             found[id] = [Candidate(id, {parameter.name: float(v)}, "columns") for v in values]
         return found
 
@@ -184,7 +184,8 @@ def is_single_cycle(records: Records) -> bool:
 def cycle_of(records: Records) -> Cycle:
     """Looks for one or two states in a single cycle."""
     fits = _Fits(records)
-    kinds = [(k,) for k in _POINTS] + list(itertools.combinations_with_replacement(_POINTS, 2))
+    memories = _memories()
+    kinds = [(k,) for k in memories] + list(itertools.combinations_with_replacement(memories, 2))
     best = {k: _members(fits, k) for k in kinds}
     least = min((fits.left(m) for m in best.values()), key=lambda e: float(e @ e))
     effective = _effective_size(records, least)
@@ -193,16 +194,26 @@ def cycle_of(records: Records) -> Cycle:
     if tried[0].criterion >= 0.0:
         return Cycle(tried, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
     near = [t for t in tried if t.criterion - tried[0].criterion <= _EQUIVALENT]
-    chosen = next((t for t in near if "hysteresis" not in t.kinds), tried[0])
-    others = [
-        t for t in near if t is not chosen and "hysteresis" in t.kinds and "hysteresis" not in chosen.kinds
-    ]
-    rivals = (Rival("hysteresis", others[0].criterion - chosen.criterion),) if others else ()
+    chosen = next((t for t in near if not _rare(t)), tried[0])
+    others = [t for t in near if t is not chosen and _rare(t) and not _rare(chosen)]
+    rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
     p_value = max(float(chi2.sf(ratio, _PRICE * len(chosen.members))), 1e-300)
     causes = tuple(_refined(fits, chosen, effective))
     explained = fits.rest - fits.left(chosen.members)
     return Cycle(tried, chosen, causes, rivals, rms, p_value, fits.rest, explained)
+
+
+def _memories() -> dict[str, SingleCycle]:
+    """Causes that are looked for in a single cycle."""
+    found = {id: searched(id).cycle for id in diagnosed()}
+    return {id: cycle for id, cycle in found.items() if cycle is not None}
+
+
+def _rare(tried: Tried) -> list[str]:
+    """Kinds of a set that not every package has."""
+    memories = _memories()
+    return [kind for kind in tried.kinds if not memories[kind].usual]
 
 
 def _members(fits: _Fits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:

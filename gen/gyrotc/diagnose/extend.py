@@ -36,15 +36,6 @@ Chain = list[list[Averages]]
 _FOLDS = 3
 _FEW_RUNS = 3
 _MOVING_C_PER_MIN = 0.3
-_SHIPPED = (
-    "cavity_lag",
-    "thermal_gradient",
-    "hysteresis",
-    "warm_up",
-    "path_length_periodicity",
-    "auxiliary",
-    "map_too_coarse",
-)
 _MOST_TERMS = 4
 
 
@@ -98,7 +89,7 @@ class _Bench:
         self.train = play_runs(dataset, self.runs, self.front)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
         self.average_s = options.average_s
-        self._fits: list[tuple[list[Effect], Fit]] = []
+        self._fits: list[tuple[list[Effect], bool, Fit]] = []
         self.arguments: dict[str, Any] = {
             "method": options.method,
             "seed": options.seed,
@@ -107,16 +98,18 @@ class _Bench:
             "average_s": options.average_s,
         }
 
-    def fit(self, effects: Sequence[Effect], kept: list[Mask] | None = None) -> Fit:
-        """The map beside the effects; fits on all training samples are remembered."""
+    def fit(
+        self, effects: Sequence[Effect], kept: list[Mask] | None = None, *, beside: bool | None = None
+    ) -> Fit:
+        """The map beside the effects (`beside`: as if there were any); fits on all samples are remembered."""
         whole = kept is None or all(m.all() for m in kept)
-        for known, fitted in self._fits:
-            if whole and known == list(effects):
+        rate = not (self.single_cycle and (bool(effects) if beside is None else beside))
+        for known, with_rate, fitted in self._fits:
+            if whole and known == list(effects) and with_rate == rate:
                 return fitted
-        rate = not (self.single_cycle and effects)
         fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept, rate=rate)
         if whole:
-            self._fits.append((list(effects), fitted))
+            self._fits.append((list(effects), rate, fitted))
         return fitted
 
     def everything(self) -> list[Mask]:
@@ -135,13 +128,21 @@ class _Bench:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
         kept = [~m for m in held]
         effects = [Effect.of(c) for c in self._chosen(held, count)]
-        effects += [Effect("none", {})] * (count - len(effects))
-        return [self._residuals(kept, self.train, held, effects[:k]) for k in range(count + 1)]
+        stages = (effects[:k] for k in range(count + 1))
+        return [
+            self._residuals(kept, self.train, held, stage, beside=k > 0) for k, stage in enumerate(stages)
+        ]
 
     def _residuals(
-        self, kept: list[Mask], runs: list[Played], scored: list[Mask], effects: Sequence[Effect]
+        self,
+        kept: list[Mask],
+        runs: list[Played],
+        scored: list[Mask],
+        effects: Sequence[Effect],
+        *,
+        beside: bool | None = None,
     ) -> list[Averages]:
-        fitted = self.fit(effects, kept)
+        fitted = self.fit(effects, kept, beside=beside)
         return score(fitted, runs, effects, self.average_s, scored)
 
     def _chosen(self, held: list[Mask], count: int) -> tuple[Refined, ...]:
@@ -205,7 +206,7 @@ def _shipped(
     bench: _Bench, effects: list[Effect], steps: list[Gain], chain: Chain, floor: float
 ) -> tuple[list[Effect], Gain | None]:
     """Effects that a table can hold and that gain with confidence on unseen runs."""
-    able = [e for e, g in zip(effects, steps, strict=True) if e.id in _SHIPPED and g.positive][:_MOST_TERMS]
+    able = [e for e, g in zip(effects, steps, strict=True) if e.term.shipped and g.positive][:_MOST_TERMS]
     if not able:
         return [], None
     if able == effects:
@@ -222,14 +223,13 @@ def _crossed(bench: _Bench, count: int) -> Chain:
     """Every training run (or branch of few runs) left out in turn, in a few groups."""
     folds = _folds(bench)
     if not folds:
-        return [score_self(bench, k) for k in range(count + 1)]
+        return [_score_self(bench)] * (count + 1)
     chains = [bench.left_out(held, count) for held in folds]
     return [[a for chain in chains for a in chain[k]] for k in range(count + 1)]
 
 
-def score_self(bench: _Bench, count: int) -> list[Averages]:
+def _score_self(bench: _Bench) -> list[Averages]:
     """Where nothing can be left out (one very short run): the training samples themselves, without gain."""
-    del count
     return score(bench.fit([]), bench.train, [], bench.average_s, bench.everything())
 
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .catalogue import PENALTY, Candidate
+from .catalogue import Candidate, searched
 from .detect import variance_ratio_of
 from .noise import Whitener
 from .records import singled_out
@@ -36,7 +36,7 @@ class Point:
 
     def criterion(self, size: int) -> float:
         """Gain less the price of the parameters: half the difference of BIC, times two."""
-        return self.gain - sum(PENALTY[m.id] for m in self.members) * float(np.log(size))
+        return self.gain - sum(searched(m.id).price for m in self.members) * float(np.log(size))
 
 
 Model = tuple[Candidate, ...]

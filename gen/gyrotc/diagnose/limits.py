@@ -1,7 +1,7 @@
 """What could still hide: the smallest amplitude of every cause that the search would find, and what mimics what.
 
 d is the matched-filter signal-to-noise ratio of a cause after the static map is taken out; the search finds
-d = 6.3 in 95 % of cases at a familywise level of 1 %, run offsets d = 10.
+`Search.needed_d` (6.3 for most causes) in 95 % of cases at a familywise level of 1 %.
 """
 
 from __future__ import annotations
@@ -11,29 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .catalogue import Candidate, shape_parameter
+from ..terms import CATALOGUE
+from .catalogue import Candidate, searched, shape_parameter
 from .likelihood import Gains
 from .refine import Refined
 from .search import Search
 
-__all__ = ["Limit", "detection_limits", "limit_of", "overlap"]
+__all__ = ["Limit", "amplitude_energy", "detection_limits", "limit_of", "overlap"]
 
 Array = NDArray[np.float64]
-
-_D = {"turn_on_offset": 10.0, "path_length_periodicity": 6.6, "map_too_coarse": 9.0}
-_D_OTHERS = 6.3
-_UNITS = {
-    "cavity_lag": "s",
-    "time_misalignment": "s",
-    "thermal_gradient": "deg/h/C",
-    "hysteresis": "deg/h/C",
-    "warm_up": "deg/h",
-    "turn_on_offset": "deg/h",
-    "ageing": "deg/h/day",
-    "map_too_coarse": "deg/h",
-    "path_length_periodicity": "deg/h",
-    "auxiliary": "deg/h/unit",
-}
 
 
 @dataclass(frozen=True)
@@ -64,8 +50,8 @@ def detection_limits(search: Search) -> dict[str, Limit]:
             continue
         at = np.arange(group.columns.start, group.columns.stop)
         power = size[at + search.n_map] * search.bank.scale[at] ** 2
-        amount = float(power.sum() if group.candidate.id == "turn_on_offset" else power.mean())
-        if group.candidate.id == "map_too_coarse":
+        amount = amplitude_energy(group.candidate.id, power)
+        if CATALOGUE[group.candidate.id].kind == "static":  # any shape: a unit of it in every block
             amount = search.y.size / view.scale**2
         found.setdefault(group.candidate.id, []).append((group.candidate, amount))
     for k, candidate in enumerate(search.extra_candidates):
@@ -77,12 +63,16 @@ def detection_limits(search: Search) -> dict[str, Limit]:
     return {key: limit_of(key.split(":")[0], points) for key, points in found.items()}
 
 
+def amplitude_energy(cause: str, power: Array) -> float:
+    """d² of a cause at unit amplitude from that of its columns, shape (k,): of all draws, or of any one column."""
+    return float(power.sum() if CATALOGUE[cause].kind == "random" else power.mean())
+
+
 def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
     """Limit from the energies of unit amplitudes over the grid of a cause."""
-    d = _D.get(cause, _D_OTHERS)
+    d, unit = searched(cause).needed_d, CATALOGUE[cause].unit
     parameter = shape_parameter(cause)
-    unit = _UNITS[cause]
-    if cause in ("cavity_lag", "time_misalignment"):
+    if CATALOGUE[cause].kind == "input":
         assert parameter is not None
         seen = [abs(c.values[parameter.name]) for c, power in points if np.sqrt(power) >= d]
         at = tuple((c.values[parameter.name], float(np.sqrt(power))) for c, power in points)

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
-from .catalogue import columns_of
+from ..terms import CATALOGUE
+from .bank import direction_of
 from .detect import Projection, ratio_of
 from .noise import Whitener
 from .refine import Refined
@@ -72,11 +73,12 @@ def _changed(current: Search, causes: Sequence[Refined]) -> Array:
     """Every cause with an amplitude that differs by run, temperature and direction, shape (N, k)."""
     records = current.records
     t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
-    direction = columns_of(records, "hysteresis", {"width_c": _DIRECTION_C})[:, 0] / _DIRECTION_C
+    direction = direction_of(records, _DIRECTION_C)[:, 0] / _DIRECTION_C
     t = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     columns = []
     for cause in causes:
-        if cause.candidate.id in ("turn_on_offset", "ageing", "map_too_coarse"):
+        term = CATALOGUE[cause.candidate.id]
+        if term.family == "between_runs" or term.kind == "static":  # nothing of them changes within a run
             continue
         shape = cause.contribution
         columns += [shape * t, shape * direction]

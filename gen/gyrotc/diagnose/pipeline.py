@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..terms import CATALOGUE
 from .attribute import Attribution, attribute
 from .bank import Bank
 from .cache import bank_of
-from .catalogue import Candidate, columns_of
+from .catalogue import Candidate, columns_of, diagnosed, searched
 from .compare import Ensemble, compare
 from .levels import NoiseFinding, noise_findings
 from .likelihood import Gains
@@ -106,8 +107,7 @@ def _extended(
 
 
 def _others(cause: str) -> list[str]:
-    near = ["cavity_lag", "thermal_gradient", "time_misalignment", "hysteresis", "warm_up", "turn_on_offset"]
-    return [n for n in near if n != cause]
+    return [id for id in diagnosed() if searched(id).imitates and id != cause]
 
 
 def search_of(
@@ -141,8 +141,9 @@ def _channels(records: Records) -> tuple[Array, list[Candidate]] | None:
     for name in names:
         column = records.average([r.channels[name] for r in records.runs])
         if np.ptp(column) > 1e-9 * (1.0 + np.abs(column).max()):
-            columns.append(column - column.mean())
-            candidates.append(Candidate("auxiliary", {}, "columns", name))
+            for cause in (id for id, term in diagnosed().items() if term.needs.channel):
+                columns.append(column - column.mean())
+                candidates.append(Candidate(cause, {}, "columns", name))
     return (np.column_stack(columns), candidates) if columns else None
 
 
@@ -153,14 +154,16 @@ def needs_finer(search: Search) -> bool:
     gains = Gains(search)
     bank: Bank = search.bank
     finer = gains.whiten(bank.finer)
-    best = max(
-        (p for p in gains.added() if p.members[0].id == "path_length_periodicity"), key=lambda p: p.gain
-    )
-    wave = columns_of(search.records, best.members[0].id, best.members[0].values)
+    added = [p for p in gains.added() if p.members[0].role == "columns"]
+    of_map = [p for p in added if _of_map(p.members[0])]
+    waves = []
+    if of_map:
+        best = max(of_map, key=lambda p: p.gain).members[0]
+        waves.append(gains.whiten(columns_of(search.records, best.id, best.values)))
     memory = np.column_stack(
-        [gains.plain_columns(s) for c, s in gains.plain if c.id != "path_length_periodicity"]
-        + [gains.plain_columns(s) for c, s in gains.random if c.id == "turn_on_offset"]
-        + [gains.whiten(wave)]
+        [gains.plain_columns(s) for c, s in gains.plain if not _of_map(c)]
+        + [gains.plain_columns(s) for c, s in gains.random if not _of_map(c)]
+        + waves
     )
     left, size, _ = np.linalg.svd(memory, full_matrices=False)
     held = np.linalg.qr(np.column_stack([gains.map_q, left[:, size > 0.05 * size[0]]]))[0]
@@ -172,6 +175,11 @@ def needs_finer(search: Search) -> bool:
     y = gains.whiten(search.y) / gains.scale
     energy = float(((q[:, own].T @ (y - held @ (held.T @ y))) ** 2).sum())
     return float(chi2.sf(energy, int(own.sum()))) < _FINER_P
+
+
+def _of_map(candidate: Candidate) -> bool:
+    """Whether a cause is a shape of the static map, and no memory."""
+    return CATALOGUE[candidate.id].family == "static_map"
 
 
 def _after(search: Search, attribution: Attribution) -> Search:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import terms
 from .bank import replaced_map
 from .baseline import fine_columns
-from .catalogue import Candidate, columns_of, shape_parameter
+from .catalogue import Candidate, columns_of, reach_of, searched, shape_parameter
 from .likelihood import Gains
 from .records import singled_out
 from .search import Search
@@ -68,7 +68,7 @@ def _columns(search: Search, candidate: Candidate) -> Array:
     records = search.records
     if candidate.role == "input":
         return replaced_map(records, search.bank.basis, candidate)[0]
-    if candidate.id == "map_too_coarse":
+    if terms.CATALOGUE[candidate.id].kind == "static":
         return fine_columns(records, _FINEST_C)
     if candidate.channel is not None:
         return records.average([r.channels[candidate.channel] for r in records.runs])[:, None]
@@ -86,9 +86,9 @@ class _Fit:
 
     def __init__(self, search: Search, gains: Gains, members: tuple[Candidate, ...]) -> None:
         self.search, self.gains = search, gains
-        shift = max((abs(m.values["shift_s"]) for m in members if m.id == "time_misalignment"), default=0.0)
-        known = np.concatenate([_inside(search, k, shift + 150.0) for k in range(len(search.records.runs))])
-        edges = singled_out(~known) if shift else np.zeros((search.y.size, 0))
+        unseen = max(map(_unseen_s, members))
+        known = np.concatenate([_inside(search, k, unseen) for k in range(len(search.records.runs))])
+        edges = singled_out(~known) if unseen else np.zeros((search.y.size, 0))
         self.edges = edges
         held = [gains.whiten(edges)] + (
             [] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)]
@@ -111,6 +111,12 @@ class _Fit:
         q, r = np.linalg.qr(np.column_stack([self.white(m) for m in members]))
         size = np.abs(np.diag(r))
         return float(((q[:, size > 1e-9 * size.max()].T @ self.y) ** 2).sum())
+
+
+def _unseen_s(candidate: Candidate) -> float:
+    """How much of either end of a run a candidate puts out of sight, s."""
+    rule = terms.CATALOGUE[candidate.id].unseen_s
+    return 0.0 if rule is None else rule(candidate.values)
 
 
 def _inside(search: Search, k: int, margin_s: float) -> NDArray[np.bool_]:
@@ -148,7 +154,7 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]
 
     here = members[k].values[parameter.name]
     width = _local_width(fit, members[k], here)
-    low = 0.05 * here if parameter.name != "shift_s" else -np.inf
+    low = -np.inf if parameter.signed else 0.05 * here
     for shrink in (1.0, 0.35):
         here, curve = _parabola(energy, here, shrink * width, low)
     half = float(np.sqrt(_HALF_95 / curve)) if curve > 0 else width
@@ -176,12 +182,7 @@ def _parabola(energy: Callable[[float], float], here: float, width: float, low: 
 
 def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
     """About one point of the search's grid."""
-    if member.id == "time_misalignment":
-        return 45.0
-    if member.id == "path_length_periodicity":
-        t = np.concatenate([r.history.temperature_c for r in fit.search.records.runs])
-        return here**2 / (4.0 * float(np.ptp(t)))
-    return 0.2 * abs(here)
+    return searched(member.id).width(here, reach_of(fit.search.records).span_c)
 
 
 def _interval(profile: Array) -> tuple[float, float]:
@@ -226,7 +227,7 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
     tangents = [_tangent(search, m, None) if m is not members[k] else tangent for m in members]
     spread = _spread(fit, design, [t for t in tangents if t is not None], start, own.shape[1])
     parameters |= _amplitudes(members[k], mine, spread, fit, own)
-    edges = fit.edges if members[k].id == "time_misalignment" else None
+    edges = fit.edges if _unseen_s(members[k]) else None
     return Refined(members[k], own, tangent, parameters, np.asarray(contribution), edges, profile)
 
 
@@ -236,7 +237,7 @@ def _tangent(search: Search, candidate: Candidate, weights: Array | None) -> Arr
     if parameter is None or candidate.channel is not None:
         return None
     here = candidate.values[parameter.name]
-    step = 5.0 if candidate.id == "time_misalignment" else _STEP * here
+    step = searched(candidate.id).step or _STEP * here
     upper = _columns(search, _moved(candidate, here + step))
     lower = _columns(search, _moved(candidate, here - step))
     slope = (upper - lower) / (2.0 * step)
@@ -260,12 +261,12 @@ def _amplitudes(
     candidate: Candidate, weights: Array, spread: Array, fit: _Fit, columns: Array
 ) -> dict[str, Interval]:
     """Linear parameters by the term's own rule, with intervals."""
-    if candidate.role == "input" or candidate.id == "map_too_coarse":
+    term = terms.CATALOGUE[candidate.id]
+    rule = term.amplitudes
+    if candidate.role == "input" or term.kind == "static" or rule is None:
         return {}
-    if candidate.id == "turn_on_offset":
-        return {"std_dph": _random(weights, spread)}
-    rule = terms.CATALOGUE[candidate.id].amplitudes
-    assert rule is not None
+    if term.kind == "random":
+        return {name: _random(weights, spread) for name in rule(weights)}
     centre = rule(weights)
     out = {}
     for name, value in centre.items():

@@ -1,20 +1,21 @@
-"""Runs as the target would see them, with the states of extension terms in force; fits and scores on them."""
+"""Runs as the target would see them, with the terms' corrections in force; fits and scores on them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from ..dataset import Dataset, Run
 from ..fitting import FrontEnd, samples_of
+from ..frontend import blocks_since_power_on
 from ..metrics import Averages, average
-from ..terms.operators import play
+from ..terms import CATALOGUE, Scene, Term
+from ..terms.recursion import Course, Outcome
 from ..train import Fit, TrainingData, fit, predict
 from .refine import Refined
 
@@ -22,7 +23,6 @@ __all__ = ["Effect", "Played", "fit_extended", "joined", "play_runs", "samples",
 
 Array = NDArray[np.float64]
 
-_MANY_CENTERS = 24
 _RE_ZERO_S = 600.0
 _FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 
@@ -41,30 +41,56 @@ class Effect:
         values = {name: interval.value for name, interval in cause.parameters.items()}
         return Effect(cause.candidate.id, cause.candidate.values | values, cause.candidate.channel)
 
+    @property
+    def term(self) -> Term:
+        """What the catalogue knows of the cause."""
+        return CATALOGUE[self.id]
+
 
 @dataclass(frozen=True)
 class Played:
-    """One run after the front end, one entry per block.
+    """One run after the front end.
 
     Attributes:
         data: Training samples (used blocks only); inputs are those in force.
-        used: Which blocks these are, shape (n,).
-        mean_c: Mean temperature of every block, bridged, shape (n,).
-        on_s: Time since power-on at the start of every block, s, or None.
+        in_force: For each of them, the correction in force that the map made, shape (n,).
+        course: Every correction of the run as terms see it.
+        slope: C per block, of every correction.
+        on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
         day: Days since the first run, or None.
-        channels: Channel means of every block.
+        channels: Samples of the channels, one for every row.
         block_s: Length of a block, s.
         environment: As in the data set.
     """
 
     data: TrainingData
-    used: NDArray[np.bool_]
-    mean_c: Array
-    on_s: Array | None
+    in_force: NDArray[np.int64]
+    course: Course
+    slope: Array
+    on_s: Array
     day: float | None
-    channels: dict[str, Array]
+    channels: Mapping[str, Array]
     block_s: float
     environment: str
+    _outcomes: list[tuple[Effect, Outcome]] = field(default_factory=list)
+
+    def outcome(self, effect: Effect) -> Outcome:
+        """What a term makes of every correction; the last few are remembered."""
+        for known, outcome in self._outcomes:
+            if known == effect:
+                return outcome
+        table = effect.term.table
+        assert table is not None
+        x = self.course.temperature
+        made = Outcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
+        channel = None if effect.channel is None else self.channels[effect.channel]
+        table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
+        self._outcomes[:0] = [(effect, made)]
+        del self._outcomes[_REMEMBERED:]
+        return made
+
+
+_REMEMBERED = 8  # outcomes of terms for each run: those of two sets of causes at a time
 
 
 def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
@@ -74,98 +100,51 @@ def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Pl
 
 
 def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
-    blocks = front.blocks(run)
-    used = blocks.valid & (blocks.rows > 0) & np.isfinite(blocks.temperature_c)
-    rows = run.rows()
-    n = blocks.start_s.size
-    mean = np.where(blocks.valid, blocks.mean_c.astype(np.float64), np.nan)
-    index = np.clip(np.searchsorted(blocks.start_s, rows.time_s + 1e-6, side="right") - 1, 0, n - 1)
-    count = np.maximum(np.bincount(index, minlength=n), 1)
-    channels = {
-        name: np.bincount(index, weights=np.nan_to_num(rows.channels[name]), minlength=n) / count
-        for name in dataset.channels
-    }
+    blocks, rows = front.blocks(run), run.rows()
+    data = samples_of(blocks, front.block_s, number)
+    before = blocks_since_power_on(rows, run, front.block_s)
+    course = blocks.stream.course(blocks.steps, blocks.samples_per_block, before)
     day = None
     if run.started is not None and first is not None:
         day = (run.started - first).total_seconds() / 86400.0
-    on = None if run.power_on_s is None else blocks.start_s - run.power_on_s
     return Played(
-        data=samples_of(blocks, front.block_s, number),
-        used=used,
-        mean_c=_bridged(mean),
-        on_s=on,
+        data=data,
+        in_force=blocks.in_force[blocks.used],
+        course=replace(course, temperature=course.temperature.astype(np.float64)),
+        slope=blocks.steps.slope.astype(np.float64),
+        on_s=data.time_s - (run.power_on_s or 0.0),
         day=day,
-        channels=channels,
+        channels={name: rows.channels[name] for name in dataset.channels},
         block_s=front.block_s,
         environment=run.environment,
     )
 
 
-def _bridged(values: Array) -> Array:
-    good = np.flatnonzero(np.isfinite(values))
-    if good.size == 0:
-        return np.zeros_like(values)
-    return np.interp(np.arange(values.size), good, values[good])
-
-
-def _in_force(state: Array) -> Array:
-    """State after block n−1 for every block n; the first block has the first state."""
-    return np.concatenate([state[:1], state[:-1]])
-
-
-def _memory(tau_s: float, mean_c: Array, block_s: float) -> Array:
-    """z after every block: z ← z + a (T − z), at rest on the first block."""
-    a = -np.expm1(-block_s / tau_s)
-    return np.asarray(lfilter([a], [1.0, a - 1.0], mean_c, zi=[(1.0 - a) * mean_c[0]])[0])
-
-
-def _added(run: Played, effect: Effect) -> Array:
-    """What a term adds in every block, deg/h."""
-    v, n = effect.values, run.mean_c.size
-    if effect.id == "thermal_gradient":
-        z = _memory(v["tau_s"], run.mean_c, run.block_s)
-        return _in_force(v["amplitude_dph_per_c"] * (z - run.mean_c))
-    if effect.id == "hysteresis":
-        z = play(v["width_c"], run.mean_c)
-        return _in_force(v["amplitude_dph_per_c"] * (z - run.mean_c))
-    if effect.id == "warm_up" and run.on_s is not None:
-        return np.asarray(v["amplitude_dph"] * np.exp(-np.maximum(run.on_s, 0.0) / v["tau_s"]))
-    if effect.id == "path_length_periodicity":
-        angle = 2.0 * np.pi * run.mean_c / v["period_c"] + v["phase_rad"]
-        return _in_force(v["amplitude_dph"] * np.cos(angle))
-    if effect.id == "auxiliary" and effect.channel is not None:
-        return _in_force(v["slope_dph_per_unit"] * (run.channels[effect.channel] - v["reference"]))
-    if effect.id == "ageing" and run.day is not None:
-        d0 = v["d0_day"]
-        passed = run.day if np.isinf(d0) else d0 * np.log1p(run.day / d0)
-        return np.full(n, v["slope_dph_per_day"] * passed)
-    return np.zeros(n)
-
-
-def _seen(run: Played, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    """Temperature and rate (C/min) that the map sees in the used blocks."""
-    temperature, slope = run.data.temperature_c, run.data.slope_c_per_min
-    for effect in effects:
-        if effect.id == "cavity_lag":
-            tau = effect.values["tau_s"]
-            z = _memory(tau, run.mean_c, run.block_s)
-            rate = _in_force((run.mean_c - z) * (60.0 / tau))
-            temperature, slope = _in_force(z)[run.used], rate[run.used]
-        elif effect.id == "time_misalignment":
-            time = run.data.time_s
-            later = time + effect.values["shift_s"]
-            temperature = np.interp(later, time, temperature)
-            slope = np.interp(later, time, slope)
-    return temperature, slope
-
-
 def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
     """Training samples with the inputs that the effects give and their additions taken off."""
-    temperature, slope = _seen(run, effects)
-    total = sum((_added(run, e)[run.used] for e in effects), np.zeros(temperature.size))
-    return replace(
-        run.data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=run.data.bias_dph - total
-    )
+    data, at = run.data, run.in_force
+    temperature, slope = data.temperature_c, data.slope_c_per_min
+    added = np.zeros(at.size)
+    for effect in effects:
+        term = effect.term
+        if term.table is not None:
+            made = run.outcome(effect)
+            added = added + made.added[at]
+            if term.kind == "input":
+                temperature, slope = made.temperature[at], made.slope[at] * (60.0 / run.block_s)
+        elif term.mended is not None:
+            temperature, slope = term.mended(data.time_s, temperature, slope, effect.values)
+        elif term.kind == "add":
+            added = added + _simulated(run, effect)
+    return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
+
+
+def _simulated(run: Played, effect: Effect) -> Array:
+    """What a cause that no table holds adds, as the simulation has it, deg/h."""
+    seen = run.data.temperature_c
+    scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
+    assert effect.term.bias is not None
+    return effect.term.bias(scene, effect.values, np.random.default_rng(0))
 
 
 def joined(parts: Sequence[TrainingData]) -> TrainingData:
@@ -186,8 +165,9 @@ def fit_extended(
     parts = [samples(run, effects) for run in runs]
     if kept is not None:
         parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
-    if any(e.id == "map_too_coarse" for e in effects):
-        arguments = arguments | {"centers": _MANY_CENTERS}
+    finer = [e.term.centers for e in effects if e.term.centers is not None]
+    if finer:
+        arguments = arguments | {"centers": max(finer)}
     data = joined(parts)
     return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
 
@@ -227,7 +207,7 @@ def score(
             continue
         data = samples(run, effects)
         rest = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
-        if any(e.id == "turn_on_offset" for e in effects):
+        if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
             rest = rest - rest[data.time_s < data.time_s[0] + _RE_ZERO_S].mean()
         out.append(
             average(

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__, terms
+from .. import __version__
 from ..dataset import Dataset
 from ..fitting import FitOptions, front_end, model_of, training_of
 from ..model import Model
 from ..spans import training_spans
+from ..terms import CATALOGUE, separate_by
 from .advice import VERDICTS, next_steps
+from .catalogue import diagnosed
 from .cycle import Cycle, cycle_of, is_single_cycle
 from .extend import Extension, extend
 from .gain import Gain
@@ -23,7 +25,7 @@ from .pipeline import Analysis, analyse
 from .recordings import declared_noise, records_of
 from .refine import Interval, Refined
 from .verdict import named, verdict_of
-from .words import NOISE_WORDS, WORDS, separate_by
+from .words import NOISE_WORDS
 
 __all__ = ["Diagnosis", "diagnose"]
 
@@ -127,8 +129,7 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
         "extended": None,
         "considered": [
             {"id": i, "family": t.family, "p_value": None, "detection_limit": None, "not_testable": text}
-            for i, t in terms.CATALOGUE.items()
-            if i in WORDS
+            for i, t in diagnosed().items()
         ],
         "missing": [text],
         "measured_on": None,
@@ -149,12 +150,12 @@ def _result(
     cycle: Cycle | None,
 ) -> dict[str, Any]:
     attribution = analysis.attribution
-    verdict = verdict_of(attribution, analysis.noise, [])
+    verdict = verdict_of(attribution, analysis.noise)
     if cycle is not None and causes:
         verdict = "ambiguous" if cycle.rivals else "partial"
     listed = [_cause(analysis, extension, k) for k in range(len(causes))]
     listed += [_noise_cause(n) for n in analysis.noise]
-    missing = [f"{WORDS[i].name}: {why}" for i, why in analysis.search.bank.untestable.items()]
+    missing = [f"{CATALOGUE[i].words.name}: {why}" for i, why in analysis.search.bank.untestable.items()]
     result = _head(dataset, verdict, options) | {
         "noise_floor_dph": extension.floor,
         "discrepancies": _discrepancies(analysis),
@@ -211,15 +212,15 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> dict[str, Any]:
     channels = [r.channel for r in near if r.channel is not None]
     entry: dict[str, Any] = {
         "id": id,
-        "family": terms.CATALOGUE[id].family,
-        "name": WORDS[id].name,
+        "family": CATALOGUE[id].family,
+        "name": CATALOGUE[id].words.name,
         "p_value": attribution.p_values[k],
         "parameters": {n: _interval(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
         "equivalent": rivals,
         "separate_by": separate_by(id, rivals[0]) if rivals else None,
         "gain": _gain(extension.steps[k]),
-        "signature": WORDS[id].signature,
-        "remedy": WORDS[id].remedy,
+        "signature": CATALOGUE[id].words.signature,
+        "remedy": CATALOGUE[id].words.remedy,
         "separable_from_d": analysis.separations[k],
     }
     if cause.candidate.channel is not None:
@@ -259,7 +260,7 @@ def _extended(extension: Extension) -> dict[str, Any] | None:
     return {
         "exam_rms_dph": extension.total.rms_after,
         "centers": extension.extended.n_centers,
-        "terms": [e.id for e in extension.shipped if e.id != "map_too_coarse"],
+        "terms": [e.id for e in extension.shipped if CATALOGUE[e.id].table is not None],
         "model": None,
         "gain": _gain(extension.total),
         "rate_left_out": None if left is None else {"environment": left[0], **_gain(left[1])},
@@ -297,7 +298,7 @@ def _considered(analysis: Analysis) -> list[dict[str, Any]]:
         limit = analysis.limits.get(key)
         entry: dict[str, Any] = {
             "id": id,
-            "family": terms.CATALOGUE[id].family,
+            "family": CATALOGUE[id].family,
             "p_value": p_value,
             "detection_limit": _limit(limit),
         }
@@ -308,13 +309,13 @@ def _considered(analysis: Analysis) -> list[dict[str, Any]]:
         out.append(
             {
                 "id": id,
-                "family": terms.CATALOGUE[id].family,
+                "family": CATALOGUE[id].family,
                 "p_value": None,
                 "detection_limit": None,
                 "not_testable": why,
             }
         )
-    order = list(WORDS)
+    order = list(diagnosed())
     return sorted(out, key=lambda e: order.index(e["id"]))
 
 
@@ -353,7 +354,8 @@ def _sentence(result: dict[str, Any]) -> str:
         "explained": f"{names}.",
         "ambiguous": f"{names}, or equally well: "
         + ", ".join(
-            WORDS[i].name + (f" ({', '.join(c['equivalent_channels'])})" if i == "auxiliary" else "")
+            CATALOGUE[i].words.name
+            + (f" ({', '.join(c['equivalent_channels'])})" if CATALOGUE[i].needs.channel else "")
             for c in causes
             for i in c["equivalent"]
         )
@@ -384,9 +386,9 @@ def _extended_model(
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options)
     entries = []
     for effect in extension.shipped:
-        if effect.id == "map_too_coarse":
+        if CATALOGUE[effect.id].table is None:
             continue
-        names = [p.name for p in terms.CATALOGUE[effect.id].parameters]
+        names = [p.name for p in CATALOGUE[effect.id].parameters]
         entries.append(
             {
                 "id": effect.id,

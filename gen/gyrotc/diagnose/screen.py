@@ -7,7 +7,7 @@ variance becomes weights.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,8 +179,7 @@ def cleaned(records: Records, screened: Screened) -> tuple[Array, NDArray[np.int
     empty = []
     for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
         keep = screened.masks[k]
-        only = replace(run, usable=run.usable)
-        y[span] = records.average_run(k, np.where(keep, only.rate_dph, 0.0), keep)
+        y[span] = records.average_run(k, np.where(keep, run.rate_dph, 0.0), keep)
         count = np.bincount(records.index[k], weights=keep, minlength=int(records.index[k][-1]) + 1)
         empty.append(np.flatnonzero(count[records.kept[k]] == 0) + span.start)
     return y, np.concatenate(empty)

@@ -22,13 +22,12 @@ def named(attribution: Attribution) -> bool:
     return bool(attribution.causes) and not little and attribution.other.lead < _LEAD
 
 
-def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], missing: Sequence[str]) -> str:
-    """One of the verdicts of the interface.
+def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> str:
+    """One of the verdicts of the interface; `not_testable` is given before any search.
 
     Args:
         attribution: What the search found.
         noise: Findings of the family `noise`.
-        missing: Causes that cannot be tested; only all of them together make `not_testable`.
     """
     if attribution.detected and not named(attribution):
         return "unexplained"
@@ -36,6 +35,4 @@ def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], missing:
         if attribution.misfit_p < _REMAINDER:
             return "partial"
         return "ambiguous" if any(attribution.rivals) else "explained"
-    if noise:
-        return "noise_differs"
-    return "not_testable" if missing else "consistent"
+    return "noise_differs" if noise else "consistent"

@@ -3,8 +3,8 @@
 Stage 2 of the house (recordings → **samples** → model → tables → C → proof). docs/numerics.md,
 section 1, is the text that this package and libc/gtc_front.inl both follow, to the bit:
 `numbers` holds the operations of each arithmetic, `believe` decides which samples are believed,
-`follow` makes block means, slopes and the sequence of corrections, `training` turns a recording
-into training samples.
+`follow` makes block means, slopes and the sequence of corrections, `stream` counts samples and blocks as the
+target does, `training` turns a recording into training samples.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from __future__ import annotations
 from .believe import BELIEVED, HELD, RESTART, believe
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow, positions, with_missing
 from .numbers import F32, Q31, Arithmetic
-from .training import Blocks, missed_before, run_blocks, samples_per_block
+from .stream import Stream
+from .training import Blocks, blocks_since_power_on, missed_before, run_blocks, samples_per_block
 
 __all__ = [
     "BELIEVED",
@@ -27,7 +28,9 @@ __all__ = [
     "Blocks",
     "Settings",
     "Steps",
+    "Stream",
     "believe",
+    "blocks_since_power_on",
     "expand_missed",
     "follow",
     "missed_before",

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .follow import FALLBACK, KEEP, Settings, Steps, expand_missed, follow, positions, with_missing
+from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
 from .numbers import F32
+from .stream import Stream
 
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
 
-__all__ = ["Blocks", "missed_before", "run_blocks", "samples_per_block"]
+__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks", "samples_per_block"]
 
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1
@@ -25,7 +26,7 @@ _HELD, _FALLBACK = 8, 16  # as in gtc.h
 class Blocks:
     """What the front end makes of one run: one entry per block, from the first row of the file on.
 
-    A training sample is a block with `rows > 0` that is `valid`: input (`temperature_c`, `slope_c`), answer
+    A training sample is a block that is `used`: input (`temperature_c`, `slope_c`), answer
     `rate_dph`, weight `rows`.
     """
 
@@ -37,6 +38,15 @@ class Blocks:
     status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
     rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
     rows: NDArray[np.int64]  # number of these rows
+    steps: Steps  # every correction of the run
+    in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
+    stream: Stream  # its samples
+    samples_per_block: int
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which blocks are training samples."""
+        return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
 
 
 def samples_per_block(block_s: float, row_period_s: float) -> int:
@@ -52,6 +62,13 @@ def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[n
     missed = np.zeros(time_s.size, dtype=np.int64)
     missed[late + 1] = np.minimum(np.rint(gaps[late]) - 1.0, _MAX_MISSED).astype(np.int64)
     return missed
+
+
+def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
+    """Whole blocks between power-on and the first row; 0 where power-on is not known or came later."""
+    if run.power_on_s is None:
+        return 0
+    return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
 
 
 def run_blocks(
@@ -85,16 +102,17 @@ def run_blocks(
         max_step=np.float32(max_step_c),
         max_slope=np.float32(max_rate_c_per_min * block_s / 60.0),
     )
-    missed = expand_missed(missed_before(rows.time_s, run.row_period_s), settings)
-    position = positions(missed, run.file)
-    samples = with_missing(F32, F32.numbers(rows.temperature_c), position)
-    steps = follow(F32, samples, settings)
+    missed = missed_before(rows.time_s, run.row_period_s)
+    stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
+    steps = follow(F32, stream.samples, settings)
     n = settings.samples_per_block
     n_blocks = steps.valid.size
-    temperature, slope, status = _in_force(steps, samples.size, n)
-    rate, count = _mean_rate(rows, run, position // n, n_blocks)
+    last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
+    k = steps.in_force(last)
+    temperature, slope, status = _in_force(steps, k)
+    rate, count = _mean_rate(rows, run, stream.position // n, n_blocks)
     return Blocks(
-        start_s=np.interp(np.arange(n_blocks) * n, position, rows.time_s) if n_blocks else np.empty(0),
+        start_s=np.interp(np.arange(n_blocks) * n, stream.position, rows.time_s) if n_blocks else np.empty(0),
         valid=steps.valid,
         temperature_c=temperature,
         slope_c=slope,
@@ -102,15 +120,25 @@ def run_blocks(
         status=status,
         rate_dph=rate,
         rows=count,
+        steps=steps,
+        in_force=_last_map(steps, k),
+        stream=stream,
+        samples_per_block=n,
     )
 
 
+def _last_map(steps: Steps, k: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The last correction up to each of k that the map made: one that is kept goes on."""
+    if steps.kind.size == 0:
+        return k
+    made = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
+    return np.where(k >= 0, made[k], -1)
+
+
 def _in_force(
-    steps: Steps, n_samples: int, n: int
+    steps: Steps, k: NDArray[np.int64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
-    """Input and status in force during each block: those at its last sample."""
-    last = np.minimum(np.arange(1, steps.valid.size + 1) * n, n_samples) - 1
-    k = steps.in_force(last)
+    """Input and status in force during each block, from the correction at its last sample (-1: none)."""
     started = k >= 0
     source = k[started]
     temperature = np.full(k.size, np.nan, dtype=np.float32)

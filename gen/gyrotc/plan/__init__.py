@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__, terms
+from .. import __version__
+from ..diagnose.catalogue import searched
 from ..diagnose.records import Record
-from ..diagnose.words import separate_by
 from ..simulate.campaign import Noise
+from ..terms import CATALOGUE, separate_by
 from .programme import Programme, programme_of
 from .sensitivity import Sensitivity
 from .separate import Row, additions, separability
@@ -122,7 +123,7 @@ def _limits(sensitivity: Sensitivity) -> list[dict[str, Any]]:
     return [
         {
             "id": id,
-            "family": terms.CATALOGUE[id].family,
+            "family": CATALOGUE[id].family,
             "detection_limit": {
                 "value": limit.value,
                 "unit": limit.unit,
@@ -140,7 +141,8 @@ def _hard(rows: list[Row]) -> list[dict[str, Any]]:
     for row in rows:
         for other, d in row.d.items():
             key = frozenset({row.id, other})
-            if d > _HARD and d > worst.get(key, (0.0, "", ""))[0] and other != "map_too_coarse":
+            planned = searched(other).planned
+            if planned and d > _HARD and d > worst.get(key, (0.0, "", ""))[0]:
                 worst[key] = (d, row.id, other)
     ranked = sorted(worst.values(), reverse=True)
     return [{"pair": [a, b], "d": d, "add": separate_by(a, b)} for d, a, b in ranked]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..diagnose.bank import Bank
 from ..diagnose.cache import bank_of
-from ..diagnose.catalogue import Candidate
-from ..diagnose.limits import Limit, limit_of
+from ..diagnose.catalogue import Candidate, planned
+from ..diagnose.limits import Limit, amplitude_energy, limit_of
 from ..diagnose.noise import COLOURS, Colour, Whitener
 from ..diagnose.search import Search
 from .programme import Programme
@@ -25,7 +25,6 @@ __all__ = ["Sensitivity"]
 Array = NDArray[np.float64]
 
 _RIDGE = 1e-9  # of the strongest map function: what a choice of runs does not visit stays undetermined
-_NOT_PLANNED = ("structure", "map_too_coarse", "auxiliary")
 
 
 class Sensitivity:
@@ -57,7 +56,7 @@ class Sensitivity:
         points: dict[str, list[tuple[Candidate, float]]] = {}
         for candidate, at in zip(self.candidates, self.at, strict=True):
             part = energy[at]
-            amount = float(part.sum() if candidate.id == "turn_on_offset" else part.mean())
+            amount = amplitude_energy(candidate.id, part)
             points.setdefault(candidate.id, []).append((candidate, max(amount, 0.0)))
         return {id: limit_of(id, p) for id, p in points.items()}
 
@@ -101,7 +100,7 @@ def _columns(search: Search) -> tuple[list[Candidate], Array, list[slice]]:
     candidates, blocks, at = [], [], []
     start = 0
     for group in bank.groups:
-        if group.candidate.id in _NOT_PLANNED:
+        if group.candidate.id not in planned():
             continue
         block = raw[:, group.columns]
         candidates.append(group.candidate)

@@ -6,6 +6,7 @@ map (docs/diagnosis.md).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.catalogue import Candidate, columns_of, shape_parameter
+from ..diagnose.catalogue import Candidate, columns_of, planned, searched, shape_parameter
 from ..diagnose.likelihood import Gains
 from ..errors import InputError
 from ..simulate.campaign import Noise
@@ -24,19 +25,6 @@ __all__ = ["Row", "additions", "separability"]
 
 Array = NDArray[np.float64]
 
-_SHOWN: dict[str, tuple[float, ...]] = {
-    "cavity_lag": (300.0, 900.0),
-    "thermal_gradient": (300.0, 1500.0),
-    "time_misalignment": (200.0,),
-    "hysteresis": (4.0, 12.0),
-    "warm_up": (1800.0,),
-    "turn_on_offset": (0.0,),
-    "ageing": (0.0,),
-    "path_length_periodicity": (8.0,),
-}
-"""Parameter values at which causes stand for themselves."""
-
-_EVERY_SHIFT = 3  # of the grid of time shifts, one in this many is looked at as a rival
 _INDEPENDENT = 1e-6
 _D_LIMIT = 6.0
 _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
@@ -85,13 +73,13 @@ def separability(sensitivity: Sensitivity, only: Sequence[str] | None = None) ->
 
 def _shown(sensitivity: Sensitivity) -> Iterator[Candidate]:
     """Candidates of the search nearest to the values shown."""
-    for id, values in _SHOWN.items():
+    for id in planned():
         same = [c for c in sensitivity.candidates if c.id == id]
         parameter = shape_parameter(id)
-        if parameter is None or id == "turn_on_offset":
+        if parameter is None:
             yield from same[:1]
             continue
-        for value in values if same else ():
+        for value in searched(id).shown if same else ():
             yield min(same, key=lambda c: abs(c.values[parameter.name] - value))
 
 
@@ -126,12 +114,11 @@ def _by_columns(gains: Gains, own: Array, energy: Array) -> Iterator[tuple[str, 
 def _by_inputs(gains: Gains, total: Array, energy: Array) -> Iterator[tuple[str, Array]]:
     """The same for the map of other inputs."""
     bank = gains.search.bank
-    shifts = 0
+    seen: Counter[str] = Counter()
     for candidate, replaced, known in zip(bank.inputs, bank.replaced, bank.known, strict=True):
-        if candidate.id == "time_misalignment":
-            shifts += 1
-            if shifts % _EVERY_SHIFT:
-                continue
+        seen[candidate.id] += 1
+        if seen[candidate.id] % searched(candidate.id).rival_every:
+            continue
         design = gains.whiten(replaced)
         if not known.all():
             design = np.column_stack([design, gains.whiten(np.eye(known.size)[:, ~known])])
@@ -155,8 +142,8 @@ def additions(
         InputError: A cause has no row in the table of separability.
     """
     for id in pair:
-        if id not in _SHOWN:
-            raise InputError("--separate", repr(id), ", ".join(_SHOWN))
+        if id not in planned():
+            raise InputError("--separate", repr(id), ", ".join(planned()))
     found = []
     for name in ("", *library(scenario)):
         programme = programme_of(scenario, noise=noise, seed=seed, added=[name] if name else [])

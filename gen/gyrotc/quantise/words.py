@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..amalgamate import runtime_folders
-from ..table import ARRAYS, AUXILIARY, Table
+from ..table import ARRAYS, Table
+from ..terms.recursion import TableKind
 
 __all__ = ["outside"]
 
@@ -73,7 +74,7 @@ def _terms(table: Table, limits: Limits) -> Iterator[str]:
         kind, channel = int(record[0]), int(record[1])
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
-        elif channel >= table.n_channels or (channel != 0) != (kind == AUXILIARY):
+        elif channel >= table.n_channels or (channel != 0) != (kind == TableKind.AUXILIARY):
             yield f"channel of a term is {channel}"
         else:
             yield from _beyond(table.numbers(record[2:]), limits[(kind - 1) * width : kind * width])

@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frontend import follow
+from ..frontend import Settings, Steps, Stream, follow
 from ..table import Table, Words
-from .corrections import Stream, arithmetic_of, corrections, settings_of
+from .corrections import arithmetic_of, corrections, settings_of
 from .maps import evaluate_map
 
 __all__ = ["Replay", "answers", "replay"]
@@ -60,9 +60,9 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         samples_per_block: As given to `gtc_<n>_init`.
     """
     settings = settings_of(table, samples_per_block)
-    stream = Stream.of_rows(table, settings, np.asarray(channels), np.asarray(missed, dtype=np.int64))
-    steps = follow(arithmetic_of(table), stream.samples, settings)
-    status, bits = corrections(table, steps, stream, samples_per_block)
+    channels, missed = np.asarray(channels), np.asarray(missed, dtype=np.int64)
+    stream, steps = _followed(table, settings, channels, missed)
+    status, bits = corrections(table, steps, stream, channels, samples_per_block)
     position = stream.position
     valid = steps.valid[position // samples_per_block]
     in_force = steps.in_force(position)
@@ -79,6 +79,15 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         missed_status=missed_status,
         block_valid=valid,
     )
+
+
+def _followed(
+    table: Table, settings: Settings, channels: Words, missed: NDArray[np.int64]
+) -> tuple[Stream, Steps]:
+    """The front end over a history."""
+    arithmetic = arithmetic_of(table)
+    stream = Stream.of_rows(arithmetic, settings, table.numbers(channels)[:, 0], missed)
+    return stream, follow(arithmetic, stream.samples, settings)
 
 
 def answers(table: Table, vectors: Vectors) -> NDArray[np.uint32]:
@@ -104,9 +113,8 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     if waiting:  # the history ends with missing samples: one more holds their place
         absent = np.full((1, table.n_channels), table.encode_inputs(np.nan), dtype=np.uint32)
         channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
-    stream = Stream.of_rows(table, settings, channels, missed)
-    steps = follow(arithmetic_of(table), stream.samples, settings)
-    status, bits = corrections(table, steps, stream, samples_per_block)
+    stream, steps = _followed(table, settings, channels, missed)
+    status, bits = corrections(table, steps, stream, channels, samples_per_block)
     row = np.cumsum(~was_missed) - 1
     last = np.where(
         was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]

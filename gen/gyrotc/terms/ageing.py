@@ -11,6 +11,8 @@ import math
 import numpy as np
 
 from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .search import Reach, Search
+from .words import Telling, Words
 
 __all__ = ["TERM"]
 
@@ -37,9 +39,15 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"slope_dph_per_day": float(weights[0])}
 
 
+def _grid(reach: Reach) -> list[Values]:
+    """A straight line, and a course that is logarithmic from the second day on."""
+    return [{"d0_day": _STRAIGHT}, {"d0_day": 2.0}]
+
+
 TERM = Term(
     id="ageing",
     family="between_runs",
+    rank=70,
     kind="add",
     equation="bias += slope d0 log(1 + day/d0)",
     source="long-term bias drift; d0 large: linear",
@@ -47,6 +55,16 @@ TERM = Term(
         Parameter("d0_day", "day", 0.1, _STRAIGHT, default=_STRAIGHT),
         Parameter("slope_dph_per_day", "deg/h/day", 1e-7, 1e-2, linear=True, signed=True),
     ),
+    words=Words(
+        name="The bias drifts from run to run with the date",
+        short="ageing",
+        signature="means of the runs follow the calendar",
+        remedy="calibrate again in time; a table must not extrapolate it",
+        experiment="three or more repeats of one hold with power cycles between them",
+        telling=Telling.REPEATS,
+        recording="record on three dates or more and note them (started)",
+    ),
+    search=Search(price=1, grid=_grid),
     needs=Needs(runs=3, dates=3),
     bias=_bias,
     features=_features,

@@ -9,8 +9,12 @@ import numpy as np
 
 from ..errors import InputError
 from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .recursion import TableKind
+from .search import Search, anywhere
+from .tabled import Tabled
+from .words import Telling, Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _channel(channel: Array | None) -> Array:
@@ -34,31 +38,14 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"slope_dph_per_unit": float(weights[0]), "reference": 0.0}
 
 
-class Reference:
-    """slope · (block mean of the channel − reference)."""
-
-    def __init__(self, values: Values, block_s: float, dtype: type[np.floating]) -> None:
-        self._dtype = dtype
-        self._slope = dtype(values["slope_dph_per_unit"])
-        self._reference = dtype(values["reference"])
-        self._mean = self._reference
-
-    def start(self, value: float) -> None:
-        """First sample of the channel."""
-        self._mean = self._dtype(value)
-
-    def step(self, mean: float) -> None:
-        """Mean of the channel over a block."""
-        self._mean = self._dtype(mean)
-
-    def value(self) -> float:
-        """deg/h."""
-        return float(self._dtype(self._slope * self._dtype(self._mean - self._reference)))
+def _record(values: Values, block_s: float) -> list[float]:
+    return [values["slope_dph_per_unit"], values["reference"]]
 
 
 TERM = Term(
     id="auxiliary",
     family="auxiliary",
+    rank=100,
     kind="add",
     equation="bias += slope (channel - reference)",
     source="null shift from discharge current, supply, pressure or magnetic field; needs the channel",
@@ -66,9 +53,18 @@ TERM = Term(
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
         Parameter("reference", "unit", -1e9, 1e9, linear=True, logarithmic=False, default=0.0),
     ),
+    words=Words(
+        name="The bias follows a recorded channel",
+        short="channel",
+        signature="residual is proportional to the channel, and not to the channel shifted in time",
+        remedy="a linear term in the channel, or a better supply or shield",
+        experiment="vary the channel by hand at a constant temperature",
+        telling=Telling.CHANNEL,
+    ),
+    search=Search(price=1, grid=anywhere, planned=False),
+    table=Tabled(TableKind.AUXILIARY, _record),
     needs=Needs(channel=True),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
-    reference=Reference,
 )

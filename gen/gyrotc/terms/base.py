@@ -1,23 +1,29 @@
-"""What a cause of the catalogue is: equation in the simulation, features for diagnosis, reference.
-
-A term stands in one module of this package and in one C file of the same name; the modules hold
+"""What a cause of the catalogue is: everything that is known of it stands in one `Term`, in one module.
 
 - `cavity`, `bias`, `record`: how the cause acts on a simulated instrument (`Scene`), at the simulation's own
   rate;
-- `features`: what a fit needs, from a measured record (`History`) at its native rate, before any averaging;
-- `reference`: the recursion that the target runs, one step for each block (docs/FORMAT.md, section 2).
+- `features`, `amplitudes`: what a fit needs, from a measured record (`History`) at its native rate, before any
+  averaging;
+- `search`: over which values diagnosis looks for it, and at what price;
+- `table`: how it stands in a table, if one can hold it (the recursions are in `recursion`, the C in
+  libc/gtc_term_<kind>.inl);
+- `words`: what reports say of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Features", "History", "Kind", "Needs", "Parameter", "Recursion", "Scene", "Term", "Values"]
+from .search import Search
+from .tabled import Tabled
+from .words import Words
+
+__all__ = ["Features", "History", "Kind", "Needs", "Parameter", "Scene", "Term", "Values"]
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -121,55 +127,63 @@ class Scene:
     day: float
 
 
-class Recursion(Protocol):
-    """A term on the target: started by the first valid sample, stepped by every block mean.
-
-    `dtype` chooses the arithmetic (np.float64, np.float32); one operation at a time in either.
-    """
-
-    def start(self, value: float) -> None:
-        """First valid sample (temperature in C, or the channel's unit)."""
-
-    def step(self, mean: float) -> None:
-        """Mean of a block that ends."""
-
-    def value(self) -> float:
-        """What is added to the map's bias now, deg/h."""
-
-
 @dataclass(frozen=True, slots=True)
 class Term:
     """A cause of the catalogue. A hook that a cause does not have is None.
 
     Attributes:
         id, family: As in docs/FORMAT.md and in the results of `diagnose`.
+        rank: Results list the causes by ascending rank.
         kind: How it enters a model.
         equation: In plain text.
         source: Where the mechanism is described.
         parameters: In the order of docs/FORMAT.md; the linear ones come last.
+        words: What reports say of it.
         needs: What recordings must offer.
+        search: How diagnosis looks for it; None: it is simulated only.
+        table: How it stands in a table; None: no table holds it.
+        centers: Number of Gaussians with which a finer map holds it; None: a map is not what mends it.
         cavity: Simulation: temperature that the bias acts on instead of `scene.cavity_c`, C.
         bias: Simulation: what it adds to the bias, deg/h; may draw from the generator (once for each run).
         record: Simulation: what the sensor shows instead of `scene.sensed_c`, C.
         features: Columns for given nonlinear parameters.
         amplitudes: Linear parameters from the fitted weights of the columns.
-        reference: Recursion on the target for all parameters, block length in s and number type.
+        mended: For kind "input" without a table: what the map would see had the recording been right, from times
+            in s, temperature in C, its rate in C/min and the parameters.
+        unseen_s: How much of either end of a run the cause puts out of sight, s.
     """
 
     id: str
     family: str
+    rank: int
     kind: Kind
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
+    words: Words
     needs: Needs = Needs()
+    search: Search | None = None
+    table: Tabled | None = None
+    centers: int | None = None
     cavity: Callable[[Scene, Values], Array] | None = None
     bias: Callable[[Scene, Values, np.random.Generator], Array] | None = None
     record: Callable[[Scene, Values], Array] | None = None
     features: Callable[[History, Values], Features] | None = None
     amplitudes: Callable[[Array], dict[str, float]] | None = None
-    reference: Callable[[Values, float, type[np.floating]], Recursion] | None = None
+    mended: Callable[[Array, Array, Array, Values], tuple[Array, Array]] | None = None
+    unseen_s: Callable[[Values], float] | None = None
 
     def nonlinear(self) -> tuple[Parameter, ...]:
         """Parameters that `features` takes."""
         return tuple(parameter for parameter in self.parameters if not parameter.linear)
+
+    @property
+    def unit(self) -> str:
+        """Unit of its size: of its amplitude, or of the parameter that changes the map's input."""
+        shown = self.parameters if self.kind == "input" else [p for p in self.parameters if p.linear]
+        return shown[0].unit
+
+    @property
+    def shipped(self) -> bool:
+        """Whether an extended model can hold it: as a term, or by a finer map."""
+        return self.table is not None or self.centers is not None

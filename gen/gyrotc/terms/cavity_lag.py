@@ -5,13 +5,15 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 
 from __future__ import annotations
 
-import numpy as np
-
 from .base import Array, Features, History, Parameter, Scene, Term, Values
-from .memory import MemoryState, lagged
+from .memory import RATES, lagged
 from .operators import first_order
+from .recursion import TableKind
+from .search import Search, geometric
+from .tabled import Tabled, blocks_per_tau, memory_gain
+from .words import Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _cavity(scene: Scene, values: Values) -> Array:
@@ -22,26 +24,36 @@ def _features(history: History, values: Values) -> Features:
     return lagged(history, values["tau_s"])[1]
 
 
-class Reference(MemoryState):
-    """Adds nothing of its own: the map sees (`z`, `slope()`) instead of (T, dT/dt)."""
-
-    def value(self) -> float:
-        """Nothing is added, deg/h."""
-        return 0.0
+_TAU = Parameter("tau_s", "s", 60.0, 4000.0)
 
 
-def _reference(values: Values, block_s: float, dtype: type[np.floating]) -> Reference:
-    return Reference(values["tau_s"], block_s, dtype)
+def _record(values: Values, block_s: float) -> list[float]:
+    return [memory_gain(block_s, values["tau_s"]), 0.0, blocks_per_tau(block_s, values["tau_s"])]
 
 
 TERM = Term(
     id="cavity_lag",
     family="thermal_memory",
+    rank=10,
     kind="input",
     equation="tau dz/dt = T - z; bias = f(z, dz/dt)",
     source="first-order heat conduction from the sensor into the cavity; glass ceramics conduct poorly",
-    parameters=(Parameter("tau_s", "s", 60.0, 4000.0),),
+    parameters=(_TAU,),
+    words=Words(
+        name="The cavity lags the temperature sensor",
+        short="lag",
+        signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
+        remedy="one first-order state: the map sees the cavity's temperature",
+        experiment=RATES,
+    ),
+    search=Search(
+        price=2,
+        grid=geometric(_TAU, 22),
+        over=_TAU.name,
+        imitates=True,
+        shown=(300.0, 900.0),
+    ),
+    table=Tabled(TableKind.MEMORY, _record),
     cavity=_cavity,
     features=_features,
-    reference=_reference,
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from .base import Array, Parameter, Scene, Term, Values
 from .operators import first_order
+from .words import Telling, Words
 
 __all__ = ["EARTH_RATE_DPH", "TERM"]
 
@@ -33,14 +34,23 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
 TERM = Term(
     id="earth_rate_tilt",
     family="bench",
+    rank=120,
     kind="static",
     equation="bias += Omega (cos(lat) twist + sin(lat) tilt) (T_fixture - 20 C)",
     source="Earth rate 15.041 deg/h seen by a misaligned east axis",
     parameters=(
         Parameter("latitude_deg", "deg", -90.0, 90.0, logarithmic=False, default=45.0),
+        Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
         Parameter("twist_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
         Parameter("tilt_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
-        Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
+    ),
+    words=Words(
+        name="The fixture turns the axis through Earth rate",
+        short="tilt",
+        signature="none on one axis: the static map holds it",
+        remedy="a stiffer fixture, or Earth rate computed from its measured angles",
+        experiment="the same profile with the gyro turned by 180 degrees on its fixture",
+        telling=Telling.STATIC,
     ),
     bias=_bias,
 )

@@ -11,8 +11,12 @@ import numpy as np
 
 from .base import Array, Features, History, Parameter, Scene, Term, Values
 from .operators import play
+from .recursion import TableKind
+from .search import Search, SingleCycle, geometric
+from .tabled import Tabled
+from .words import Telling, Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -32,43 +36,45 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"amplitude_dph_per_c": float(weights[0])}
 
 
-class Reference:
-    """z ← max(T − w, min(T + w, z)); amplitude · (z − T)."""
+_WIDTH = Parameter("width_c", "C", 0.5, 40.0)
+_BOTH_SIDES = "the same hold temperature reached from both sides, at two rates, and nested shrinking loops"
 
-    def __init__(self, values: Values, block_s: float, dtype: type[np.floating]) -> None:
-        self._dtype = dtype
-        self._width = dtype(values["width_c"])
-        self._amplitude = dtype(values["amplitude_dph_per_c"])
-        self.z = self.temperature = dtype(0.0)
 
-    def start(self, value: float) -> None:
-        """Play without slack on either side at the first valid temperature, C."""
-        self.z = self.temperature = self._dtype(value)
-
-    def step(self, mean: float) -> None:
-        """Takes in the mean temperature of a block, C."""
-        self.temperature = self._dtype(mean)
-        low = self._dtype(self.temperature - self._width)
-        high = self._dtype(self.temperature + self._width)
-        self.z = max(low, min(high, self.z))
-
-    def value(self) -> float:
-        """deg/h."""
-        return float(self._dtype(self._amplitude * self._dtype(self.z - self.temperature)))
+def _record(values: Values, block_s: float) -> list[float]:
+    return [values["width_c"], values["amplitude_dph_per_c"]]
 
 
 TERM = Term(
     id="hysteresis",
     family="hysteresis",
+    rank=40,
     kind="add",
     equation="z = max(T - w, min(T + w, z)); bias += amplitude (z - T)",
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
     parameters=(
-        Parameter("width_c", "C", 0.5, 40.0),
+        _WIDTH,
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
     ),
+    words=Words(
+        name="The bias remembers the direction of the last temperature change",
+        short="hyster.",
+        signature="loops over T whose width does not depend on the rate; "
+        "holds differ by the side they were reached from",
+        remedy="one play operator, saved over power cycles",
+        experiment=_BOTH_SIDES,
+        telling=Telling.DIRECTION,
+        beside={"turn_on_offset": _BOTH_SIDES + ", all within one power-on"},
+    ),
+    search=Search(
+        price=2,
+        grid=geometric(_WIDTH, 20),
+        over=_WIDTH.name,
+        imitates=True,
+        shown=(4.0, 12.0),
+        cycle=SingleCycle(points=24, usual=False),
+    ),
+    table=Tabled(TableKind.PLAY, _record),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
-    reference=Reference,
 )

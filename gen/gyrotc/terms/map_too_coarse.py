@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .search import Search, anywhere
+from .words import Telling, Words
 
 __all__ = ["TERM"]
 
@@ -28,6 +30,7 @@ def _features(history: History, values: Values) -> Features:
 TERM = Term(
     id="map_too_coarse",
     family="static_map",
+    rank=80,
     kind="static",
     equation="bias += amplitude tanh((T - at)/width)",
     source="a steep place in the static map",
@@ -36,6 +39,16 @@ TERM = Term(
         Parameter("at_c", "C", -40.0, 70.0, logarithmic=False, default=20.0),
         Parameter("amplitude_dph", "deg/h", 1e-5, 1e-2, linear=True, signed=True),
     ),
+    words=Words(
+        name="The static map is too coarse",
+        short="map",
+        signature="residual repeats over T, heating and cooling alike, finer than the map",
+        remedy="more centers",
+        experiment="one slow ramp over the full range in both directions",
+        telling=Telling.STATIC,
+    ),
+    search=Search(price=1, grid=anywhere, needed_d=9.0, planned=False),
+    centers=24,
     bias=_bias,
     features=_features,
 )

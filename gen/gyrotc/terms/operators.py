@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 __all__ = ["delayed", "first_order", "play"]
 
 Array = NDArray[np.float64]
+Number = TypeVar("Number", bound=np.generic)
 
 _UNIFORM = 1e-6  # largest departure of a row period from their mean that still counts as even, relative
 
@@ -31,6 +33,8 @@ def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
     late = 1.0 - lost / x  # weight of an interval's end point
     forced = late * driven[1:] + (lost - late) * driven[:-1]
     if np.ptp(x) <= _UNIFORM * float(x.mean()):
+        from scipy.signal import lfilter  # 0.7 s to import, which commands that filter nothing need not spend
+
         decay = 1.0 - float(lost.mean())
         rest = lfilter([1.0], [1.0, -decay], forced, zi=[decay * driven[0]])[0]
         return np.asarray(np.concatenate((driven[:1], rest)))
@@ -47,20 +51,20 @@ def _affine_scan(factor: Array, offset: Array) -> Array:
     return offset
 
 
-def play(width_c: float, temperature_c: Array, start_c: float | None = None) -> Array:
-    """Play (backlash) operator z ← max(T − w, min(T + w, z)), from z = T or `start_c`, shape (n,).
+def play(width: Any, temperature: NDArray[Number]) -> NDArray[Number]:
+    """Play (backlash) operator z ← max(T − w, min(T + w, z)), from z = T on, shape (n,), in the type of T.
 
-    A step clamps z to T ± w. Clamps composed are a clamp again, so they are composed over 1, 2, 4, ... steps.
+    A step clamps z to T ± w. Clamps composed are a clamp again, so they are composed over 1, 2, 4, ... steps:
+    nothing is rounded but T ± w.
     """
-    low, high = temperature_c - width_c, temperature_c + width_c
+    low, high = temperature - width, temperature + width
     step = 1
     while step < len(low):
         after_low, after_high = low[step:], high[step:]
         low = np.concatenate((low[:step], np.clip(low[:-step], after_low, after_high)))
         high = np.concatenate((high[:step], np.clip(high[:-step], after_low, after_high)))
         step *= 2
-    first = float(temperature_c[0]) if start_c is None else start_c
-    return np.asarray(np.clip(first, low, high))
+    return np.asarray(np.clip(temperature[0], low, high))
 
 
 def delayed(shift_s: float, time_s: Array, values: Array) -> Array:

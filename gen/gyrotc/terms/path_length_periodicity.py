@@ -14,8 +14,12 @@ import math
 import numpy as np
 
 from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .recursion import TableKind
+from .search import Reach, Search
+from .tabled import Tabled, turns
+from .words import Telling, Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -37,41 +41,54 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     }
 
 
-class Reference:
-    """amplitude · cos(2π T/period + phase); the cosine is taken in float64 and rounded."""
+_PERIOD = Parameter("period_c", "C", 3.0, 60.0)
 
-    def __init__(self, values: Values, block_s: float, dtype: type[np.floating]) -> None:
-        self._dtype = dtype
-        self._values = dict(values)
-        self._temperature = 0.0
 
-    def start(self, value: float) -> None:
-        """First valid temperature, C."""
-        self._temperature = value
+def _grid(reach: Reach) -> list[Values]:
+    """Even in waves over the range: from 0.7 of it on a wave is no longer told from the map."""
+    longest = min(_PERIOD.high, 0.7 * reach.span_c)
+    if longest <= _PERIOD.low:
+        return []
+    waves = np.arange(1.0 / longest, 1.0 / _PERIOD.low, 1.0 / (3.0 * reach.span_c))
+    return [{_PERIOD.name: float(1.0 / w)} for w in waves]
 
-    def step(self, mean: float) -> None:
-        """Takes in the mean temperature of a block, C."""
-        self._temperature = mean
 
-    def value(self) -> float:
-        """deg/h."""
-        angle = 2.0 * math.pi * self._temperature / self._values["period_c"] + self._values["phase_rad"]
-        return float(self._dtype(self._values["amplitude_dph"] * math.cos(angle)))
+def _record(values: Values, block_s: float) -> list[float]:
+    return [1.0 / values["period_c"], turns(values["phase_rad"]), values["amplitude_dph"]]
 
 
 TERM = Term(
     id="path_length_periodicity",
     family="static_map",
+    rank=90,
     kind="add",
     equation="bias += amplitude cos(2 pi T/period + phase)",
     source="backscatter phase under path-length control (Rodloff 1987)",
     parameters=(
-        Parameter("period_c", "C", 3.0, 60.0),
+        _PERIOD,
         Parameter("amplitude_dph", "deg/h", 1e-6, 1e-2, linear=True),
         Parameter("phase_rad", "rad", -math.pi, math.pi, linear=True, default=0.0),
     ),
+    words=Words(
+        name="The bias is periodic in temperature",
+        short="period",
+        signature="residual waves over T with one period and the same phase heating and cooling",
+        remedy="a sine and a cosine of T",
+        experiment="one slow ramp over the full range in both directions",
+        telling=Telling.STATIC,
+        beside={"map_too_coarse": "one slow ramp over the full range (0.5 C/min)"},
+    ),
+    search=Search(
+        price=3,
+        grid=_grid,
+        over=_PERIOD.name,
+        needed_d=6.6,
+        width=lambda here, span_c: here**2 / (4.0 * span_c),
+        twice=True,
+        shown=(8.0,),
+    ),
+    table=Tabled(TableKind.HARMONIC, _record),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
-    reference=Reference,
 )

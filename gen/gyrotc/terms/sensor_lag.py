@@ -8,7 +8,9 @@ a static map absorbs it and nothing in its residual can show it. There is nothin
 from __future__ import annotations
 
 from .base import Array, Parameter, Scene, Term, Values
+from .memory import RATES
 from .operators import first_order
+from .words import Words
 
 __all__ = ["TERM"]
 
@@ -20,9 +22,17 @@ def _record(scene: Scene, values: Values) -> Array:
 TERM = Term(
     id="sensor_lag",
     family="control",
+    rank=110,
     kind="record",
     equation="tau dT_s/dt = T - T_s; f(T) = f(T_s + tau dT_s/dt)",
     source="identity; a static map of (T_s, dT_s/dt) absorbs it",
     parameters=(Parameter("tau_s", "s", 10.0, 1000.0),),
+    words=Words(
+        name="The temperature sensor lags the cavity",
+        short="sensor",
+        signature="none: a static map absorbs it",
+        remedy="none is needed",
+        experiment=RATES,
+    ),
     record=_record,
 )

@@ -12,10 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Array, Features, History, Parameter, Scene, Term, Values
-from .memory import MemoryState, lagged
+from .memory import RATES, lagged
 from .operators import first_order
+from .recursion import TableKind
+from .search import Search, SingleCycle, geometric
+from .tabled import Tabled, memory_gain
+from .words import Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -32,31 +36,43 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"amplitude_dph_per_c": float(weights[0])}
 
 
-class Reference(MemoryState):
-    """amplitude · (z − T)."""
+_TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
-    def __init__(self, values: Values, block_s: float, dtype: type[np.floating]) -> None:
-        super().__init__(values["tau_s"], block_s, dtype)
-        self._amplitude = dtype(values["amplitude_dph_per_c"])
 
-    def value(self) -> float:
-        """deg/h."""
-        return float(self._dtype(self._amplitude * self._dtype(self.z - self.temperature)))
+def _record(values: Values, block_s: float) -> list[float]:
+    return [memory_gain(block_s, values["tau_s"]), values["amplitude_dph_per_c"], 0.0]
 
 
 TERM = Term(
     id="thermal_gradient",
     family="thermal_memory",
+    rank=20,
     kind="add",
     equation="tau dz/dt = T - z; bias += amplitude (z - T)",
     source="Langmuir flow and alignment follow temperature differences in the block "
     "(Podgorski and Aronowitz 1968, Aronowitz and Lim 1979)",
     parameters=(
-        Parameter("tau_s", "s", 60.0, 8000.0),
+        _TAU,
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True),
     ),
+    words=Words(
+        name="The bias follows a temperature difference inside the gyro",
+        short="gradient",
+        signature="residual follows the ramp with the same size at every temperature and fades in holds",
+        remedy="one first-order state and a linear term",
+        experiment=RATES,
+    ),
+    search=Search(
+        price=2,
+        grid=geometric(_TAU, 24),
+        over=_TAU.name,
+        twice=True,
+        imitates=True,
+        shown=(300.0, 1500.0),
+        cycle=SingleCycle(points=48, usual=True),
+    ),
+    table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
-    reference=Reference,
 )

@@ -8,9 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .memory import CORNERS, RATES
 from .operators import delayed
+from .search import Reach, Search
+from .words import Words
 
 __all__ = ["TERM"]
+
+_SHIFT_S, _SHIFTS = 50.0, 12  # of the grid, to either side
+_MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
 
 
 def _record(scene: Scene, values: Values) -> Array:
@@ -25,13 +31,49 @@ def _features(history: History, values: Values) -> Features:
     return Features(np.column_stack((true_c, 60.0 * np.gradient(true_c, history.time_s))), known)
 
 
+def _grid(reach: Reach) -> list[Values]:
+    steps = _SHIFT_S * np.arange(1, _SHIFTS + 1)
+    return [{"shift_s": float(s)} for s in np.concatenate([-steps[::-1], steps])]
+
+
+def _mended(time_s: Array, temperature_c: Array, slope: Array, values: Values) -> tuple[Array, Array]:
+    later = time_s + values["shift_s"]
+    return np.interp(later, time_s, temperature_c), np.interp(later, time_s, slope)
+
+
+def _unseen_s(values: Values) -> float:
+    return abs(values["shift_s"]) + _MARGIN_S
+
+
 TERM = Term(
     id="time_misalignment",
     family="thermal_memory",
+    rank=30,
     kind="input",
     equation="T_recorded(t) = T(t - shift); bias = f(T, dT/dt)",
     source="clocks of two recorders, group delay of a filter in one channel only",
     parameters=(Parameter("shift_s", "s", 5.0, 1200.0, signed=True),),
+    words=Words(
+        name="Temperature and rate are not recorded at the same time",
+        short="shift",
+        signature="residual follows the second derivative of T at the corners of ramps",
+        remedy="mend the clocks or the filter of the recording; no term on the target",
+        experiment=RATES,
+        beside={"cavity_lag": CORNERS, "thermal_gradient": CORNERS},
+        advice="Mend the clocks or filters of the recording; no term on the target stands for them.",
+    ),
+    search=Search(
+        price=2,
+        grid=_grid,
+        over="shift_s",
+        width=lambda here, span_c: 45.0,
+        step=5.0,
+        imitates=True,
+        shown=(200.0,),
+        rival_every=3,
+    ),
+    mended=_mended,
+    unseen_s=_unseen_s,
     record=_record,
     features=_features,
 )

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .search import Search, anywhere
+from .words import Telling, Words
 
 __all__ = ["TERM"]
 
@@ -30,10 +32,22 @@ def _amplitudes(weights: Array) -> dict[str, float]:
 TERM = Term(
     id="turn_on_offset",
     family="between_runs",
+    rank=60,
     kind="random",
     equation="bias += o_run, o_run normal with standard deviation std",
     source="run-to-run bias repeatability, IEEE Std 647",
     parameters=(Parameter("std_dph", "deg/h", 1e-5, 1e-1, linear=True),),
+    words=Words(
+        name="Every power-on has its own offset",
+        short="offsets",
+        signature="means of the runs scatter more than their noise allows",
+        remedy="no map holds it: re-zero in the first minutes at rest, or state it as an uncertainty",
+        experiment="three or more repeats of one hold with power cycles between them",
+        telling=Telling.REPEATS,
+        beside={"ageing": "the same hold on at least five dates, several power cycles on each"},
+        recording="record three runs or more, each with its own power-on",
+    ),
+    search=Search(price=1, grid=anywhere, needed_d=10.0, imitates=True),
     needs=Needs(runs=3),
     bias=_bias,
     features=_features,

@@ -8,8 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .memory import COLD_STARTS
+from .recursion import TableKind
+from .search import Search, geometric
+from .tabled import Tabled, octaves_per_block
+from .words import Telling, Words
 
-__all__ = ["TERM", "Reference"]
+__all__ = ["TERM"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -32,39 +37,38 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"amplitude_dph": float(weights[0])}
 
 
-class Reference:
-    """amplitude · exp(−t_on/tau), multiplied down by one factor for each block."""
+_TAU = Parameter("tau_s", "s", 200.0, 8000.0)
 
-    def __init__(self, values: Values, block_s: float, dtype: type[np.floating]) -> None:
-        self._dtype = dtype
-        self._decay = dtype(np.exp(-block_s / values["tau_s"]))
-        self._value = dtype(values["amplitude_dph"])
 
-    def start(self, value: float) -> None:
-        """The clock runs from power-on, not from the first valid temperature."""
-
-    def step(self, mean: float) -> None:
-        """A block has passed."""
-        self._value = self._dtype(self._decay * self._value)
-
-    def value(self) -> float:
-        """deg/h."""
-        return float(self._value)
+def _record(values: Values, block_s: float) -> list[float]:
+    return [octaves_per_block(block_s, values["tau_s"]), values["amplitude_dph"]]
 
 
 TERM = Term(
     id="warm_up",
     family="power_on",
+    rank=50,
     kind="add",
     equation="bias += amplitude exp(-t_on/tau)",
     source="start-up drift: discharge, clean-up of the gas at the electrodes, dither, electronics",
     parameters=(
-        Parameter("tau_s", "s", 200.0, 8000.0),
+        _TAU,
         Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True),
     ),
+    words=Words(
+        name="The bias settles after power-on whatever the temperature is",
+        short="warm-up",
+        signature="residuals of all runs agree over the time since power-on",
+        remedy="one exponential of the time since power-on",
+        experiment="cold starts at two constant chamber temperatures, and a hot restart",
+        telling=Telling.COLD_START,
+        beside={"thermal_gradient": COLD_STARTS, "cavity_lag": COLD_STARTS},
+        recording="note the time of power-on of every run (power_on_s)",
+    ),
+    search=Search(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True, shown=(1800.0,)),
+    table=Tabled(TableKind.WARM_UP, _record),
     needs=Needs(power_on=True),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
-    reference=Reference,
 )

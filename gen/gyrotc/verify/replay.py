@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..applied import channels_of
 from ..dataset import Rows, Run
 from ..errors import CheckFailed, InputError
-from ..frontend import missed_before, samples_per_block
+from ..frontend import blocks_since_power_on, missed_before, samples_per_block
 from ..model import Model
 from ..reference import Replay, replay
 from ..table import Table, Words
@@ -70,11 +70,10 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
     channels = channels_of(rows, model, table)
     missed = missed_before(rows.time_s, run.row_period_s)
     per_block = samples_per_block(model.block_s, run.row_period_s)
-    if run.power_on_s is not None and any(term.id == "warm_up" for term in model.terms):
-        before_s = float(rows.time_s[0]) - run.power_on_s
-        before = per_block * max(round(before_s / model.block_s), 0)
+    if any(term.cause.needs.power_on for term in model.terms):
+        before = per_block * blocks_since_power_on(rows, run, model.block_s)
         if before > _MOST_MISSED:
-            found = f"power-on {before_s:.4g} s before the first row"
+            found = f"power-on {before * run.row_period_s:.4g} s before the first row"
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
         missed[0] = before
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)

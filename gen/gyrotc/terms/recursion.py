@@ -1,0 +1,180 @@
+"""What a term does on the target: the one text of each recursion, for every arithmetic.
+
+`diagnose` runs it in float64 on training and exam runs, `reference` in float32 and in fixed point against the
+compiled code. libc/gtc_term_*.inl is the same in C; docs/numerics.md, section 8, says it in words.
+
+A term sees the corrections of a history (`Course`) and changes what the map gets or adds to it (`Outcome`).
+Only what depends on the order is done one correction after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arithmetic import Operations
+from .operators import play
+
+__all__ = ["Course", "Outcome", "Recursion", "TableKind", "recursion_of"]
+
+Numbers = NDArray[Any]
+
+_HELD = 8  # GTC_HELD
+
+
+class TableKind(IntEnum):
+    """Kinds of terms that a table can hold, as in gtc_table.h."""
+
+    MEMORY = 1
+    PLAY = 2
+    WARM_UP = 3
+    HARMONIC = 4
+    AUXILIARY = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The corrections of a history as terms see them, one entry each, in numbers of one arithmetic.
+
+    Attributes:
+        temperature: Mean of the block that ended (of the last valid block where it is not valid itself), or the
+            sample that started the front end, shape (n,).
+        closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
+        elapsed: Blocks since power-on, shape (n,).
+        taken: How many samples of the channels had come, shape (n,).
+        samples_per_block: As in the table's front end.
+    """
+
+    temperature: Numbers
+    closes: NDArray[np.bool_]
+    elapsed: NDArray[np.int64]
+    taken: NDArray[np.int64]
+    samples_per_block: int
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits."""
+
+    temperature: Numbers
+    slope: Numbers
+    added: Numbers
+    remarks: NDArray[np.int32]
+
+
+class Recursion:
+    """A term of one kind with its parameters, numbers of an arithmetic as docs/FORMAT.md, section 3, lists them."""
+
+    def __init__(self, do: Operations, parameters: Sequence[Any]) -> None:
+        self.do = do
+        self.p = parameters
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        """Changes the outcome of every correction; `channel`: samples of the term's channel, in their order."""
+        raise NotImplementedError
+
+
+class _Memory(Recursion):
+    """z <- z + gain (T - z) once a block, at rest on the first T; adds amplitude (z - T).
+
+    Where rate is not 0 the map sees z and (T - z) rate instead of T and its slope.
+    """
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        _, amplitude, rate = self.p[:3]
+        x, z = course.temperature, self.do.reading(self._states(course))
+        if rate != 0:
+            outcome.temperature, outcome.slope = z, self.do.slope_of(x, z, rate)
+        outcome.added = outcome.added + self.do.scaled_difference(z, x, amplitude)
+
+    def _states(self, course: Course) -> Numbers:
+        follow, gain, z = self.do.follow, self.p[0], None
+        states = []
+        for x, closes in zip(self.do.scalars(course.temperature), course.closes.tolist(), strict=True):
+            if z is None:
+                z = self.do.settle(x)
+            elif closes:
+                z = follow(z, x, gain)
+            states.append(z)
+        return self.do.array(states)
+
+
+class _Play(Recursion):
+    """z <- max(T - width, min(T + width, z)) once a block, from the first T on; adds amplitude (z - T)."""
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        steps = course.closes.copy()
+        steps[:1] = True
+        z = play(self.p[0], course.temperature[steps])[np.cumsum(steps) - 1]
+        outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, self.p[1])
+
+
+class _WarmUp(Recursion):
+    """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        outcome.added = outcome.added + self.do.fading(course.elapsed, self.p[0], self.p[1])
+
+
+class _Harmonic(Recursion):
+    """Adds amplitude cos(2 pi (T frequency + phase)), phase in turns."""
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        outcome.added = outcome.added + self.do.wave(course.temperature, *self.p[:3])
+
+
+class _Auxiliary(Recursion):
+    """Adds slope (mean - reference), the mean of the channel's last block of which at least half was there."""
+
+    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+        if channel is None:
+            raise ValueError("a term of a channel without its channel")
+        slope, reference = self.p[:2]
+        mean, here = self._means(course, channel)
+        added = self.do.scaled_difference(mean, reference, slope)
+        zero = added.dtype.type(0)
+        outcome.added = outcome.added + np.where(self.do.is_missing(mean), zero, added)
+        outcome.remarks = outcome.remarks | np.where(here, 0, _HELD).astype(np.int32)
+
+    def _means(self, course: Course, channel: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
+        """Mean in force for every correction, and whether its block had enough samples.
+
+        Before the first whole block the first sample stands for the mean. A block counts from the first
+        correction on.
+        """
+        there = ~self.do.is_missing(channel)
+        samples = channel[there]
+        count = np.concatenate([[0], np.cumsum(there)])[course.taken].tolist()
+        mean, here, opened, before = self.do.missing, False, 0, 0
+        means, enough = [], []
+        for k, (until, closes) in enumerate(zip(count, course.closes.tolist(), strict=True)):
+            if before == 0 and until > 0:
+                mean = samples[0]
+            here, before = here or until > opened, until
+            if k > 0 and closes:
+                here = 2 * (until - opened) >= course.samples_per_block
+                mean = self.do.mean(samples[opened:until]) if here else mean
+            if k == 0 or closes:
+                opened = until
+            means.append(mean)
+            enough.append(here)
+        return self.do.array(means), np.array(enough, dtype=np.bool_)
+
+
+_RECURSIONS: dict[TableKind, type[Recursion]] = {
+    TableKind.MEMORY: _Memory,
+    TableKind.PLAY: _Play,
+    TableKind.WARM_UP: _WarmUp,
+    TableKind.HARMONIC: _Harmonic,
+    TableKind.AUXILIARY: _Auxiliary,
+}
+
+
+def recursion_of(kind: TableKind, do: Operations, parameters: Sequence[Any]) -> Recursion:
+    """A term of a kind in an arithmetic."""
+    return _RECURSIONS[kind](do, parameters)

@@ -1,0 +1,65 @@
+"""A cause that the catalogue does not have, in one file as any other: the bias follows the rate of a second node.
+
+    tau dz/dt = T − z,    bias += b dz/dt
+
+On the target it is a memory with the amplitude −60 b/tau.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gyrotc.terms import Features, History, Parameter, Scene, Term
+from gyrotc.terms.base import Array, Values
+from gyrotc.terms.memory import RATES, lagged
+from gyrotc.terms.operators import first_order
+from gyrotc.terms.recursion import TableKind
+from gyrotc.terms.search import Search, geometric
+from gyrotc.terms.tabled import Tabled, memory_gain
+from gyrotc.terms.words import Words
+
+TAU = Parameter("tau_s", "s", 60.0, 8000.0)
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    z = first_order(values["tau_s"], scene.time_s, scene.node_c)
+    return np.asarray(values["slope_dph_min_per_c"] * (scene.node_c - z) * 60.0 / values["tau_s"])
+
+
+def _features(history: History, values: Values) -> Features:
+    memory = lagged(history, values["tau_s"])[1]
+    return Features(memory.columns[:, 1:], memory.known)
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"slope_dph_min_per_c": float(weights[0])}
+
+
+def _record(values: Values, block_s: float) -> list[float]:
+    amplitude = -60.0 * values["slope_dph_min_per_c"] / values["tau_s"]
+    return [memory_gain(block_s, values["tau_s"]), amplitude, 0.0]
+
+
+TERM = Term(
+    id="slow_rate",
+    family="thermal_memory",
+    rank=25,
+    kind="add",
+    equation="tau dz/dt = T - z; bias += slope dz/dt",
+    source="made up",
+    parameters=(
+        TAU,
+        Parameter("slope_dph_min_per_c", "deg/h per C/min", 1e-6, 1e-1, linear=True, signed=True),
+    ),
+    words=Words(
+        name="The bias follows the temperature rate of a second node",
+        short="slow",
+        signature="residual follows the ramp and fades in holds",
+        remedy="one first-order state and a linear term",
+        experiment=RATES,
+    ),
+    search=Search(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True, shown=(900.0,)),
+    table=Tabled(TableKind.MEMORY, _record),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)
