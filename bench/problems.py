@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 from gyrotc.dataset import load
-from gyrotc.fitting import front_end, samples_of
 from gyrotc.simulate import read_truth, simulate
 from gyrotc.train import TrainingData
 from gyrotc.train.data import average
+from gyrotc.train.fitting import front_end, samples_of
 from numpy.typing import NDArray
 
 __all__ = ["AVERAGE_S", "BLOCK_S", "Gyro", "Predictor", "cloud", "gyro", "joined", "means", "ratio"]

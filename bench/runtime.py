@@ -13,16 +13,15 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from gyrotc import vectors
-from gyrotc.emit import emit, emitted_tables
+from gyrotc.emit.files import emit, emitted_tables, vectors
+from gyrotc.emit.files.vectors import make_vectors
 from gyrotc.errors import CheckFailed
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
 from gyrotc.reference import answers, evaluate_map
-from gyrotc.table import Table
-from gyrotc.toolchain import Target, all_targets, compile_objects, compiler_version, symbols
-from gyrotc.vectors import make_vectors
+from gyrotc.reference.table import Table
 from gyrotc.verify.board import Job, board_entries
 from gyrotc.verify.exhaustive import visit_all
+from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compiler_version, symbols
 from numpy.typing import NDArray
 
 __all__ = ["GRIDS", "grid_model", "runtime"]

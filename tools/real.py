@@ -16,11 +16,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from gyrotc.dataset import axes_of, load
-from gyrotc.fitting import front_end, samples_of
 from gyrotc.metrics import average
+from gyrotc.pages.plots import AFTER, BEFORE, svg
 from gyrotc.paper.page import filled
-from gyrotc.plots import AFTER, BEFORE, svg
-from gyrotc.spans import training_spans
+from gyrotc.train.fitting import front_end, samples_of
+from gyrotc.train.spans import training_spans
 from matplotlib.figure import Figure
 
 SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")

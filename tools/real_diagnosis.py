@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from gyrotc.dataset import load
-from gyrotc.fitting import front_end, samples_of
 from gyrotc.paper.page import filled
 from gyrotc.train import TrainingData
+from gyrotc.train.fitting import front_end, samples_of
 from real import with_exam
 
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .estimator import RBFNetworkRegressor
+    from .train.estimator import RBFNetworkRegressor
 
 __all__ = ["RBFNetworkRegressor", "__version__"]
 
@@ -16,6 +16,6 @@ def __getattr__(name: str) -> Any:
     """`RBFNetworkRegressor` on first use: scikit-learn stays optional."""
     if name != "RBFNetworkRegressor":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from .estimator import RBFNetworkRegressor
+    from .train.estimator import RBFNetworkRegressor
 
     return RBFNetworkRegressor

@@ -123,7 +123,7 @@ def c_environment() -> jinja2.Environment:
         )  # jinja2 says which name it is
 
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
+        loader=jinja2.PackageLoader("gyrotc", "emit/templates"),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         autoescape=False,  # that is HTML's; here `finalize` lets nothing through
@@ -159,7 +159,7 @@ def html_environment(**filters: Callable[..., str]) -> jinja2.Environment:
     import jinja2
 
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("gyrotc", "templates"),
+        loader=jinja2.PackageLoader("gyrotc", "pages/templates"),
         undefined=jinja2.StrictUndefined,
         autoescape=True,
         finalize=_only_html,

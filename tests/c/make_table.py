@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import load_model
 
 HERE = Path(__file__).resolve().parent

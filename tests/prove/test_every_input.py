@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from emitted import GOLDEN, emitted
-from gyrotc.emit import emitted_tables
+from gyrotc.emit.files import emitted_tables
 from gyrotc.model import Model, load_model
 from gyrotc.verify.exhaustive import visit_all
 from results import Results

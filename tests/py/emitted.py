@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 from gyrotc.dataset import Dataset, load
-from gyrotc.emit import emit
+from gyrotc.emit.files import emit
 from gyrotc.model import Model, load_model
-from gyrotc.toolchain import Target, all_targets
 from gyrotc.verify import verify
+from gyrotc.verify.toolchain import Target, all_targets
 from recordings import csv_text, toml
 
 #: What the negative controls of this session showed: a record for each program that ran to its end and differed.

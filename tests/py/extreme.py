@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from gyrotc.model import Envelope, Model, Network, Scale
 from gyrotc.reference import maps
-from gyrotc.table import Table, f32_words
+from gyrotc.reference.table import Table, f32_words
 from models import random_model
 from numpy.typing import NDArray
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gyrotc.emit import emitted_tables
+from gyrotc.emit.files import emitted_tables
+from gyrotc.emit.files.vectors import make_vectors
 from gyrotc.model import load_model
 from gyrotc.reference import answers
-from gyrotc.vectors import make_vectors
 from gyrotc.verify.board import Job
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.table import ARRAYS, Table, Words
+from gyrotc.reference.table import ARRAYS, Table, Words
 
 ROOT = Path(__file__).resolve().parents[2]
 _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing-declarations shadow error"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from conftest import ROOT
 from gyrotc.model import Model
-from gyrotc.table import Table, Words
+from gyrotc.reference.table import Table, Words
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 

@@ -9,32 +9,32 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import gyrotc.report as pages
+import gyrotc.pages.report as pages
 import numpy as np
-from gyrotc.changes import Earlier
-from gyrotc.check import check
 from gyrotc.dataset import load
 from gyrotc.diagnose import cache, diagnose
 from gyrotc.diagnose.bank import build
 from gyrotc.diagnose.recordings import records_of
-from gyrotc.diagnosis_page import write_diagnosis_page
-from gyrotc.emission import RECORD, read_options
-from gyrotc.emit import emit
+from gyrotc.emit.files import emit
+from gyrotc.emit.files.record import RECORD, read_options
 from gyrotc.errors import InputError
-from gyrotc.evaluate import evaluate
-from gyrotc.fitting import FitOptions, fit_dataset
-from gyrotc.fleet import load_manifest
 from gyrotc.frontend import run_blocks
-from gyrotc.limits import held_against, load_limits
+from gyrotc.inputs.stored import read_result
+from gyrotc.jobs.fleet import load_manifest
+from gyrotc.judge.changes import Earlier
+from gyrotc.judge.check import check
+from gyrotc.judge.evaluate import evaluate
+from gyrotc.judge.limits import held_against, load_limits
 from gyrotc.metrics import average
 from gyrotc.model import load_model
+from gyrotc.pages.diagnosis_page import write_diagnosis_page
+from gyrotc.pages.plan_page import write_plan_page
 from gyrotc.plan import plan
-from gyrotc.plan_page import write_plan_page
 from gyrotc.quantise import quantise
 from gyrotc.simulate import read as read_scenario
 from gyrotc.simulate import simulate
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.stored import read_result
+from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.verify import verify
 from gyrotc.verify.boardlog import compare
 from gyrotc.verify.logs import log_parts

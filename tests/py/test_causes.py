@@ -10,16 +10,16 @@ from pathlib import Path
 import made_up_cause
 import numpy as np
 import pytest
-from gyrotc.build import build
 from gyrotc.commands.plan_lines import plan_parts
-from gyrotc.fitting import FitOptions
+from gyrotc.jobs.build import build
 from gyrotc.model import load_model
+from gyrotc.pages.plan_page import write_plan
 from gyrotc.plan import plan
-from gyrotc.plan_page import write_plan
 from gyrotc.simulate import simulate
 from gyrotc.terms import CATALOGUE, History, Scene, Term, register, separate_by
 from gyrotc.terms.recursion import Course, Outcome
 from gyrotc.terms.search import Reach
+from gyrotc.train.fitting import FitOptions
 
 PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 MOST_LITERALS = 9

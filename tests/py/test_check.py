@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.check import CheckResult, check, envelope_of
 from gyrotc.errors import InputError
+from gyrotc.judge.check import CheckResult, check, envelope_of
 from recordings import ROWS, RUN, Columns, columns, described, toml, write_csv
 
 

@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from emitted import GOLDEN, emitted, flip
-from gyrotc import vectors
-from gyrotc.emit import Emission, emit, emit_texts, quantise_all, write_texts
+from gyrotc.emit.files import Emission, emit, emit_texts, quantise_all, vectors, write_texts
 from gyrotc.model import Model, load_model
-from gyrotc.table import Table
+from gyrotc.reference.table import Table
 from models import bank_of, random_model, random_terms
 
 SCRIPT = ROOT / "tools" / "check_table.py"

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.dataset import load
-from gyrotc.emit import emit
-from gyrotc.evaluate import evaluate
-from gyrotc.fitting import FitOptions, fit_dataset
+from gyrotc.emit.files import emit
+from gyrotc.judge.evaluate import evaluate
 from gyrotc.model import load_model
 from gyrotc.simulate import simulate
+from gyrotc.train.fitting import FitOptions, fit_dataset
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[3] / "shared/data/real"))
 
@@ -235,7 +235,7 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
 def test_traces_of_files_with_one_stem_do_not_meet() -> None:
     from types import SimpleNamespace
 
-    from gyrotc.evaluate import trace_name
+    from gyrotc.judge.evaluate import trace_name
 
     runs = [
         SimpleNamespace(file=f, from_s=s)

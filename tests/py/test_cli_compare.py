@@ -7,10 +7,10 @@ from pathlib import Path
 
 from conftest import Command
 from gyrotc.dataset import load
-from gyrotc.emit import emit
-from gyrotc.evaluate import evaluate
-from gyrotc.fitting import FitOptions, fit_dataset
+from gyrotc.emit.files import emit
+from gyrotc.judge.evaluate import evaluate
 from gyrotc.simulate import simulate
+from gyrotc.train.fitting import FitOptions, fit_dataset
 
 
 def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: Command) -> None:

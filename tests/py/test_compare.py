@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.compare import CompareOptions, compare
 from gyrotc.dataset import load
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions, fit_dataset, front_end, samples_of
+from gyrotc.jobs.compare import CompareOptions, compare
 from gyrotc.simulate import simulate
 from gyrotc.simulate.truth import simulated_floor
 from gyrotc.train import METHODS, TrainingData, fit, predict
+from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import re
 from typing import Any
 
 import pytest
-from gyrotc.comparison import comparison_picture, comparison_tables, with_published
-from gyrotc.paper.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
+from gyrotc.pages.comparison import comparison_picture, comparison_tables, with_published
+from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from rich.console import Console
 
 

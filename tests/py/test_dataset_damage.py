@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from gyrotc.check import check
 from gyrotc.dataset import load
 from gyrotc.errors import InputError
+from gyrotc.judge.check import check
 from recordings import ACCEPTED
 
 TRIALS = 150

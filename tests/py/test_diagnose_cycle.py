@@ -11,8 +11,8 @@ from gyrotc.diagnose import diagnose
 from gyrotc.diagnose.cycle import cycle_of, is_single_cycle
 from gyrotc.diagnose.recordings import records_of
 from gyrotc.diagnose.records import Records
-from gyrotc.fitting import FitOptions
 from gyrotc.terms.operators import first_order
+from gyrotc.train.fitting import FitOptions
 
 SEED = 20260321
 ROW_S = 5.0

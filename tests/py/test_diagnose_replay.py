@@ -10,13 +10,13 @@ import pytest
 from gyrotc.dataset import Rows, Run, load
 from gyrotc.diagnose import diagnose
 from gyrotc.diagnose.replay import Effect, Played, play_runs, samples
-from gyrotc.fitting import FrontEnd, front_end
 from gyrotc.frontend import missed_before
 from gyrotc.model import Model
 from gyrotc.quantise import quantise
 from gyrotc.reference import evaluate_map
 from gyrotc.simulate import simulate
 from gyrotc.terms import CATALOGUE
+from gyrotc.train.fitting import FrontEnd, front_end
 from gyrotc.verify.replay import history_of
 from numpy.typing import NDArray
 

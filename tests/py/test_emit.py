@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
-from gyrotc.emit import emit, emit_texts, quantise_all
+from gyrotc.emit.files import emit, emit_texts, quantise_all
 from gyrotc.errors import InputError
 from gyrotc.model import Model, load_model
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
-from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import CheckFailed
 from gyrotc.model import Envelope, Model, Network, Scale
 from gyrotc.quantise import NUMERICS, quantise

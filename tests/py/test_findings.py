@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.dataset import Dataset, facts_of, load
-from gyrotc.findings import findings_of
+from gyrotc.judge.findings import findings_of
 from gyrotc.model import Model
 from recordings import Columns, columns, toml, write_csv
 

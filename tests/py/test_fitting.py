@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from gyrotc.dataset import Dataset
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions, fit_dataset
 from gyrotc.train import METHODS, NETWORK_METHODS
+from gyrotc.train.fitting import FitOptions, fit_dataset
 
 
 def empty() -> Dataset:

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions
-from gyrotc.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
+from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
+from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'

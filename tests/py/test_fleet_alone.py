@@ -19,13 +19,13 @@ from typing import Any
 
 import pytest
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions
-from gyrotc.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
-from gyrotc.fleet.fingerprint import inputs_of, program_of
-from gyrotc.fleet.manifest import SUMMARY
-from gyrotc.fleet.unit import Task, do_unit, done_before
-from gyrotc.limits import load_limits
+from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
+from gyrotc.jobs.fleet.fingerprint import inputs_of, program_of
+from gyrotc.jobs.fleet.manifest import SUMMARY
+from gyrotc.jobs.fleet.unit import Task, do_unit, done_before
+from gyrotc.judge.limits import load_limits
 from gyrotc.outputs import MARKER, Lock, faults
+from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -214,7 +214,7 @@ def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:
 def test_recordings_that_change_while_they_are_read_are_refused(
     task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gyrotc.fleet import unit
+    from gyrotc.jobs.fleet import unit
 
     def load(folder: Path, **given: Any) -> Any:
         dataset = whole(folder, **given)

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from conftest import Command
 from emitted import emitted, recorded
-from gyrotc.emit import emit
+from gyrotc.emit.files import emit
 from gyrotc.errors import CheckFailed
-from gyrotc.evaluate import evaluate
+from gyrotc.judge.evaluate import evaluate
 from gyrotc.model import Model, load_model
 from gyrotc.verify import verify
 from gyrotc.verify.source import board_files, checked_sources

@@ -15,18 +15,19 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from conftest import Command
-from gyrotc import inputs, report
+from gyrotc import inputs
 from gyrotc.dataset import load
 from gyrotc.diagnose import cache
 from gyrotc.diagnose.recordings import records_of
 from gyrotc.errors import InputError
-from gyrotc.fleet import load_manifest
 from gyrotc.frontend import run_blocks
-from gyrotc.limits import load_limits
+from gyrotc.inputs.stored import checked_result, read_result
+from gyrotc.jobs.fleet import load_manifest
+from gyrotc.judge.limits import load_limits
 from gyrotc.model import load_model
+from gyrotc.pages import report
 from gyrotc.simulate import read, simulate
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.stored import checked_result, read_result
 from gyrotc.verify.logs import log_parts
 from recordings import columns, csv_text, described, write_csv
 
@@ -229,9 +230,9 @@ def test_results_of_other_types_are_refused_by_field() -> None:
 
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
     program = (
-        "import sys, gyrotc.dataset.load as m, gyrotc.check, gyrotc.cli\n"
+        "import sys, gyrotc.dataset.load as m, gyrotc.judge.check, gyrotc.cli\n"
         "def fail(*a, **k): raise {0}\n"
-        "gyrotc.check.survey = fail\n"
+        "gyrotc.judge.check.survey = fail\n"
         f"sys.argv = ['gyrotc', 'check', {str(tmp_path)!r}]\n"
         "gyrotc.cli.main()\n"
     )

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from conftest import Command
 from gyrotc.errors import InputError
-from gyrotc.limits import AtLeast, AtMost, held_against, load_limits
+from gyrotc.judge.limits import AtLeast, AtMost, held_against, load_limits
 from gyrotc.model import Model
 from recordings import columns, described, write_csv
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from emitted import emitted, ran_and_differed, spoil, with_flags
 from gyrotc.model import load_model
-from gyrotc.toolchain import Target
 from gyrotc.verify.board import Job, board_entries
+from gyrotc.verify.toolchain import Target
 from jobs import job_of
 from models import bank_of, random_model, random_terms
 

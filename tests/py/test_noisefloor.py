@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.noisefloor import allan_variance, noise_terms, sensitivities, stretches
+from gyrotc.train.noisefloor import allan_variance, noise_terms, sensitivities, stretches
 
 SEED = 20260302
 STEP_S = 10.0

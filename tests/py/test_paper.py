@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.errors import InputError
+from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from gyrotc.paper.experiment import METHODS, Experiment, experiment
 from gyrotc.paper.figures import FIGURES, draw
 from gyrotc.paper.page import filled, gyros_table, scatter_table, table_1, times_table
-from gyrotc.paper.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "paper.md"
 

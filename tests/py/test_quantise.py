@@ -13,7 +13,7 @@ from gyrotc.model import Model, load_model
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference import evaluate_map
 from gyrotc.reference.f32 import gauss
-from gyrotc.table import MAGIC, Table
+from gyrotc.reference.table import MAGIC, Table
 from models import random_model
 
 C_TESTS = Path(__file__).resolve().parents[1] / "c"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.build import build
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions
+from gyrotc.jobs.build import build
+from gyrotc.train.fitting import FitOptions
 from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv
 
 

@@ -10,7 +10,7 @@ import pytest
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference import evaluate_map, replay
 from gyrotc.reference.q31 import GAUSS_ERROR, exp2
-from gyrotc.table import f32_words
+from gyrotc.reference.table import f32_words
 from libc_build import runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import Model
 from gyrotc.quantise import NUMERICS
-from gyrotc.table import Table, Words
+from gyrotc.reference.table import Table, Words
 from libc_build import Runtime, runtime
 from libc_device import E_ID, E_IMAGE, E_LAYOUT, Device, history, variant
 from models import random_model

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.model import Model, Term
 from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.table import Words
+from gyrotc.reference.table import Words
 from libc_build import Runtime, runtime
 from libc_device import E_ID, E_IMAGE, SAVE_WORDS, Device, history, variant
 from models import random_history

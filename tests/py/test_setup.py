@@ -79,7 +79,7 @@ def test_what_the_main_job_needs_is_never_left_out(house: Path) -> None:
 
 def test_no_release_stands_in_a_package_name() -> None:
     """libfoo-14-dev is one release's; libeigen3-dev and libc6-dev are names."""
-    files = [ROOT / "tools/setup.sh", *(ROOT / "gen/gyrotc/targets").glob("*.toml")]
+    files = [ROOT / "tools/setup.sh", *(ROOT / "gen/gyrotc/verify/targets").glob("*.toml")]
     numbered = [
         word for path in files for word in re.findall(r"\b[a-z0-9+-]+-\d+(?:-[a-z]+)?\b", path.read_text())
         if re.match(r"lib|gcc-\d|clang-\d|g\+\+-\d", word)

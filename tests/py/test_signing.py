@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, spoil
-from gyrotc.emission import RECORD, SIGNATURE
-from gyrotc.emit import emit
+from gyrotc.emit.files import emit
+from gyrotc.emit.files.record import RECORD, SIGNATURE
 from gyrotc.errors import InputError
 from gyrotc.model import load_model
-from gyrotc.signature import load_private_key, load_public_key
 from gyrotc.verify import verify
+from gyrotc.verify.signature import load_private_key, load_public_key
 
 
 def _openssl(*arguments: object) -> subprocess.CompletedProcess[bytes]:

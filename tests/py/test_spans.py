@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from gyrotc.dataset import Run
-from gyrotc.spans import Span, training_spans
+from gyrotc.train.spans import Span, training_spans
 
 
 @dataclass

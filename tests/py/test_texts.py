@@ -16,22 +16,22 @@ from xml.etree import ElementTree
 import jinja2
 import pytest
 from emitted import recorded
-from gyrotc import report
 from gyrotc.commands import base
 from gyrotc.commands.results import evaluation_table, verify_table
 from gyrotc.dataset import load
 from gyrotc.dataset.problems import Problems
 from gyrotc.dataset.schema import parse_description
-from gyrotc.diagnosis import extended_scenario
-from gyrotc.diagnosis_page import write_diagnosis_page as write_page
-from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import InputError
-from gyrotc.evaluate import evaluate
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.page import write_summary
-from gyrotc.limits import load_limits
+from gyrotc.jobs.diagnosis import extended_scenario
+from gyrotc.jobs.fleet.manifest import load_manifest
+from gyrotc.jobs.fleet.page import write_summary
+from gyrotc.judge.evaluate import evaluate
+from gyrotc.judge.limits import load_limits
 from gyrotc.model import Model, table_id
-from gyrotc.plots import STYLE, svg
+from gyrotc.pages import report
+from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
+from gyrotc.pages.plots import STYLE, svg
 from gyrotc.simulate import scenario
 from gyrotc.simulate.write import dataset_toml
 from gyrotc.texts import (

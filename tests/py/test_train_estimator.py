@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from gyrotc.estimator import RBFNetworkRegressor
+from gyrotc.train.estimator import RBFNetworkRegressor
 from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler

@@ -16,9 +16,9 @@ from emitted import emitted, entries, flip, recorded, spoil
 from gyrotc import verify as package
 from gyrotc.errors import CheckFailed, InputError
 from gyrotc.reference import answers
-from gyrotc.toolchain import Target, all_targets, compile_c, run_program
 from gyrotc.verify import verify
 from gyrotc.verify.boardlog import compare, read_output
+from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 
 FAST = "host-gcc-O2"
 

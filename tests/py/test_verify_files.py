@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, flip, spoil
-from gyrotc.emit import emit
+from gyrotc.emit.files import emit
 from gyrotc.errors import InputError
+from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
-from gyrotc.triad import axes_in, joint_texts, verify_axes
 from gyrotc.verify import verify
 
 Spoil = Callable[[Path], object]

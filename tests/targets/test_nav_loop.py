@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emitted import GOLDEN, emitted
-from gyrotc.emit import quantise_all
+from gyrotc.emit.files import quantise_all
 from gyrotc.model import load_model
 from gyrotc.reference import replay
-from gyrotc.toolchain import all_targets, compile_c, run_program
+from gyrotc.verify.toolchain import all_targets, compile_c, run_program
 from results import Results
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "nav_loop"

@@ -32,7 +32,7 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..fleet import load_manifest, run_fleet, summary_of
+    from ..jobs.fleet import load_manifest, run_fleet, summary_of
 
     wanted = load_manifest(manifest)
     with progress() as say:

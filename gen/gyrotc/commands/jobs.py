@@ -35,7 +35,7 @@ from .diagnosis_lines import diagnosis_lines, extension_lines
 from .results import change_lines, evaluation_table, limit_lines, span_lines, summary, verify_table
 
 if TYPE_CHECKING:
-    from ..build import Built
+    from ..jobs.build import Built
 
 
 @app.command()
@@ -69,8 +69,8 @@ def build(
 
     Example: gyrotc build recordings --out result
     """
-    from ..build import build as run
-    from ..fitting import FitOptions
+    from ..jobs.build import build as run
+    from ..train.fitting import FitOptions
 
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     with progress() as say:
@@ -134,11 +134,11 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
-    from ..applied import applied_of
-    from ..compare import CompareOptions
-    from ..compare import compare as run
-    from ..comparison import comparison_picture, comparison_tables, with_published
     from ..dataset import load
+    from ..jobs.compare import CompareOptions
+    from ..jobs.compare import compare as run
+    from ..pages.comparison import comparison_picture, comparison_tables, with_published
+    from ..quantise.applied import applied_of
 
     options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
     with (
@@ -178,12 +178,12 @@ def diagnose(
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
-    from ..applied import applied_of
     from ..dataset import Dataset, axes_of, load
     from ..diagnose import diagnose as run
-    from ..diagnosis import diagnose_into
-    from ..fitting import FitOptions
+    from ..jobs.diagnosis import diagnose_into
     from ..model import load_model
+    from ..quantise.applied import applied_of
+    from ..train.fitting import FitOptions
 
     known = load_model(model) if model else None
     options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None

@@ -40,8 +40,8 @@ def plan(
 
     Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
     """
+    from ..pages.plan_page import write_plan
     from ..plan import plan as run
-    from ..plan_page import write_plan
 
     with result_folder(out, "plan") if out else nullcontext() as stage, progress() as say:
         result = run(

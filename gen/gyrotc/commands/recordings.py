@@ -69,9 +69,9 @@ def check(
 
     Example: gyrotc check recordings
     """
-    from ..applied import applied_of
-    from ..check import check as run
-    from ..check import envelope_of
+    from ..judge.check import check as run
+    from ..judge.check import envelope_of
+    from ..quantise.applied import applied_of
 
     result = run(
         dataset,

@@ -22,11 +22,11 @@ def sign(
 
     Example: gyrotc sign result --key lab.pem
     """
-    from ..emission import SIGNATURE
+    from ..emit.record import SIGNATURE
+    from ..jobs.axes import axes_in, verify_axes
     from ..outputs import result_folder
-    from ..signature import load_private_key, sign_record
-    from ..triad import axes_in, verify_axes
     from ..verify import verify
+    from ..verify.signature import load_private_key, sign_record
 
     private = load_private_key(key, lambda: _passphrase(key))
     axes = axes_in(folder)

@@ -8,7 +8,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..paper.published import ENVIRONMENTS
+from ..pages.published import ENVIRONMENTS
 
 
 def _e(value: float | None, digits: int = 2) -> str:

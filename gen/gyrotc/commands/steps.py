@@ -56,9 +56,9 @@ def fit(
 
     Example: gyrotc fit recordings --out result
     """
-    from ..applied import applied_of
     from ..dataset import load
-    from ..fitting import FitOptions, fit_dataset
+    from ..quantise.applied import applied_of
+    from ..train.fitting import FitOptions, fit_dataset
 
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     known = applied_of(applied) if applied else None
@@ -154,8 +154,8 @@ def verify(
     Example: gyrotc verify result --target all
     """
     from ..dataset import load
+    from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
-    from ..triad import axes_in, verify_axes
     from ..verify import verify as run
 
     allowed = allow_edited or ()
@@ -212,10 +212,10 @@ def evaluate(
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
-    from ..applied import applied_of
     from ..dataset import load
-    from ..evaluate import evaluate as run
+    from ..judge.evaluate import evaluate as run
     from ..model import load_model
+    from ..quantise.applied import applied_of
 
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
@@ -242,9 +242,9 @@ def report(folder: DirArg) -> None:
 
     Example: gyrotc report result
     """
-    from ..diagnosis_page import is_diagnosis, write_diagnosis_page
-    from ..plan_page import is_plan, write_plan_page
-    from ..report import write_report
+    from ..pages.diagnosis_page import is_diagnosis, write_diagnosis_page
+    from ..pages.plan_page import is_plan, write_plan_page
+    from ..pages.report import write_report
 
     with progress() as say:
         say("drawing")

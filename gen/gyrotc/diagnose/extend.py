@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Dataset
-from ..fitting import FitOptions, front_end
 from ..metrics import Averages
-from ..spans import training_spans
 from ..train import Fit, TrainingData
+from ..train.fitting import FitOptions, front_end
+from ..train.spans import training_spans
 from .attribute import choose
 from .cycle import cycle_of
 from .gain import Gain, floor_of, gain_of

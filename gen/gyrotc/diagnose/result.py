@@ -10,10 +10,10 @@ import numpy as np
 
 from .. import __version__
 from ..dataset import Dataset
-from ..fitting import FitOptions, front_end, model_of, training_of
 from ..model import Model
-from ..spans import training_spans
 from ..terms import CATALOGUE, separate_by
+from ..train.fitting import FitOptions, front_end, model_of, training_of
+from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
 from .catalogue import diagnosed
 from .cycle import Cycle, cycle_of, is_single_cycle

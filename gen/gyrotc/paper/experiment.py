@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import load
-from ..fitting import front_end, samples_of
+from ..pages.published import ENVIRONMENTS, NEURONS
 from ..simulate import simulate
 from ..simulate.campaign import Noise
 from ..simulate.truth import simulated_floor
 from ..train import Fit, TrainingData, fit, predict
 from ..train.data import scaling_of
+from ..train.fitting import front_end, samples_of
 from ..train.ols import fit_ols
 from ..train.result import Outcome, network
-from .published import ENVIRONMENTS, NEURONS
 
 __all__ = ["AVERAGE_S", "METHODS", "Cell", "Experiment", "Group", "experiment"]
 

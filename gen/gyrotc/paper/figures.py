@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots import AFTER, BEFORE, COVERED, STYLE, svg
+from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
+from ..pages.published import ENVIRONMENTS
 from ..simulate.instrument import Record
 from ..simulate.noise import CELL_S
 from .experiment import AVERAGE_S, Cell, Experiment
-from .published import ENVIRONMENTS
 
 __all__ = ["FIGURES", "draw", "draw_run"]
 

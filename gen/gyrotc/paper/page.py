@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 from .experiment import METHODS, Cell, Experiment
-from .published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 
 __all__ = ["filled", "gyros_table", "scatter_table", "table_1", "times_table"]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import CheckFailed, InputError
 from ..model import Model
-from ..table import Numeric, Table
+from ..reference.table import Numeric, Table
 from . import f32, q31
 from .probes import with_probes
 from .words import outside

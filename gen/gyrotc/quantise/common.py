@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ..model import Model
-from ..table import Words
+from ..reference.table import Words
 
 __all__ = ["STEEPEST", "Shared", "coverage_words", "max_slope_c", "shared"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed
 from ..model import Envelope, Model, Network
-from ..table import Table, Words, f32_words
+from ..reference.table import Table, Words, f32_words
 from .bank import Axis, handover_error_dph, regions
 from .common import STEEPEST, max_slope_c, shared
 from .gradient import largest_gradient

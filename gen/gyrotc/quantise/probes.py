@@ -8,7 +8,7 @@ import numpy as np
 
 from ..model import Model
 from ..reference import evaluate_map
-from ..table import Table
+from ..reference.table import Table
 
 __all__ = ["with_probes"]
 

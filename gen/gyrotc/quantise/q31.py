@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import CheckFailed
 from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
-from ..table import Table
+from ..reference.table import Table
 from .bank import Axis, handover_error_dph, regions
 from .common import max_slope_c, shared
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of

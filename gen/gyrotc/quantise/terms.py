@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import CheckFailed
 from ..model import Model, Term
-from ..table import Words, f32_words
+from ..reference.table import Words, f32_words
 from ..terms.recursion import TableKind
 
 __all__ = ["channel_names", "f32_terms", "q31_terms", "term_size_dph"]

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..amalgamate import runtime_folders
-from ..table import ARRAYS, Table
+from ..reference.runtime import runtime_folders
+from ..reference.table import ARRAYS, Table
 from ..terms.recursion import TableKind
 
 __all__ = ["outside"]

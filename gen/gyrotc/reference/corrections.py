@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream
 from ..frontend.numbers import Numbers
-from ..table import Table, Words
 from ..terms.recursion import Outcome
 from .maps import evaluate_map
 from .operations import recursions
+from .table import Table, Words
 
 __all__ = ["arithmetic_of", "corrections", "settings_of"]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import ARRAYS, Table, Words
+from .table import ARRAYS, Table, Words
 
 __all__ = ["ENTRIES", "biases", "cells", "exp2_table", "gauss", "normalise"]
 

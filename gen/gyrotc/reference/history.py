@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frontend import Settings, Steps, Stream, follow
-from ..table import Table, Words
 from .corrections import arithmetic_of, corrections, settings_of
 from .maps import evaluate_map
+from .table import Table, Words
 
 __all__ = ["Replay", "answers", "replay"]
 
@@ -29,7 +29,7 @@ class Calls(Protocol):
 
 
 class Vectors(Protocol):
-    """Inputs of the known-answer test, as `gyrotc.vectors` makes them."""
+    """Inputs of the known-answer test, as `gyrotc.emit.vectors` makes them."""
 
     @property
     def samples_per_block(self) -> int: ...

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import MISSING_Q31, Table, Words
 from . import f32, q31
+from .table import MISSING_Q31, Table, Words
 
 __all__ = ["CLAMPED", "E_ARG", "UNCOVERED", "evaluate_map"]
 

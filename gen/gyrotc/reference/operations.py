@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..table import ARRAYS, MISSING_Q31, Table
 from ..terms.arithmetic import Floating, Operations
 from ..terms.recursion import Recursion, TableKind, recursion_of
 from . import f32, q31
+from .table import ARRAYS, MISSING_Q31, Table
 
 __all__ = ["recursions"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frontend.numbers import divided
-from ..table import ARRAYS, Table, Words
+from .table import ARRAYS, Table, Words
 
 __all__ = [
     "CUT",

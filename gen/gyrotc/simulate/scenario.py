@@ -25,7 +25,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 
-_FOLDER = Path(__file__).parent.parent / "scenarios"
+_FOLDER = Path(__file__).parent / "scenarios"
 _OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..inputs import read_input
-from ..stored import read_result
+from ..inputs.stored import read_result
 
 __all__ = ["FILE", "SCHEMA", "Truth", "read_truth", "simulated_floor"]
 

@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gyrotc.errors import InputError
-from gyrotc.train.bank import fit_bank
-from gyrotc.train.data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
-from gyrotc.train.linear import fit_mlr, fit_poly
-from gyrotc.train.mrbf import fit_mrbf
-from gyrotc.train.noise import floor_dph
-from gyrotc.train.ols import SIZE_RULES, fit_ols
-from gyrotc.train.result import Fit, Outcome, network, predict
-from gyrotc.train.uncertainty import coverage, uncertainty
+from ..errors import InputError
+from .bank import fit_bank
+from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
+from .linear import fit_mlr, fit_poly
+from .mrbf import fit_mrbf
+from .noise import floor_dph
+from .ols import SIZE_RULES, fit_ols
+from .result import Fit, Outcome, network, predict
+from .uncertainty import coverage, uncertainty
 
 __all__ = [
     "METHODS",

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gyrotc.train.data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData
-from gyrotc.train.mrbf import fit_mrbf
-from gyrotc.train.result import Outcome
+from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData
+from .mrbf import fit_mrbf
+from .result import Outcome
 
 __all__ = ["fit_bank"]
 

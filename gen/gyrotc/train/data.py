@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrotc.errors import InputError
+from ..errors import InputError
 
 __all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "scaling_of"]
 

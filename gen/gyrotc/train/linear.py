@@ -7,8 +7,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrotc.train.data import Scaling, TrainingData, average
-from gyrotc.train.result import Outcome, network
+from .data import Scaling, TrainingData, average
+from .result import Outcome, network
 
 __all__ = ["fit_mlr", "fit_poly"]
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrotc import _core
-from gyrotc.train.data import Scaling, TrainingData
-from gyrotc.train.noise import not_white
-from gyrotc.train.process import Process, fit_process
-from gyrotc.train.result import Outcome, network
+from .. import _core
+from .data import Scaling, TrainingData
+from .noise import not_white
+from .process import Process, fit_process
+from .result import Outcome, network
 
 __all__ = ["fit_mrbf"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from gyrotc.train.data import TrainingData, average
+from .data import TrainingData, average
 
 __all__ = ["floor_dph", "not_white"]
 

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrotc import _core
-from gyrotc.errors import InputError
-from gyrotc.train.data import Scaling, TrainingData, average
-from gyrotc.train.noise import floor_dph
-from gyrotc.train.result import Outcome, network
+from .. import _core
+from ..errors import InputError
+from .data import Scaling, TrainingData, average
+from .noise import floor_dph
+from .result import Outcome, network
 
 __all__ = ["SIZE_RULES", "fit_ols"]
 

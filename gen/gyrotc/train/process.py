@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyrotc import _core
-from gyrotc.train.data import Bins, Scaling, TrainingData, average, gather
+from .. import _core
+from .data import Bins, Scaling, TrainingData, average, gather
 
 __all__ = ["Process", "fit_process"]
 

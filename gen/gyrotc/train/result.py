@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyrotc.train.data import Scaling
-from gyrotc.train.process import Process
+from .data import Scaling
+from .process import Process
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict"]
 

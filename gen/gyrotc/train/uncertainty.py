@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from gyrotc.train.data import TrainingData, cleaned
-from gyrotc.train.process import Process, fit_process
-from gyrotc.train.result import Fit, predict
+from .data import TrainingData, cleaned
+from .process import Process, fit_process
+from .result import Fit, predict
 
 __all__ = ["coverage", "uncertainty"]
 

@@ -18,18 +18,18 @@ import numpy as np
 from .. import __version__
 from ..dataset import Dataset
 from ..emit import emit_texts
+from ..emit.vectors import Vectors, make_vectors
 from ..errors import InputError
+from ..inputs.stored import read_result
 from ..model import Model, load_model
 from ..reference import answers
-from ..signature import check_signature, load_public_key
-from ..stored import read_result
-from ..toolchain import Target, all_targets
-from ..vectors import Vectors, make_vectors
 from .board import Job, board_entries
 from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
 from .logs import log_entries
 from .recordings import replay_dataset
+from .signature import check_signature, load_public_key
+from .toolchain import Target, all_targets
 
 __all__ = ["file_entries", "verify"]
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed
 from ..model import Model
-from ..table import Table
-from ..toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
+from ..reference.table import Table
 from .boardlog import BoardOutput, compare, read_output
 from .source import board_files, checked_sources
+from .toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
 
 __all__ = ["Job", "board_entries", "check_identity"]
 

@@ -13,8 +13,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..emission import BESIDES, Options, read_options
 from ..emit import Emission, quantise_all
+from ..emit.record import BESIDES, Options, read_options
 from ..errors import CheckFailed, InputError
 from ..model import Model
 

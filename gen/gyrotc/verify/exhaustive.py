@@ -18,13 +18,13 @@ from pathlib import Path
 from subprocess import DEVNULL, PIPE
 from typing import Any
 
-from ..confined import confined
 from ..errors import CheckFailed, GyrotcError
 from ..model import Model
 from ..reference.q31 import exp2_table
-from ..table import Table
-from ..toolchain import Target, all_targets, compile_objects, link
+from ..reference.table import Table
+from .confined import confined
 from .source import checked_sources, table_files
+from .toolchain import Target, all_targets, compile_objects, link
 
 __all__ = ["Visited", "visit_all"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..model import Model
-from ..table import Table
+from ..reference.table import Table
 from ..texts import c_environment
-from ..toolchain import Target, all_targets, compile_objects, link, symbols
 from .source import checked_sources, table_files
+from .toolchain import Target, all_targets, compile_objects, link, symbols
 
 __all__ = ["Footprint", "footprint"]
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..emit.vectors import Vectors
 from ..errors import CheckFailed
 from ..inputs import read_input
 from ..reference import answers
-from ..vectors import Vectors
 from .board import Job, check_identity
 from .boardlog import BoardLog, BoardOutput, Comparison, compare, read_log
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from ..dataset import Dataset
 from ..errors import CheckFailed
-from ..table import Table
-from ..toolchain import Target
+from ..reference.table import Table
 from .board import Job
 from .replay import History, history_of, replay_on, replay_program
+from .toolchain import Target
 
 __all__ = ["replay_dataset"]
 

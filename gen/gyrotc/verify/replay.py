@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..applied import channels_of
 from ..dataset import Rows, Run
 from ..errors import CheckFailed, InputError
 from ..frontend import blocks_since_power_on, missed_before, samples_per_block
 from ..model import Model
+from ..quantise.applied import channels_of
 from ..reference import Replay, replay
-from ..table import Table, Words
+from ..reference.table import Table, Words
 from ..texts import c_environment
-from ..toolchain import Target, compile_c, run_program
 from .source import checked_sources, table_files
+from .toolchain import Target, compile_c, run_program
 
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
 

@@ -11,10 +11,11 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..amalgamate import amalgamate, runtime_folders
 from ..emit import board_test_text
+from ..emit.amalgamate import amalgamate
 from ..errors import CheckFailed
 from ..model import SERIAL, Model
+from ..reference.runtime import runtime_folders
 from ..texts import C_COMMENT, C_INITIALISER
 
 __all__ = ["board_files", "checked_sources", "table_files"]

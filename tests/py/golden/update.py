@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from gyrotc.emit import emit_texts, quantise_all
+from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import load_model
 
 GOLDEN = Path(__file__).resolve().parent

@@ -1,0 +1,23 @@
+"""From quantised tables to C: text of tables, runtime, image, known answers, board test, example."""
+
+from .files import (
+    Emission,
+    answers_text,
+    board_test_text,
+    emit,
+    emit_texts,
+    emitted_tables,
+    quantise_all,
+    write_texts,
+)
+
+__all__ = [
+    "Emission",
+    "answers_text",
+    "board_test_text",
+    "emit",
+    "emit_texts",
+    "emitted_tables",
+    "quantise_all",
+    "write_texts",
+]

@@ -1,0 +1,90 @@
+"""The runtime as one header and one source, made from `include/` and `libc/`.
+
+Includes of the runtime's own files are expanded; the algorithm's text is expanded once for each
+arithmetic, and the names that an arithmetic defines for it are undefined behind it.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+__all__ = ["amalgamate"]
+
+_HEADERS = ("gtc_config.h", "gtc_table.h", "gtc.h")
+_ARITHMETICS = ("f32", "q31")
+_INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
+_DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
+_LICENCE = " * SPDX-License-Identifier: MIT"
+
+
+@functools.cache
+def amalgamate(include_dir: Path, libc_dir: Path, *, bank: bool = False) -> tuple[str, str]:
+    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
+
+    Args:
+        include_dir, libc_dir: As `reference.runtime.runtime_folders` gives them.
+        bank: Banks of networks are compiled in by default (GTC_WITH_BANK 1).
+    """
+    header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
+    if bank:
+        header = header.replace("#define GTC_WITH_BANK 0", "#define GTC_WITH_BANK 1")
+    common = sorted(p for p in libc_dir.glob("gtc_*.c") if not _arithmetic(p.name))
+    parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
+    seen: set[str] = set()
+    parts += ["".join(_expanded(p, libc_dir, seen)) for p in common]
+    for arithmetic in _ARITHMETICS:
+        sources = sorted(p for p in libc_dir.glob("gtc_*.c") if _arithmetic(p.name) == arithmetic)
+        group = set(seen)
+        text = "".join("".join(_expanded(p, libc_dir, group)) for p in sources)
+        parts.append(text + _undefined(text))
+    return _one_licence(header), _one_licence("\n".join(p for p in parts if p))
+
+
+def _banner() -> str:
+    return (
+        "/* gtc.c - the gyrotc runtime in one file; gtc.h is its manual.\n"
+        " *\n"
+        " * Made from the files of libc/ by gyrotc; do not edit. Compile it as C99; float32 needs\n"
+        " * -std=c99 -ffp-contract=off, and -ffunction-sections -fdata-sections with --gc-sections leave\n"
+        " * only what is used.\n"
+        " *\n"
+        f"{_LICENCE}\n"
+        " */\n"
+    )
+
+
+def _arithmetic(name: str) -> str | None:
+    return next((a for a in _ARITHMETICS if name.startswith(f"gtc_{a}_")), None)
+
+
+def _without_includes(path: Path) -> str:
+    lines = path.read_text(encoding="ascii").splitlines()
+    return "\n".join(line for line in lines if not _INCLUDE.match(line)) + "\n"
+
+
+def _expanded(path: Path, libc_dir: Path, seen: set[str]) -> Iterator[str]:
+    """Lines of a file, its own includes expanded where they first occur."""
+    for line in path.read_text(encoding="ascii").splitlines():
+        match = _INCLUDE.match(line)
+        if match is None:
+            if line != "#include <stddef.h>":
+                yield line + "\n"
+        elif match["name"] != "gtc.h" and match["name"] not in seen:
+            seen.add(match["name"])
+            yield from _expanded(libc_dir / match["name"], libc_dir, seen)
+
+
+def _undefined(text: str) -> str:
+    """#undef of every macro that a group defines, but not of include guards and options."""
+    names = [m["name"] for line in text.splitlines() if (m := _DEFINE.match(line))]
+    own = dict.fromkeys(n for n in names if not n.startswith("GTC_"))
+    return "".join(f"#undef {name}\n" for name in own)
+
+
+def _one_licence(text: str) -> str:
+    """The licence's line once, at the top."""
+    first, mark, rest = text.partition(_LICENCE)
+    return first + mark + rest.replace(f" *\n{_LICENCE}\n", "")

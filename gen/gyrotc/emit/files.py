@@ -1,0 +1,259 @@
+"""Write the C files of a model: tables, runtime, image, vectors, board test, example.
+
+Stage 6 of the house (… → tables → **C** → proof → report). A pure function of the model: no date,
+no path, no host, no version, so one model gives the same bytes on every machine. All arithmetic was
+done in `quantise`; here integers are printed.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal, localcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CheckFailed, InputError
+from ..model import Model
+from ..outputs import result_folder
+from ..quantise import NUMERICS, Table, quantise
+from ..reference import answers
+from ..reference.runtime import runtime_folders
+from ..reference.table import LAYOUT
+from ..texts import c_environment
+from .amalgamate import amalgamate
+from .record import RECORD, Options, read_options, record_text
+from .table_text import table_text
+from .vectors import MISSING, make_vectors
+
+__all__ = [
+    "Emission",
+    "answers_text",
+    "board_test_text",
+    "emit",
+    "emit_texts",
+    "emitted_tables",
+    "quantise_all",
+    "write_texts",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What was written: the tables by arithmetic, and the arithmetics that `quantise` refused, with why."""
+
+    tables: dict[str, Table]
+    refused: dict[str, str]
+
+
+def quantise_all(model: Model, numerics: Sequence[str] | None) -> Emission:
+    """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
+
+    Raises:
+        InputError: An unknown arithmetic, or a method that has no table.
+        CheckFailed: An arithmetic asked for by name is refused, or none remains.
+    """
+    if model.method in ("mlr", "poly"):
+        raise InputError(
+            "model.json, field method", f"{model.method!r} is for comparison only", "a network (mrbf, ...)"
+        )
+    unknown = sorted(set(numerics or ()) - set(NUMERICS))
+    if unknown:
+        raise InputError("--numeric", repr(unknown[0]), " or ".join(NUMERICS))
+    tables: dict[str, Table] = {}
+    refused: dict[str, str] = {}
+    for numeric in NUMERICS if numerics is None else tuple(dict.fromkeys(numerics)):
+        try:
+            tables[numeric] = quantise(model, numeric)
+        except CheckFailed as error:
+            if numerics is not None:
+                raise
+            refused[numeric] = str(error)
+    if not tables:
+        raise CheckFailed("; ".join(refused.values()))
+    return Emission(tables, refused)
+
+
+def emit(
+    model: Model, out: Path, *, numerics: Sequence[str] | None = None, zero_at: float | None = None
+) -> Emission:
+    """Writes `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced."""
+    emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics)
+    texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at)
+    write_texts(out, texts, model)
+    return emission
+
+
+def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
+    """The tables that an emitted folder must hold: made again from the model, with the same options.
+
+    Raises:
+        InputError: There is no emitted code, or its record is damaged.
+    """
+    options = read_options(folder)
+    return quantise_all(options.shifted(model), options.numeric).tables
+
+
+def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
+    """Puts a folder with exactly these files in place of `out/c`.
+
+    Raises:
+        InputError: Something in `out/c` was not written by gyrotc, or was changed since.
+    """
+    with result_folder(out, "emit", entries=("c",)) as stage:
+        stage.of(model.serial, model.axis)
+        (stage.folder / "c").mkdir()
+        for name, data in texts.items():
+            (stage.folder / "c" / name).write_bytes(data)
+
+
+def emit_texts(
+    model: Model,
+    emission: Emission,
+    *,
+    asked: bool = False,
+    zero_at: float | None = None,
+    expected: Mapping[str, NDArray[np.uint32]] | None = None,
+) -> dict[str, bytes]:
+    """All files of `c/` by name.
+
+    Args:
+        model: The model, before `zero_at` shifts it.
+        emission: Its tables.
+        asked: The arithmetics were asked for by name.
+        zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+        expected: Answers of the tables to the vectors, each (status, bits), shape (n, 2), where they are known already.
+    """
+    numerics = tuple(emission.tables)
+    options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
+    vectors = make_vectors(model, numerics)
+    first = next(iter(emission.tables.values()))
+    values: dict[str, Any] = {
+        "id": model.id,
+        "symbol": model.symbol,
+        "serial": model.serial,
+        "axis": model.axis,
+        "model_hash": model.hash,
+        "options": options.text,
+        "layout": LAYOUT,
+        "numerics": numerics,
+        "v": vectors,
+        "n": numerics[0],
+        "n_channels": vectors.n_channels,
+        "id_code": first.id,
+        "tables": [table_text(t, model) for t in emission.tables.values()],
+        "facts": list(_facts(model)),
+        "valid": _valid(model),
+        "block_s": f"{model.block_s:g}",
+        "sizes": list(_sizes(emission)),
+        "warnings": list(model.warnings),
+        **_example_values(model),
+    }
+    named = {
+        f"gtc_{model.id}.h": "table.h.j2",
+        f"gtc_{model.id}.c": "table.c.j2",
+        f"vectors_{model.id}.h": "vectors.h.j2",
+        "main.c": "main.c.j2",
+    }
+    texts = {
+        name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
+    }
+    header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
+    texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
+    for numeric, table in emission.tables.items():
+        suffix = "" if numeric == numerics[0] else f"_{numeric}"
+        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
+    if expected is None:
+        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
+    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
+    texts[RECORD] = record_text(model, options, texts)
+    return texts
+
+
+def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
+    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
+    template = c_environment().get_template("board_test.c.j2")
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
+    )
+    return text.encode("ascii")
+
+
+def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
+    """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
+    parts = [
+        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows)
+        for numeric, rows in expected.items()
+    ]
+    return b"".join(parts)
+
+
+def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
+    """Two words a line, in eight hex digits each."""
+    digits = np.frombuffer(rows.astype(">u4").tobytes().hex().encode("ascii"), dtype=np.uint8).reshape(-1, 16)
+    lines = np.full((len(rows), 18), ord(" "), dtype=np.uint8)
+    lines[:, :8], lines[:, 9:17], lines[:, 17] = digits[:, :8], digits[:, 8:], ord("\n")
+    return lines.tobytes()
+
+
+def _facts(model: Model) -> Iterator[str]:
+    """Calibration date and meta, one line each; the template makes them safe."""
+    for key, value in sorted(model.meta.items()):
+        if key in ("warnings", "environments") or isinstance(value, (dict, list)):
+            continue
+        text = " ".join(str(value).split())
+        yield f"{key[:24] + ':':<12} {text[:120]}"
+
+
+def _valid(model: Model) -> str:
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    return f"{t0:.2f} ... {t1:.2f} C, {r0:.3f} ... {r1:.3f} C/min"
+
+
+def _sizes(emission: Emission) -> Iterator[str]:
+    for numeric, table in emission.tables.items():
+        yield (
+            f"{numeric + ':':<12} {table.table_bytes} bytes of table; "
+            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
+        )
+
+
+def _upwards(bound: float) -> str:
+    """A bound with three digits, never below itself."""
+    with localcontext() as context:
+        context.rounding = ROUND_CEILING
+        return f"{float(f'{Decimal(bound):.2e}'):.2e}"
+
+
+def _example_values(model: Model) -> dict[str, Any]:
+    middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
+    per_second = 100 if abs(model.block_s * 100 - round(model.block_s * 100)) < 1e-9 else 1
+    return {
+        "first_temperature": middle,
+        "first_temperature_q16": round(middle * 65536),
+        "samples_per_second": per_second,
+        "samples_per_block": max(1, round(model.block_s * per_second)),
+    }
+
+
+def _image(table: Table) -> bytes:
+    return struct.pack(f"<{len(table.words)}I", *table.words)
+
+
+def _intel_hex(data: bytes) -> str:
+    def record(kind: int, address: int, payload: bytes) -> str:
+        body = bytes([len(payload), address >> 8 & 255, address & 255, kind]) + payload
+        return ":" + (body + bytes([-sum(body) & 255])).hex().upper() + "\n"
+
+    lines = []
+    for start in range(0, len(data), 16):
+        if start and start % 65536 == 0:
+            lines.append(record(4, 0, struct.pack(">H", start >> 16)))
+        lines.append(record(0, start & 0xFFFF, data[start : start + 16]))
+    return "".join(lines) + record(1, 0, b"")

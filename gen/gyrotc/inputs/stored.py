@@ -1,0 +1,223 @@
+"""JSON that one command wrote and another reads back: the fields that are used, and their types.
+
+Files lie on disks and pass through hands; what is not as it was written is refused by field, not met half-way
+through a page. Fields that nothing reads are let through.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..errors import InputError
+from . import checked, read_json
+
+__all__ = ["KINDS", "Kind", "checked_result", "read_result"]
+
+Figure = Annotated[float, Field(ge=-1e300, le=1e300)] | None
+Count = Annotated[int, Field(ge=0)]
+Texts = dict[str, str]
+
+
+class _Stored(BaseModel):
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+
+
+class _Statistics(_Stored):
+    rms_dph: Figure
+    std_dph: Figure
+    mean_dph: Figure
+    max_abs_dph: Figure
+
+
+class _After(_Statistics):
+    angle_1h_arcsec: Figure
+
+
+class _Run(_Stored):
+    file: str
+    role: Literal["train", "exam"]
+    environment: str | None = None
+    from_s: Figure = None
+    samples: Count
+    before: _Statistics
+    after: _After
+
+
+class _Pooled(_Stored):
+    samples: Count
+    before: _Statistics
+    after: _Statistics
+    improvement: Figure
+
+
+class _Finding(_Stored):
+    id: str
+    text: str
+
+
+class _Sizes(_Stored):
+    centers: Count
+    table_bytes: Count
+    rom_bytes: Count | None = None
+    ram_bytes: Count | None = None
+    sum_abs_weights_dph: float
+
+
+class _Evaluation(_Stored):
+    average_s: Annotated[float, Field(gt=0.0, le=1e9)]
+    noise_floor_dph: Annotated[float, Field(ge=0.0, le=1e300)] | None
+    noise_floor_source: str | None
+    mismatches: Count | None
+    runs: list[_Run]
+    train: _Pooled | None
+    exam: _Pooled | None
+    left_out: _Pooled | None = None
+    findings: list[_Finding]
+    model: _Sizes
+
+
+class _AllanPoint(_Stored):
+    tau_s: Annotated[float, Field(gt=0.0, le=1e12)]
+    deviation_dph: Annotated[float, Field(ge=0.0, le=1e12)]
+    freedom: Annotated[float, Field(gt=0.0, le=1e12)]
+
+
+class _Noise(_Stored):
+    quantisation_arcsec: Figure
+    arw_deg_per_sqrt_h: Figure
+    bias_instability_dph: Figure
+    rate_random_walk_dph_per_sqrt_h: Figure
+    allan: list[_AllanPoint]
+
+
+class _Training(_Stored):
+    predicted_rms_ratio: Figure = None
+    prediction_withheld: str | None = None
+    noise_floor_dph: Figure
+    left_out: _Pooled | None = None
+    left_out_spans: list[_Pooled | None] = []
+    noise: _Noise
+    sensitivity: dict[str, Figure]
+    curves: dict[str, Any]
+
+
+class _Target(_Stored):
+    name: str
+    numeric: str
+    status: Literal["pass", "fail", "missing"]
+
+
+class _Emitted(_Stored):
+    file: str
+    status: Literal["pass", "fail"]
+    mismatches: Count
+
+
+class _ErrorOf(_Stored):
+    numeric: str
+    bound_dph: float
+    worst_dph: float
+    inputs_visited: Count
+
+
+class _Verification(_Stored):
+    passed: Count
+    failed: Count
+    targets: list[_Target]
+    emitted: list[_Emitted]
+    errors: list[_ErrorOf]
+
+
+class _Manifest(_Stored):
+    gyrotc_version: str
+    versions: Texts
+    refused: Texts
+    files: Texts
+
+
+class _Limit(_Stored):
+    limit: str
+    met: bool
+    bound: Any
+    measured: Any
+
+
+class _Limits(_Stored):
+    product: str
+    met: bool
+    limits: list[_Limit]
+
+
+class _Changes(_Stored):
+    same_model: bool
+    map: dict[str, Any] | None
+    figures: dict[str, Any]
+    versions: dict[str, dict[str, str | None]]
+    recordings: dict[str, list[str]]
+    findings: dict[str, list[str]]
+    files: dict[str, list[str]]
+
+
+class _TrueRun(_Stored):
+    file: str
+    noise: str
+    noise_step_s: Annotated[float, Field(ge=1e-6, le=1e6)]
+
+
+class _Truth(_Stored):
+    runs: list[_TrueRun]
+
+
+class _Diagnosis(_Stored):
+    verdict: str
+    text: str
+    causes: list[dict[str, Any]]
+    considered: list[dict[str, Any]]
+    extended: dict[str, Any] | None
+    pictures: list[str] = []
+
+
+class _Plan(_Stored):
+    runs: list[dict[str, Any]]
+    limits: list[dict[str, Any]]
+
+
+Kind = Literal["evaluate", "training", "verify", "manifest", "limits", "changes", "truth", "diagnose", "plan"]
+
+KINDS: dict[Kind, tuple[type[BaseModel], str | None]] = {
+    "evaluate": (_Evaluation, "gyrotc.evaluate/1"),
+    "training": (_Training, "gyrotc.fit/1"),
+    "verify": (_Verification, "gyrotc.verify/1"),
+    "manifest": (_Manifest, "gyrotc.manifest/1"),
+    "limits": (_Limits, "gyrotc.limits/1"),
+    "changes": (_Changes, "gyrotc.changes/1"),
+    "truth": (_Truth, "gyrotc.truth/1"),
+    "diagnose": (_Diagnosis, "gyrotc.diagnose/1"),
+    "plan": (_Plan, "gyrotc.plan/1"),
+}
+"""Fields and schema of every kind."""
+
+
+def read_result(path: Path, kind: Kind, *, optional: bool = False) -> dict[str, Any]:
+    """A JSON object that a command wrote; {} for an optional one that is absent.
+
+    Raises:
+        InputError: It is missing, is no JSON, has another schema, or a field that is used is wrong.
+    """
+    if optional and not path.exists() and not path.is_symlink():
+        return {}
+    return checked_result(read_json(path, f"what gyrotc wrote as {path.name}"), kind, str(path))
+
+
+def checked_result(content: Any, kind: Kind, where: str) -> dict[str, Any]:
+    """The object itself, looked through. Raises as `read_result`."""
+    fields, schema = KINDS[kind]
+    if not isinstance(content, dict):
+        raise InputError(where, "is not a JSON object", f"what gyrotc wrote ({schema})")
+    if content.get("schema") != schema:
+        raise InputError(f"{where}, field schema", repr(content.get("schema"))[:60], repr(schema))
+    checked(fields, content, where)
+    return content

@@ -1,0 +1,1 @@
+"""Whole jobs over the stages of the house: build, fleet, compare, diagnose into a folder."""

@@ -1,0 +1,127 @@
+"""Three axes of one unit in one image: the runtime once, a table for each axis, one page for all."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..emit import emitted_tables
+from ..emit.record import RECORD, joint_record_text
+from ..errors import CheckFailed, InputError
+from ..inputs.stored import read_result
+from ..model import Model, load_model
+from ..outputs import write_atomically
+from ..pages.report import page_environment
+from ..texts import c_environment
+from ..verify import file_entries
+from ..verify.signature import check_signature, load_public_key
+from ..verify.toolchain import all_targets, compile_c, run_program
+
+__all__ = ["axes_in", "join_axes", "joint_texts", "verify_axes"]
+
+AXES = ("x", "y", "z")
+
+_HOST = "host-gcc-O2"
+
+
+def join_axes(folder: Path, axes: Sequence[str]) -> None:
+    """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
+
+    Proves that all tables link and pass their self-tests in one image.
+
+    Raises:
+        CheckFailed: The image does not link, or a table does not pass its self-test in it.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in axes}
+    numerics = list(emitted_tables(folder / axes[0] / "c", models[axes[0]]))
+    c = folder / "c"
+    c.mkdir()
+    for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
+        (c / name).write_bytes(data)
+    _run_together(c, [m.id for m in models.values()])
+    results = [read_result(folder / axis / "evaluate.json", "evaluate") for axis in axes]
+    text = (
+        page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
+    )
+    write_atomically(folder / "report.html", text)
+
+
+def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Files of every axis's own `c/` by name."""
+    return {
+        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()}
+        for axis in axes
+    }
+
+
+def joint_texts(
+    models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]], numeric: str
+) -> dict[str, bytes]:
+    """All files of the `c/` of a unit by name.
+
+    Args:
+        models: Models by axis.
+        sources: Files of each axis's own `c/` by name.
+        numeric: The arithmetic that `main.c` uses.
+    """
+    runtime = next(
+        (a for a, m in models.items() if len(m.networks) > 1), next(iter(models))
+    )  # with banks for all
+    texts = {name: sources[runtime][name] for name in ("gtc.h", "gtc.c") if name in sources[runtime]}
+    for axis, model in models.items():
+        own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
+        texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
+    main = c_environment().get_template("main_axes.c.j2").render(models=list(models.values()), n=numeric)
+    texts["main.c"] = main.encode("ascii")
+    texts[RECORD] = joint_record_text(models, texts)
+    return texts
+
+
+def axes_in(folder: Path) -> tuple[str, ...]:
+    """Axes of a result that `--axis all` made; none where the folder has a model of its own."""
+    if (folder / "model.json").is_file():
+        return ()
+    return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())
+
+
+def verify_axes(
+    folder: Path,
+    results: Mapping[str, dict[str, Any]],
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
+) -> dict[str, Any]:
+    """The JSON object of `gyrotc verify` for a unit: its axes' results, and the files that stand in `folder/c`.
+
+    These must be those of the axes' own folders, which `results` judges.
+
+    Raises:
+        InputError: There is no emitted folder, or a model cannot be read.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in results}
+    if not (folder / "c").is_dir():
+        raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
+    numeric = next(iter(results.values()))["errors"][0]["numeric"]
+    emitted = file_entries(
+        folder / "c", joint_texts(models, _sources(folder, tuple(results)), numeric), edited
+    )
+    counts = {k: sum(r[k] for r in results.values()) for k in ("passed", "failed", "missing")}
+    counts["failed"] += sum(e["status"] == "fail" for e in emitted)
+    first = next(iter(results.values()))
+    head = {k: first[k] for k in ("schema", "gyrotc_version", "serial")} | {"axis": None}
+    signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
+    counts["failed"] += signed is not None and signed["status"] == "fail"
+    return head | counts | {"emitted": emitted, "signature": signed, "axes": dict(results)}
+
+
+def _run_together(c: Path, ids: Sequence[str]) -> None:
+    target = all_targets()[_HOST]
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+        program = Path(work) / "main"
+        compile_c(
+            target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c
+        )
+        done = run_program(target, program)
+    if done.returncode != 0:
+        raise CheckFailed(f"the image of all axes ended with status {done.returncode}")

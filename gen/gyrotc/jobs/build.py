@@ -1,0 +1,222 @@
+"""The main job: fit, emit, verify, evaluate, report, all into one folder that appears whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..dataset import Dataset, axes_of, load
+from ..emit import emit
+from ..errors import InputError
+from ..judge.changes import changes_since, load_earlier
+from ..judge.evaluate import evaluate
+from ..judge.limits import Limits, held_against, load_limits
+from ..model import Model
+from ..outputs import MARKER, result_folder, sha256, write_atomically
+from ..pages.report import write_report
+from ..quantise.applied import applied_of
+from ..train.fitting import FitOptions, Fitted, fit_dataset
+from ..verify import verify
+from .axes import join_axes
+
+__all__ = ["Built", "build", "build_into"]
+
+Progress = Callable[[str], None]
+_VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What `build` made: the JSON objects of its stages, the arithmetics that were refused (with the reason), and the
+    checks that failed (none: exit 0); with `extend` what was diagnosed, with `limits` and `previous` the objects of
+    `limits.json` and `changes.json`.
+    """
+
+    training: dict[str, Any]
+    evaluation: dict[str, Any]
+    verification: dict[str, Any]
+    refused: dict[str, str]
+    failures: tuple[str, ...]
+    diagnosis: dict[str, Any] | None = None
+    limits: dict[str, Any] | None = None
+    changes: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What is asked for besides the options of `fit`."""
+
+    numerics: Sequence[str] | None
+    extend: bool
+    limits: Limits | None
+    previous: Path | None
+
+
+def build(
+    source: Path,
+    out: Path,
+    options: FitOptions,
+    *,
+    axis: str | None = None,
+    numerics: Sequence[str] | None = None,
+    applied: Path | None = None,
+    extend: bool = False,
+    limits: Path | None = None,
+    previous: Path | None = None,
+    any_serial: bool = False,
+    progress: Progress | None = None,
+) -> list[Built]:
+    """Recordings in, verified C and a report out; one result for each axis.
+
+    `out` is replaced as a whole at the end; until then an older one stays as it was.
+
+    Args:
+        axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
+            `out/c` the runtime once with all tables.
+        applied: Model that was subtracted while recording.
+        extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
+        limits: A limits file that the result is held against.
+        previous: An earlier result of the same gyro, to say what changed.
+        any_serial: An earlier result in `out` may be of another gyro.
+
+    Raises:
+        InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
+        CheckFailed: Every arithmetic is refused; `out` is untouched.
+    """
+    say = progress or (lambda _: None)
+    say("reading")
+    known = applied_of(applied) if applied else None
+    order = _Order(numerics, extend, load_limits(limits) if limits else None, previous)
+    axes = axes_of(source) if axis == "all" else ()
+    if axis == "all" and not axes:
+        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    with result_folder(out, "build", inputs=[source]) as stage:
+        if not axes:
+            dataset = load(source, axis=axis, applied=known)
+            stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
+            return [_build_axis(dataset, stage.folder, options, order, say)]
+        built = []
+        for name in axes:
+            dataset = load(source, axis=name, applied=known)
+            stage.of(dataset.serial, any_serial=any_serial)
+            with result_folder(stage.folder / name, "build") as part:
+                part.of(dataset.serial, name)
+                built.append(_build_axis(dataset, part.folder, options, order, _of_axis(name, say)))
+        join_axes(stage.folder, axes)
+        return built
+
+
+def build_into(
+    work: Path,
+    dataset: Dataset,
+    options: FitOptions,
+    *,
+    numerics: Sequence[str] | None = None,
+    limits: Limits | None = None,
+) -> Built:
+    """The main job for one axis, into a folder that is there; the caller sees to it that it appears whole.
+
+    Raises:
+        CheckFailed: Every arithmetic is refused.
+    """
+    return _build_axis(dataset, work, options, _Order(numerics, False, limits, None), lambda _: None)
+
+
+def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
+    earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
+    fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
+    fitted = fitted or fit_dataset(dataset, options, progress=say)
+    fitted.model.save(work / "model.json")
+    _write(work / "training.json", fitted.training)
+    say("emitting C")
+    emission = emit(fitted.model, work, numerics=order.numerics)
+    verification = verify(work, progress=lambda name: say(f"verifying {name}"))
+    _write(work / "verify.json", verification)
+    evaluation = evaluate(
+        work,
+        dataset,
+        average_s=options.average_s,
+        trace=work / "trace",
+        training=fitted.training,
+        progress=lambda file: say(f"replaying {file}"),
+    )
+    _write(work / "evaluate.json", evaluation)
+    held = held_against(order.limits, fitted.model, evaluation, verification) if order.limits else None
+    if held:
+        _write(work / "limits.json", held)
+    manifest = _manifest(work, dataset, fitted.model, emission.refused)
+    _write(work / "manifest.json", manifest)
+    changes = changes_since(earlier, fitted.model, evaluation, manifest) if earlier else None
+    if changes:
+        _write(work / "changes.json", changes)
+    say("drawing the report")
+    write_report(work)
+    return Built(
+        fitted.training,
+        evaluation,
+        verification,
+        emission.refused,
+        tuple(_failures(evaluation, verification, held)),
+        diagnosis,
+        held,
+        changes,
+    )
+
+
+def _extended(
+    dataset: Dataset, work: Path, options: FitOptions, say: Progress
+) -> tuple[Fitted | None, dict[str, Any]]:
+    """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
+    from .diagnosis import diagnose_into
+
+    found = diagnose_into(work / "diagnosis", dataset, options=options, progress=say)
+    if found.model is None or found.training is None:
+        return None, found.result
+    return Fitted(found.model, found.training), found.result
+
+
+def _of_axis(axis: str, say: Progress) -> Progress:
+    return lambda text: say(f"{axis}: {text}")
+
+
+def _failures(
+    evaluation: dict[str, Any], verification: dict[str, Any], held: dict[str, Any] | None
+) -> Iterator[str]:
+    for entry in verification["targets"]:
+        if entry["status"] == "fail":
+            reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
+            yield f"{entry['name']} {entry['numeric']}: {reason}"
+    for file in verification["emitted"]:
+        if file["status"] == "fail":
+            yield f"{file['file']}: {file['verdict']}"
+    if evaluation["mismatches"]:
+        yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
+    for check in held["limits"] if held else ():
+        if not check["met"]:
+            yield f"limit {check['limit']} = {check['bound']} is not met: {check['measured']}"
+
+
+def _write(path: Path, result: dict[str, Any]) -> None:
+    write_atomically(path, json.dumps(result, indent=1, allow_nan=False) + "\n")
+
+
+def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> dict[str, Any]:
+    """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
+    return {
+        "schema": "gyrotc.manifest/1",
+        "gyrotc_version": __version__,
+        "serial": model.serial,
+        "axis": model.axis,
+        "model_hash": model.hash,
+        "refused": refused,
+        "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
+        "meta": dict(dataset.meta),
+        "files": {p.relative_to(folder).as_posix(): sha256(p) for p in files},
+    }

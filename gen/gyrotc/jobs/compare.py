@@ -1,0 +1,183 @@
+"""Every training method side by side on one data set, in the form of the paper's Table 1.
+
+All methods train on the training runs and are judged on the exam runs; without exam runs, on spans (or runs) that
+were left out in turn. Corrections are the maps in float64, with the input in force.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..dataset import Dataset
+from ..errors import InputError
+from ..metrics import Averages, average, pooled
+from ..train import METHODS, Fit, TrainingData, fit, predict
+from ..train.fitting import front_end, samples_of
+from ..train.spans import training_spans
+
+__all__ = ["CompareOptions", "compare"]
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class CompareOptions:
+    """Options of `gyrotc compare`."""
+
+    methods: tuple[str, ...] = METHODS
+    seed: int = 0
+    block_s: float = 10.0
+    average_s: float = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """Samples of one run (or span) to judge on, and which training samples a fit for them may see."""
+
+    environment: str
+    samples: TrainingData
+    seen: NDArray[np.bool_]
+
+
+def compare(
+    dataset: Dataset, options: CompareOptions | None = None, *, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Trains and judges every method.
+
+    Args:
+        dataset: With at least one training run.
+        options: Methods, seed, block length, averaging.
+        progress: Called with what is being done.
+
+    Returns:
+        The JSON object `gyrotc.compare/1`.
+
+    Raises:
+        InputError: No training run, or no usable sample.
+    """
+    options = options or CompareOptions()
+    say = progress or (lambda _: None)
+    say("reading")
+    data, held, judged_on = _samples(dataset, options)
+    methods = []
+    _fit(options.methods[0], data, options)  # what a first call loads is not training time
+    for method in options.methods:
+        say(method)
+        methods.append(_judged(method, data, held, options))
+    reference = next((m for m in methods if m["id"] == "mrbf"), methods[0])
+    return {
+        "schema": "gyrotc.compare/1",
+        "gyrotc_version": __version__,
+        "serial": dataset.serial,
+        "axis": dataset.axis,
+        "block_s": options.block_s,
+        "average_s": options.average_s,
+        "seed": options.seed,
+        "judged_on": judged_on,
+        "noise_floor_dph": reference["noise_floor_dph"],
+        "noise_floor_source": "estimated",
+        "methods": methods,
+    }
+
+
+def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, list[_Held], str]:
+    """All training samples, what is judged, and on what."""
+    training = [run for run in dataset.runs if run.role == "train"]
+    if not training:
+        raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
+    front = front_end(training, options.block_s)
+    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(training)]
+    data = _joined(parts)
+    if len(data) == 0:
+        raise InputError(
+            str(dataset.folder), "no usable sample", "at least one valid block of a training run"
+        )
+    exam = [run for run in dataset.runs if run.role == "exam"]
+    everything = np.ones(len(data), dtype=bool)
+    if exam:
+        held = [
+            _Held(run.environment or run.file, samples_of(front.blocks(run), front.block_s, k), everything)
+            for k, run in enumerate(exam)
+        ]
+        return data, [h for h in held if len(h.samples)], "exam"
+    spans = training_spans(training, data)
+    if spans:
+        masks = [(training[s.run].environment or str(s), s.contains(data.run, data.time_s), s) for s in spans]
+        held = [
+            _Held(name, data.select(mask), ~s.contains(data.run, data.time_s, guard=True))
+            for name, mask, s in masks
+            if mask.any()
+        ]
+    else:
+        held = [_Held(run.environment or run.file, parts[k], data.run != k) for k, run in enumerate(training)]
+    return data, [h for h in held if h.seen.any()], "left_out"
+
+
+def _joined(parts: Sequence[TrainingData]) -> TrainingData:
+    names = TrainingData.__dataclass_fields__
+    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+def _judged(
+    method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions
+) -> dict[str, Any]:
+    began = time.process_time()
+    whole = _fit(method, data, options)
+    seconds = time.process_time() - began
+    judged = [
+        (h.environment, _averages(h, fitted, options)) for h, fitted in _fits(whole, data, held, options)
+    ]
+    environments = list(dict.fromkeys(name for name, _ in judged))
+    groups = [_group(name, pooled([a for n, a in judged if n == name])) for name in environments]
+    total = pooled([a for _, a in judged])
+    return {
+        "id": method,
+        "groups": groups,
+        "exam_rms_dph": total["after"]["rms_dph"],
+        "exam_std_dph": total["after"]["std_dph"],
+        "before_rms_dph": total["before"]["rms_dph"],
+        "improvement": total["improvement"],
+        "centers": whole.n_centers,
+        "table_bytes": whole.table_bytes,
+        "sum_abs_weights_dph": whole.sum_abs_weights,
+        "noise_floor_dph": whole.noise_floor_dph,
+        "train_s": seconds,
+    }
+
+
+def _fit(method: str, data: TrainingData, options: CompareOptions) -> Fit:
+    return fit(data, method=method, seed=options.seed, average_s=options.average_s)
+
+
+def _fits(
+    whole: Fit, data: TrainingData, held: Sequence[_Held], options: CompareOptions
+) -> Iterator[tuple[_Held, Fit]]:
+    """Each part to judge with a fit that has not seen it."""
+    for part in held:
+        yield part, whole if part.seen.all() else _fit(whole.method, data.select(part.seen), options)
+
+
+def _averages(held: _Held, fitted: Fit, options: CompareOptions) -> Averages:
+    s = held.samples
+    after = s.bias_dph - predict(fitted, s.temperature_c, s.slope_c_per_min)
+    scored = np.ones(len(s), dtype=bool)
+    return average(s.time_s, s.temperature_c, s.bias_dph, after, scored=scored, average_s=options.average_s)
+
+
+def _group(environment: str, part: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "environment": environment,
+        "samples": part["samples"],
+        "before_rms_dph": part["before"]["rms_dph"],
+        "before_std_dph": part["before"]["std_dph"],
+        "after_rms_dph": part["after"]["rms_dph"],
+        "after_std_dph": part["after"]["std_dph"],
+        "improvement": part["improvement"],
+    }

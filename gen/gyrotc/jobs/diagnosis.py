@@ -1,0 +1,108 @@
+"""`gyrotc diagnose --out`: the diagnosis with its pictures, its page, the extended model and the extended scenario.
+
+Data flows one way: `diagnose` finds, `diagnosis_plots` draws, `diagnosis_page` writes the page from what
+stands in the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..dataset import Dataset
+from ..diagnose import Diagnosis, diagnose
+from ..model import Model
+from ..outputs import result_folder, write_atomically
+from ..pages.diagnosis_page import PICTURES, write_diagnosis_page
+from ..pages.diagnosis_plots import draw
+from ..texts import toml_comment, toml_key, toml_value
+from ..train.fitting import FitOptions
+
+__all__ = ["diagnose_into", "extended_scenario", "save"]
+
+Progress = Callable[[str], None]
+
+_MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
+
+
+def diagnose_into(
+    out: Path,
+    dataset: Dataset,
+    *,
+    model: Model | None = None,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnoses a data set and fills `out`: `diagnose.json`, `report.html`, pictures, the extended model.
+
+    Raises:
+        InputError: As `diagnose` and `result_folder`.
+    """
+    with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        found = diagnose(dataset, model=model, options=options, progress=progress)
+        return save(stage.folder, found, progress)
+
+
+def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
+    """Writes a diagnosis into a folder; its result then names the files."""
+    if progress:
+        progress("drawing")
+    result = dict(found.result)
+    if result["extended"] is not None and found.model is not None:
+        found.model.save(out / _MODEL)
+        result["extended"] = result["extended"] | {"model": _MODEL}
+    scenario = extended_scenario(result)
+    if scenario is not None:
+        write_atomically(out / _SCENARIO, scenario)
+        result["scenario"] = _SCENARIO
+    result["pictures"] = []
+    for name, svg in draw(found).items():
+        write_atomically(out / PICTURES / f"{name}.svg", svg)
+        result["pictures"].append(f"{PICTURES}/{name}.svg")
+    write_atomically(out / "diagnose.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_diagnosis_page(out)
+    return replace(found, result=result)
+
+
+def extended_scenario(result: dict[str, Any]) -> str | None:
+    """A scenario file whose gyro has the causes that were found; None where none was.
+
+    Profiles are the packaged ones: who knows the chamber's programme puts it in their place.
+    """
+    causes = [c for c in result["causes"] if c["family"] != "noise" and c["parameters"]]
+    if not causes:
+        return None
+    lines = [
+        f"# Causes that gyrotc diagnose found in {toml_comment(result['serial'])}, with their fitted parameters.",
+        "# The profiles are those of the scenario named here; put your chamber's in their place.",
+        'extends = "separating"',
+        f"title = {toml_value('the separating profiles with what was found in ' + result['serial'])}",
+    ]
+    noise = result["estimated_noise"]
+    if noise:
+        lines += [
+            "",
+            "[noise]",
+            *(f"{toml_key(name)} = {toml_value(value)}" for name, value in noise.items()),
+        ]
+    for cause in causes:
+        lines += _cause(cause)
+    return "\n".join(lines) + "\n"
+
+
+def _cause(cause: dict[str, Any]) -> Iterator[str]:
+    values = {name: p["value"] for name, p in cause["parameters"].items()}
+    if "channel" in cause:
+        yield from ("", "[[channel]]", f"name = {toml_value(cause['channel'])}")
+        yield f"level = {toml_value(values.get('reference', 0.0))}"
+    yield from ("", "[[cause]]", f"id = {toml_value(cause['id'])}")
+    if "channel" in cause:
+        yield f"channel = {toml_value(cause['channel'])}"
+    for name, value in values.items():
+        if math.isfinite(value):
+            yield f"{toml_key(name)} = {toml_value(value)}"

@@ -1,0 +1,51 @@
+"""A unit's folder before its job: what somebody changed is set aside, what dead jobs left is removed."""
+
+from __future__ import annotations
+
+import itertools
+from contextlib import suppress
+from pathlib import Path
+
+from ...errors import InputError
+from ...outputs import Lock, clean, leftovers, read_marker
+from ...outputs.marker import survey
+
+__all__ = ["clean_units", "set_aside"]
+
+
+def set_aside(place: Path) -> str:
+    """A result in which somebody changed a file makes room for a new one, under a name of its own.
+
+    Returns:
+        That name; empty if there was no such result.
+
+    Raises:
+        InputError: A job is writing there.
+    """
+    if not place.exists() or not _changed(place):
+        return ""
+    lock = Lock(place, "fleet")
+    try:
+        names = (f"{place.name}.changed-{k}" for k in itertools.count(1))
+        other = next(path for name in names if not (path := place.with_name(name)).exists())
+        place.rename(other)
+    finally:
+        lock.release()
+    return other.name
+
+
+def _changed(place: Path) -> bool:
+    try:
+        marker = read_marker(place)
+        return marker is not None and bool(survey(place, marker)[1])
+    except InputError:  # the marker itself is damaged
+        return True
+
+
+def clean_units(out: Path, names: list[str]) -> None:
+    """Removes what jobs that were killed left beside the results of these names."""
+    left = leftovers(out)
+    for name in names:
+        if name in left:
+            with suppress(InputError):  # a job is at work there
+                clean(out / name)

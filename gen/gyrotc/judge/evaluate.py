@@ -1,0 +1,260 @@
+"""Replay recordings through the compiled C code, compare every step with the reference, measure.
+
+Needs `DIR/model.json` and `DIR/c/` and a data set; `truth.json` beside simulated recordings gives the
+noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..dataset import Dataset, Rows, Run, RunFacts, facts_of
+from ..emit import emitted_tables
+from ..errors import CheckFailed, GyrotcError
+from ..inputs.stored import read_result
+from ..metrics import Averages, average, pooled, statistics, time_statistics
+from ..model import Model, load_model
+from ..quantise import Table
+from ..simulate.truth import simulated_floor
+from ..texts import file_stem
+from ..verify.footprint import Footprint, footprint
+from ..verify.replay import history_of, replay_on, replay_program
+from ..verify.toolchain import Target, all_targets
+from .findings import findings_of
+
+__all__ = ["Replayed", "evaluate", "trace_name"]
+
+Progress = Callable[[str], None]
+_HOST = "host-gcc-O2"
+_TRACE_ROWS = 2**16  # written at once
+_TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """One run replayed, every row of the file.
+
+    Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps (None: not
+    compared).
+    """
+
+    bias_dph: NDArray[np.float64]
+    status: NDArray[np.int32]
+    scored: NDArray[np.bool_]
+    mismatches: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A run, its averaged samples, the steps that differ from the reference, and plain facts about it."""
+
+    run: Run
+    averages: Averages
+    mismatches: int | None
+    facts: RunFacts
+
+
+def evaluate(
+    folder: Path,
+    dataset: Dataset,
+    *,
+    numeric: str | None = None,
+    average_s: float | None = None,
+    trace: Path | None = None,
+    training: Mapping[str, Any] | None = None,
+    compiled: bool = True,
+    trust_code: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Evaluates `folder` (model and C) on a data set; the JSON object of `gyrotc evaluate`.
+
+    Args:
+        numeric: Arithmetic to run; default the first emitted one.
+        average_s: Averaging of all RMS figures; default the model's.
+        trace: Folder for one CSV per run.
+        training: The object of `training.json`; default that of `folder`, where it was made from these
+            recordings. Without an exam run its figures of spans left out count.
+        compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
+        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
+
+    Raises:
+        InputError: No emitted code of the model, or the data lack a channel it needs.
+        CheckFailed: The C code does not compile, or is not gyrotc's.
+    """
+    model = load_model(folder / "model.json")
+    tables = emitted_tables(folder / "c", model)
+    chosen = numeric or next(iter(tables))
+    if chosen not in tables:
+        raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
+    table = tables[chosen]
+    window = average_s or model.average_s
+    parts = []
+    compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
+    with compiling as program:
+        for run in dataset.runs:
+            if progress:
+                progress(run.file)
+            parts.append(
+                _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
+            )
+    sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
+    result = _result(model, dataset, table, parts, sizes, average_s=window)
+    training = training or _training_of(folder, dataset, model)
+    if result["exam"] is None and training:
+        result["left_out"] = training.get("left_out")
+    result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
+    return result
+
+
+def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, Any] | None:
+    """What `fit` wrote into the folder, where these are the recordings that it was made from."""
+    known = {(d.file, d.sha256) for d in model.data}
+    path = folder / "training.json"
+    if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
+        return None
+    return read_result(path, "training")
+
+
+@contextmanager
+def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> Iterator[tuple[Target, Path]]:
+    """The replay program of a table, compiled for the host."""
+    target = all_targets()[_HOST]
+    if target.missing():
+        raise GyrotcError(f"no C compiler: install {target.package}")
+    with replay_program(c_folder, model, table, target, trusted=trusted) as program:
+        yield target, program
+
+
+def replay_run(
+    rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
+) -> Replayed:
+    """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
+    history = history_of(rows, run, model, table)
+    if program is None:
+        known = history.reference
+        return Replayed(table.decode_bias(known.bits), known.status, known.block_valid, None)
+    try:
+        replayed = replay_on(*program, history)
+    except CheckFailed as error:
+        raise CheckFailed(f"{run.file}: {error}") from error
+    return Replayed(
+        bias_dph=table.decode_bias(replayed.bits),
+        status=replayed.status,
+        scored=history.reference.block_valid,
+        mismatches=replayed.mismatches,
+    )
+
+
+def _one_run(
+    run: Run,
+    model: Model,
+    table: Table,
+    program: tuple[Target, Path] | None,
+    *,
+    average_s: float,
+    trace: Path | None,
+    all_runs: Sequence[Run],
+) -> _Part:
+    rows = run.rows()
+    replayed = replay_run(rows, run, model, table, program)
+    inside = run.in_span(rows.time_s)
+    span = slice(None) if inside.all() else inside  # no copies of a whole file
+    averages = average(
+        rows.time_s[span],
+        rows.temperature_c[span],
+        rows.rate_dph[span],
+        (rows.rate_dph - replayed.bias_dph)[span],
+        scored=replayed.scored[span],
+        average_s=average_s,
+    )
+    if trace is not None:
+        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span)
+    return _Part(run, averages, replayed.mismatches, facts_of(run, rows))
+
+
+def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
+    """Name of a run's trace: the file's stem, its start where runs share a file, its folders where stems collide."""
+    stem = Path(run.file).stem
+    if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
+        stem = run.file.replace("/", "_")
+    shared = sum(r.file == run.file for r in all_runs) > 1
+    return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+
+
+def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    time, temperature = rows.time_s[span], rows.temperature_c[span]
+    rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]
+    options = pacsv.WriteOptions(include_header=False, quoting_style="none")
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as stream:
+        stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
+        for start in range(0, time.size, _TRACE_ROWS):
+            k = slice(start, start + _TRACE_ROWS)
+            columns = (time[k], temperature[k], rate[k], bias[k], rate[k] - bias[k], status[k])
+            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True))), stream, options)
+    part.replace(path)
+
+
+def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:
+    run, a = part.run, part.averages
+    entry: dict[str, Any] = {"file": run.file, "role": run.role, "environment": run.environment}
+    if run.from_s is not None or run.to_s is not None:
+        entry |= {"from_s": run.from_s, "to_s": run.to_s}
+    return entry | {
+        "samples": int(a.after_dph.size),
+        "before": statistics(a.before_dph),
+        "after": statistics(a.after_dph) | time_statistics(a, average_s),
+    }
+
+
+def _result(
+    model: Model,
+    dataset: Dataset,
+    table: Table,
+    parts: list[_Part],
+    sizes: Footprint | None,
+    *,
+    average_s: float,
+) -> dict[str, Any]:
+    exam = [p.averages for p in parts if p.run.role == "exam"]
+    train = [p.averages for p in parts if p.run.role == "train"]
+    floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
+    source = "simulated" if floor is not None else model.noise_floor_source
+    return {
+        "schema": "gyrotc.evaluate/1",
+        "gyrotc_version": __version__,
+        "serial": model.serial,
+        "axis": model.axis,
+        "numeric": table.numeric,
+        "block_s": model.block_s,
+        "average_s": average_s,
+        "noise_floor_dph": floor if floor is not None else model.noise_floor_dph,
+        "noise_floor_source": source,
+        "mismatches": None
+        if any(p.mismatches is None for p in parts)
+        else sum(p.mismatches or 0 for p in parts),
+        "runs": [_run_entry(p, average_s) for p in parts],
+        "train": pooled(train) if train else None,
+        "exam": pooled(exam) if exam else None,
+        "findings": [],
+        "model": {
+            "method": model.method,
+            "centers": model.n_centers,
+            "table_bytes": table.table_bytes,
+            "rom_bytes": sizes.rom_bytes if sizes else None,
+            "ram_bytes": sizes.ram_bytes if sizes else None,
+            "sizes_on": sizes.target if sizes else None,
+            "sum_abs_weights_dph": model.sum_abs_weights_dph,
+        },
+    }

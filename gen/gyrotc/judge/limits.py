@@ -1,0 +1,224 @@
+"""Limits of a product: what a built table must keep to, from a TOML file, held against what was measured.
+
+Where `evaluate` and `verify` say what is, this says whether it is enough. A figure that was not measured does not
+keep a limit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from .. import __version__
+from ..errors import InputError
+from ..inputs import parse_toml, read_input
+from ..model import Model
+from ..verify.toolchain import all_targets
+
+__all__ = ["Limits", "held_against", "load_limits"]
+
+Finding = Literal[
+    "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
+    "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
+]  # fmt: skip
+Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
+
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError("the lower end comes first")
+    return pair
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
+CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Temperatures = Annotated[tuple[Celsius, Celsius], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
+Slopes = Annotated[tuple[CelsiusPerMin, CelsiusPerMin], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
+
+
+class _Part(BaseModel):
+    # Strict: `true` is no number and "1" none either.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class AtMost(_Part):
+    """Upper limits. RMS and the like of compensated means, on exam runs, else on spans left out, else in training."""
+
+    rms_dph: Amount = None
+    std_dph: Amount = None
+    mean_dph: Amount = None  # of its absolute value
+    max_abs_dph: Amount = None
+    rms_over_floor: Amount = None
+    rms_30min_dph: Amount = None  # of the worst run
+    angle_1h_arcsec: Amount = None  # of the worst run
+    first_10min_rms_dph: Amount = None  # of the worst run
+    uncertainty_dph: Amount = None  # largest 1 sigma over the envelope
+    error_bound_dph: Amount = None
+    centers: Amount = None
+    table_bytes: Amount = None
+    rom_bytes: Amount = None
+    ram_bytes: Amount = None
+
+
+class AtLeast(_Part):
+    """Lower limits."""
+
+    improvement: Amount = None
+    covered: Annotated[float, Field(ge=0.0, le=1.0)] | None = None  # share of the envelope with training data
+
+
+class Covers(_Part):
+    """Ranges that the envelope of the model must contain."""
+
+    temperature_c: Temperatures | None = None
+    slope_c_per_min: Slopes | None = None
+
+
+class Needs(_Part):
+    """What must be there, and what must not."""
+
+    arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
+    targets: Annotated[
+        tuple[str, ...], BeforeValidator(_as_tuple)
+    ] = ()  # bit for bit, in all their arithmetics
+    no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
+
+
+class Limits(_Part):
+    """A limits file."""
+
+    schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
+    product: str = ""
+    at_most: AtMost = AtMost()
+    at_least: AtLeast = AtLeast()
+    covers: Covers = Covers()
+    needs: Needs = Needs()
+    sha256: str = ""  # of the file
+
+
+@dataclass(frozen=True, slots=True)
+class _Check:
+    limit: str
+    measured: Any
+    bound: Any
+    met: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"limit": self.limit, "measured": self.measured, "bound": self.bound, "met": self.met}
+
+
+def load_limits(path: Path) -> Limits:
+    """Reads and checks a limits file.
+
+    Raises:
+        InputError: It cannot be read, is no TOML, or a field is wrong or not known.
+    """
+    data = read_input(path, "text_mib", "a limits file")
+    content = parse_toml(data, str(path), "a limits file")
+    if "sha256" in content:
+        raise InputError(f"{path}, field sha256", "is not known", "a field named in docs/limits.md")
+    try:
+        limits = Limits.model_validate(content | {"sha256": hashlib.sha256(data).hexdigest()})
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
+        if detail["type"] == "extra_forbidden":
+            raise InputError(where, "is not known", "a field named in docs/limits.md") from error
+        if detail["type"] == "missing":
+            raise InputError(where, "is missing", "schema = 1") from error
+        expected = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        raise InputError(where, repr(detail["input"])[:80], expected) from error
+    known = all_targets()
+    for name in limits.needs.targets:
+        if name not in known:
+            raise InputError(f"{path}, field needs.targets", repr(name), ", ".join(known))
+    return limits
+
+
+def held_against(
+    limits: Limits, model: Model, evaluation: dict[str, Any], verification: dict[str, Any] | None
+) -> dict[str, Any]:
+    """The JSON object of `limits.json`: every limit with what was measured, and whether all are met."""
+    checks = [
+        *_amounts(limits, _measured(model, evaluation, verification)),
+        *_ranges(limits.covers, model),
+        *_needs(limits.needs, evaluation, verification),
+    ]
+    return {
+        "schema": "gyrotc.limits/1",
+        "gyrotc_version": __version__,
+        "serial": model.serial,
+        "axis": model.axis,
+        "product": limits.product,
+        "sha256": limits.sha256,
+        "met": all(check.met for check in checks),
+        "limits": [check.to_dict() for check in checks],
+    }
+
+
+def _measured(
+    model: Model, evaluation: dict[str, Any], verification: dict[str, Any] | None
+) -> dict[str, Any]:
+    """Figures by the names of limits; None: not measured."""
+    judged = evaluation.get("exam") or evaluation.get("left_out") or evaluation.get("train") or {}
+    role = "exam" if evaluation.get("exam") else "train"
+    runs = [run["after"] for run in evaluation["runs"] if run["role"] == role]
+    after = judged.get("after", {})
+    floor, rms = evaluation["noise_floor_dph"], after.get("rms_dph")
+    mean = after.get("mean_dph")
+    cells = "".join(model.coverage.rows) if model.coverage else ""
+    sigma = model.uncertainty_dph
+
+    def worst(name: str) -> float | None:
+        values = [run[name] for run in runs if run.get(name) is not None]
+        return max(values) if values else None
+
+    return {
+        **{name: after.get(name) for name in ("rms_dph", "std_dph", "max_abs_dph")},
+        "mean_dph": None if mean is None else abs(mean),
+        "rms_over_floor": rms / floor if floor and rms is not None else None,
+        **{name: worst(name) for name in ("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph")},
+        "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
+        "error_bound_dph": verification["error_bound_dph"] if verification else None,
+        **{name: evaluation["model"][name] for name in ("centers", "table_bytes", "rom_bytes", "ram_bytes")},
+        "improvement": judged.get("improvement"),
+        "covered": cells.count("1") / len(cells) if cells else None,
+    }
+
+
+def _amounts(limits: Limits, measured: dict[str, Any]) -> Iterator[_Check]:
+    for name, bound in limits.at_most.model_dump(exclude_none=True).items():
+        value = measured[name]
+        yield _Check(f"at_most.{name}", value, bound, value is not None and value <= bound)
+    for name, bound in limits.at_least.model_dump(exclude_none=True).items():
+        value = measured[name]
+        yield _Check(f"at_least.{name}", value, bound, value is not None and value >= bound)
+
+
+def _ranges(covers: Covers, model: Model) -> Iterator[_Check]:
+    for name, (low, high) in covers.model_dump(exclude_none=True).items():
+        has = list(getattr(model.envelope, name))
+        yield _Check(f"covers.{name}", has, [low, high], has[0] <= low and high <= has[1])
+
+
+def _needs(needs: Needs, evaluation: dict[str, Any], verification: dict[str, Any] | None) -> Iterator[_Check]:
+    entries = verification["targets"] if verification else []
+    bounds = [error["numeric"] for error in verification["errors"]] if verification else []
+    for numeric in needs.arithmetics:
+        yield _Check("needs.arithmetics", sorted(bounds), numeric, numeric in bounds)
+    for target in needs.targets:
+        status = sorted({entry["status"] for entry in entries if entry["name"] == target})
+        yield _Check("needs.targets", status, target, status == ["pass"])
+    found = [finding["id"] for finding in evaluation["findings"]]
+    for name in needs.no_findings:
+        there = found if name == "any" else [f for f in found if f == name]
+        yield _Check("needs.no_findings", there, name, not there)

@@ -1,0 +1,48 @@
+"""`report.html` of a plan: its tables and the temperatures of its runs, from `plan.json`. Computes nothing new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..inputs.stored import read_result
+from ..outputs import result_folder, write_atomically
+from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
+from .report import page_environment, page_from, write_page
+
+__all__ = ["is_plan", "write_plan", "write_plan_page"]
+
+
+def is_plan(folder: Path) -> bool:
+    """Whether a folder holds a plan (and not a build)."""
+    return (folder / "plan.json").is_file() and not (folder / "evaluate.json").exists()
+
+
+def write_plan(folder: Path, result: dict[str, Any]) -> Path:
+    """Writes `folder/plan.json` and `folder/report.html`; returns the page's path."""
+    with result_folder(folder, "plan") as stage:
+        write_atomically(stage.folder / "plan.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+        write_plan_page(stage.folder)
+    return folder / "report.html"
+
+
+def write_plan_page(folder: Path) -> Path:
+    """Writes `folder/report.html` from `folder/plan.json`; returns its path.
+
+    Raises:
+        InputError: `plan.json` is missing or broken.
+    """
+    result = read_result(folder / "plan.json", "plan")
+    with page_from(folder / "plan.json"):
+        text = (
+            page_environment()
+            .get_template("plan.html.j2")
+            .render(
+                p=result,
+                temperatures=temperatures(result),
+                matrix=separability_matrix(result),
+                accuracy=accuracy_by_hours(result),
+            )
+        )
+    return write_page(folder, text)

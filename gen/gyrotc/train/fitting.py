@@ -1,0 +1,312 @@
+"""From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
+
+Joins the stages dataset → frontend → train → model; computes nothing of its own beyond the choice of
+block, window and limits, and the refits with spans left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..dataset import Dataset, Run, earth_rate_warning
+from ..errors import InputError
+from ..frontend import Blocks, run_blocks
+from ..metrics import Averages, pooled
+from ..model import Model
+from . import NETWORK_METHODS, Fit, TrainingData, coverage, fit, predict, uncertainty
+from .noisefloor import noise_terms, sensitivities, stretches
+from .spans import Span, training_spans
+
+__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of", "training_of"]
+
+Progress = Callable[[str], None]
+_SLOPE_WINDOW_S = 100.0
+_HOLD_S = 300.0
+_MAX_RATE_C_PER_MIN = 30.0
+_MAX_STEP_C = 1.0
+_COVERAGE_CELLS = (32, 12)
+_UNCERTAINTY_CELLS = (6, 4)
+_MIN_SAMPLES = 8
+_CENTER_GRID = 2.0**20
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """Options of `gyrotc fit`."""
+
+    method: str = "mrbf"
+    seed: int = 0
+    centers: int | None = None
+    rho: float | None = None
+    block_s: float = 10.0
+    average_s: float = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model, the JSON object of `training.json`, and the residuals of spans left out (None: not done)."""
+
+    model: Model
+    training: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class FrontEnd:
+    """What the front end needs besides the data; becomes part of the model."""
+
+    block_s: float
+    slope_blocks: int
+    max_step_c: float
+    max_rate_c_per_min: float
+    hold_blocks: int
+    stuck_samples: int = 0
+
+    def blocks(self, run: Run) -> Blocks:
+        return run_blocks(
+            run.rows(),
+            run,
+            block_s=self.block_s,
+            slope_blocks=self.slope_blocks,
+            max_step_c=self.max_step_c,
+            max_rate_c_per_min=self.max_rate_c_per_min,
+            stuck_samples=self.stuck_samples,
+            hold_blocks=self.hold_blocks,
+        )
+
+
+def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
+    """Block rounded to whole median row periods (at least one), window of about 100 s, limits of belief."""
+    period = float(np.median([run.row_period_s for run in runs]))
+    rounded = max(1, round(block_s / period)) * period
+    return FrontEnd(
+        block_s=rounded,
+        slope_blocks=int(np.clip(round(_SLOPE_WINDOW_S / rounded), 2, 20)),
+        max_step_c=_MAX_STEP_C,
+        max_rate_c_per_min=_MAX_RATE_C_PER_MIN,
+        hold_blocks=max(1, round(_HOLD_S / rounded)),
+    )
+
+
+def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
+    """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
+    used = blocks.used
+    n = int(used.sum())
+    return TrainingData(
+        temperature_c=blocks.temperature_c[used].astype(np.float64),
+        slope_c_per_min=blocks.slope_c[used].astype(np.float64) * (60.0 / block_s),
+        bias_dph=blocks.rate_dph[used],
+        weight=blocks.rows[used].astype(np.float64),
+        run=np.full(n, run, dtype=np.int64),
+        time_s=blocks.start_s[used],
+        duration_s=np.full(n, block_s),
+    )
+
+
+def _joined(parts: Sequence[TrainingData]) -> TrainingData:
+    names = TrainingData.__dataclass_fields__
+    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
+    """Fits a model to the training runs of a data set.
+
+    Raises:
+        InputError: No training run, too few usable samples, or a method whose map is no network.
+    """
+    if options.method not in NETWORK_METHODS:
+        expected = f"one of {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
+        raise InputError("--method", repr(options.method), expected)
+    runs = [run for run in dataset.runs if run.role == "train"]
+    if not runs:
+        raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
+    say = progress or (lambda _: None)
+    front = front_end(runs, options.block_s)
+    parts = []
+    for k, run in enumerate(runs):
+        say(f"reading {run.file}")
+        parts.append(samples_of(front.blocks(run), front.block_s, k))
+    data = _joined(parts)
+    if data.bias_dph.size < _MIN_SAMPLES:
+        raise InputError(
+            str(dataset.folder),
+            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
+            f"at least {_MIN_SAMPLES}",
+        )
+    say("training")
+    fitted = _fit(data, options)
+    spans = training_spans(runs, data)
+    left_out = _left_out(data, spans, options, say) if spans else None
+    model = model_of(dataset, runs, data, fitted, front, options)
+    return Fitted(model, training_of(dataset, data, fitted, front, options, spans, left_out))
+
+
+def _fit(data: TrainingData, options: FitOptions) -> Fit:
+    return fit(
+        data,
+        method=options.method,
+        seed=options.seed,
+        centers=options.centers,
+        rho=options.rho,
+        average_s=options.average_s,
+    )
+
+
+def _left_out(
+    data: TrainingData, spans: Sequence[Span], options: FitOptions, say: Progress
+) -> list[Averages]:
+    """Each span left out in turn with its guard gap: residuals of a fit that has not seen it."""
+    results = []
+    for k, span in enumerate(spans):
+        say(f"leaving out span {k + 1} of {len(spans)}")
+        inside = span.contains(data.run, data.time_s)
+        near = span.contains(data.run, data.time_s, guard=True)
+        if inside.sum() == 0 or (~near).sum() < _MIN_SAMPLES:
+            continue
+        rest = _fit(data.select(~near), options)
+        held = data.select(inside)
+        residual = held.bias_dph - predict(rest, held.temperature_c, held.slope_c_per_min)
+        results.append(_averaged(held, residual, options.average_s))
+    return results
+
+
+def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: float) -> Averages:
+    """Weighted means over `average_s` of block samples of one run."""
+    number = np.floor((data.time_s - data.time_s[0]) / average_s + 1e-9).astype(np.int64)
+    weight = np.bincount(number, weights=data.weight)
+    full = weight >= 0.5 * np.max(weight)
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.bincount(number, weights=values * data.weight)
+        return np.asarray((total / np.where(weight > 0, weight, 1.0))[full])
+
+    return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
+
+
+def model_of(
+    dataset: Dataset,
+    runs: Sequence[Run],
+    data: TrainingData,
+    fitted: Fit,
+    front: FrontEnd,
+    options: FitOptions,
+) -> Model:
+    """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data."""
+    started = [run.started for run in runs if run.started is not None]
+    meta = dict(dataset.meta)
+    if dataset.description:
+        meta["description"] = dataset.description
+    if started and "calibrated_on" not in meta:
+        meta["calibrated_on"] = max(started).date().isoformat()
+    meta["environments"] = sorted({run.environment for run in runs if run.environment})
+    meta["earth_rate"] = _earth_rate(dataset)
+    mean = float(np.average(data.bias_dph, weights=data.weight))
+    warnings = [*dataset.warnings, earth_rate_warning(dataset.earth_rate, mean)]
+    meta["warnings"] = [warning for warning in warnings if warning]
+    return Model.from_dict(
+        {
+            "schema": "gyrotc.model/1",
+            "serial": dataset.serial,
+            "axis": dataset.axis,
+            "method": fitted.method,
+            "block_s": front.block_s,
+            "slope_blocks": front.slope_blocks,
+            "scale": fitted.scale,
+            "envelope": fitted.envelope,
+            "coverage": coverage(data, fitted, _COVERAGE_CELLS),
+            "networks": [_snapped(n, fitted.scale) for n in fitted.networks],
+            "fallback_dph": fitted.fallback_dph,
+            "hold_blocks": front.hold_blocks,
+            "stuck_samples": front.stuck_samples,
+            "max_step_c": front.max_step_c,
+            "max_rate_c_per_min": front.max_rate_c_per_min,
+            "noise_floor_dph": fitted.noise_floor_dph,
+            "noise_floor_source": "estimated",
+            "average_s": options.average_s,
+            "uncertainty_dph": uncertainty(data, fitted, _UNCERTAINTY_CELLS) if fitted.n_centers else None,
+            "data": [_data_file(run) for run in dataset.runs],
+            "seed": options.seed,
+            "meta": meta,
+        }
+    )
+
+
+def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, Any]:
+    """Centers on multiples of 2^-20 of the scale, so that tables hold them without further rounding.
+
+    It moves a center by less than 5e-7 half ranges, far below what the data can tell; the model is what is stored.
+    """
+    (center, half), slope = scale["temperature_c"], scale["slope_c_per_min"]
+    centers = [
+        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)]
+        for t, r in network["centers"]
+    ]
+    return dict(network) | {"centers": centers}
+
+
+def _on_grid(z: float) -> float:
+    return round(z * _CENTER_GRID) / _CENTER_GRID
+
+
+def _earth_rate(dataset: Dataset) -> str:
+    """What was done about Earth's rate, in words; computed terms with their standard uncertainties."""
+    terms = {
+        f"{run.earth.rate_dph:.4f} +- {run.earth.sigma_dph:.4f}"
+        for run in dataset.runs
+        if run.earth is not None
+    }
+    if terms:
+        return f"computed and taken off: {', '.join(sorted(terms))} deg/h (1 sigma)"
+    return dataset.earth_rate or "not stated"
+
+
+def _data_file(run: Run) -> dict[str, Any]:
+    span = None if run.from_s is None and run.to_s is None else (run.from_s, run.to_s)
+    return {"file": run.file, "sha256": run.sha256, "span": span, "role": run.role}
+
+
+def training_of(
+    dataset: Dataset,
+    data: TrainingData,
+    fitted: Fit,
+    front: FrontEnd,
+    options: FitOptions,
+    spans: Sequence[Span],
+    left_out: list[Averages] | None,
+) -> dict[str, Any]:
+    """The JSON object of `training.json`."""
+    return {
+        "schema": "gyrotc.fit/1",
+        "gyrotc_version": __version__,
+        "serial": dataset.serial,
+        "axis": dataset.axis,
+        "method": fitted.method,
+        "seed": options.seed,
+        "samples": int(data.bias_dph.size),
+        "block_s": front.block_s,
+        "average_s": options.average_s,
+        "centers": fitted.n_centers,
+        "table_bytes": fitted.table_bytes,
+        "sum_abs_weights_dph": fitted.sum_abs_weights,
+        "predicted_rms_ratio": fitted.predicted_rms_ratio,
+        "prediction_withheld": fitted.withheld,
+        "noise_floor_dph": fitted.noise_floor_dph,
+        "spans": [span.to_dict() for span in spans],
+        "left_out": pooled(left_out) if left_out else None,
+        "left_out_spans": [pooled([a]) for a in left_out or []],
+        "noise": _noise(data, fitted, front.block_s),
+        "sensitivity": sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
+        "findings": [dict(f) for f in fitted.findings],
+        "curves": dict(fitted.curves),
+    }
+
+
+def _noise(data: TrainingData, fitted: Fit, block_s: float) -> dict[str, Any]:
+    """Noise terms of what the map leaves, from means over a block."""
+    residual = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
+    return noise_terms(stretches(residual, data.time_s, data.run, block_s), block_s)

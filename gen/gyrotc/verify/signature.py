@@ -1,0 +1,122 @@
+"""Signatures of an emission: Ed25519 over the bytes of `c/emission.json` (docs/signing.md).
+
+The record names the model and the hash of every file, and `verify` proves that it and they are what gyrotc makes; the
+signature says who released them. Raw 64 bytes, as `openssl pkeyutl -sign -rawin` writes them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..emit.record import RECORD, SIGNATURE
+from ..errors import InputError
+from ..outputs import write_atomically
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+
+__all__ = ["check_signature", "load_private_key", "load_public_key", "sign_record"]
+
+_LARGEST_KEY = 2**16  # bytes of a PEM file
+_LENGTH = 64  # bytes of a signature
+
+
+def sign_record(c_folder: Path, key: Ed25519PrivateKey) -> Path:
+    """Writes `c/emission.json.sig`; returns its path.
+
+    Raises:
+        InputError: There is no record.
+    """
+    path = c_folder / SIGNATURE
+    write_atomically(path, key.sign(_bytes(c_folder / RECORD, 2**20, "a folder that emit wrote")))
+    return path
+
+
+def check_signature(c_folder: Path, key: Ed25519PublicKey) -> dict[str, Any]:
+    """Whether the record's signature is of this key: `file`, `status`, `key` (SHA-256 of its 32 bytes), `reason`."""
+    from cryptography.exceptions import InvalidSignature
+
+    entry = {"file": SIGNATURE, "status": "fail", "key": hashlib.sha256(key.public_bytes_raw()).hexdigest()}
+    try:
+        record = _bytes(c_folder / RECORD, 2**20, "")
+        signature = _bytes(c_folder / SIGNATURE, _LENGTH, "")
+        key.verify(signature, record)
+    except InputError as error:
+        return entry | {"reason": str(error)}
+    except InvalidSignature:
+        return entry | {"reason": "not a signature of this record by this key"}
+    return entry | {"status": "pass", "reason": None}
+
+
+def load_public_key(path: Path) -> Ed25519PublicKey:
+    """An Ed25519 public key from a PEM file.
+
+    Raises:
+        InputError: It cannot be read, is something else, or the package `cryptography` is not installed.
+    """
+    serialization = _serialization()
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    expected = "an Ed25519 public key (PEM), as `openssl pkey -pubout` writes it"
+    try:
+        key = serialization.load_pem_public_key(_bytes(path, _LARGEST_KEY, expected))
+    except _refusals() as error:
+        raise InputError(str(path), "is no public key", expected) from error
+    if not isinstance(key, Ed25519PublicKey):
+        raise InputError(str(path), "is a key of another kind", expected)
+    return key
+
+
+def load_private_key(path: Path, passphrase: Callable[[], str]) -> Ed25519PrivateKey:
+    """An Ed25519 private key from a PEM file; `passphrase` is asked for it where it is encrypted.
+
+    Raises:
+        InputError: It cannot be read or decrypted, is something else, or `cryptography` is not installed.
+    """
+    serialization = _serialization()
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+    expected = "an Ed25519 private key (PEM), as `openssl genpkey -algorithm ed25519` writes it"
+    data = _bytes(path, _LARGEST_KEY, expected)
+    word = passphrase().encode() if b"ENCRYPTED" in data else None
+    try:
+        key = serialization.load_pem_private_key(data, word)
+    except _refusals() as error:
+        found = "cannot be decrypted with this passphrase" if word is not None else "is no private key"
+        raise InputError(str(path), found, expected) from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise InputError(str(path), "is a key of another kind", expected)
+    return key
+
+
+def _serialization() -> Any:
+    try:
+        from cryptography.hazmat.primitives import serialization
+    except ImportError as error:
+        raise InputError(
+            "signatures", "the package cryptography is not installed", "pip install 'gyrotc[sign]'"
+        ) from error
+    return serialization
+
+
+def _refusals() -> tuple[type[Exception], ...]:
+    """What the reader of keys raises for a file that is none."""
+    from cryptography.exceptions import UnsupportedAlgorithm
+
+    return (ValueError, TypeError, UnsupportedAlgorithm)
+
+
+def _bytes(path: Path, largest: int, expected: str) -> bytes:
+    try:
+        if not path.is_file():
+            raise InputError(str(path), "is no file that is there", expected)
+        with path.open("rb") as file:
+            data = file.read(largest + 1)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})", expected) from error
+    if len(data) > largest:
+        raise InputError(str(path), f"is larger than {largest} bytes", expected)
+    return data
