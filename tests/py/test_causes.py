@@ -168,7 +168,7 @@ def literals() -> Iterator[str]:
             if isinstance(node, ast.Constant) and node.value in CATALOGUE:
                 yield f"{path.relative_to(PACKAGE)}:{node.lineno} {node.value}"
     quoted = re.compile("[\"'](" + "|".join(CATALOGUE) + ")[\"']")
-    for path in sorted((PACKAGE / "templates").glob("*")):
+    for path in sorted(PACKAGE.rglob("*.j2")):
         yield from (f"{path.name} {found}" for found in quoted.findall(path.read_text(encoding="utf-8")))
 
 

@@ -19,7 +19,7 @@ from gyrotc.verify.toolchain import (
 )
 from metered import metered
 
-FOLDER = Path(__import__("gyrotc").__file__).parent / "targets"
+FOLDER = Path(__import__("gyrotc").__file__).parent / "verify" / "targets"
 HOST = all_targets()["host-gcc-O2"]
 
 
