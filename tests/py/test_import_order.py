@@ -18,6 +18,7 @@ ORDER = [
     "_core",
     "terms",
     "dataset",
+    "importers",
     "simulate",
     "frontend",
     "metrics",

@@ -81,6 +81,9 @@ TrustOption = Annotated[
         help="Compile and run DIR/c although it holds code that this gyrotc did not write: only what is your own.",
     ),
 ]
+TrustUnitsOption = Annotated[
+    bool, typer.Option("--trust-units", help="Take units that the values contradict; it is recorded.")
+]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 
 

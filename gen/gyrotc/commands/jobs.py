@@ -24,6 +24,7 @@ from .base import (
     OutOption,
     RhoOption,
     SeedOption,
+    TrustUnitsOption,
     app,
     json_text,
     numerics_of,
@@ -51,6 +52,7 @@ def build(
     average_s: AverageOption = 100.0,
     numeric: NumericOption = None,
     applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
     extend: Annotated[
         bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
     ] = False,
@@ -81,6 +83,7 @@ def build(
             axis=axis,
             numerics=numerics_of(numeric),
             applied=applied,
+            trust_units=trust_units,
             extend=extend,
             limits=limits,
             previous=previous,
@@ -128,6 +131,7 @@ def compare(
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
     applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """The paper's Table 1 on this data: every training method side by side.
@@ -145,7 +149,8 @@ def compare(
         result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
         progress() as say,
     ):
-        recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None)
+        subtracted = applied_of(applied) if applied else None
+        recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
         if stage:
             stage.of(recordings.serial, axis)
         result = with_published(run(recordings, options, progress=say))
@@ -172,6 +177,7 @@ def diagnose(
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
     applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """What the simulation gets wrong about recordings, the named cause, the extended model, the measured gain.
@@ -194,7 +200,7 @@ def diagnose(
     results: dict[str, dict[str, Any]] = {}
 
     def one(name: str | None, into: Path | None) -> None:
-        recordings: Dataset = load(dataset, axis=name, applied=subtracted)
+        recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
         with progress() as say:
             if into is None:
                 found = run(recordings, model=known, options=options, progress=say)

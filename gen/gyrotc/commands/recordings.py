@@ -13,6 +13,7 @@ from .base import (
     JsonOption,
     OutOption,
     SeedOption,
+    TrustUnitsOption,
     app,
     progress,
     tell,
@@ -63,6 +64,7 @@ def check(
         typer.Option("--envelope", help="What training should cover, C and C/min, e.g. -40:60,-5:5."),
     ] = None,
     applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Tell everything that is wrong or doubtful about recordings, at once; also while they still grow.
@@ -78,6 +80,7 @@ def check(
         axis=axis,
         envelope=envelope_of(envelope) if envelope is not None else None,
         applied=applied_of(applied) if applied else None,
+        trust_units=trust_units,
     )
     write_json(json_file, result.to_dict())
     for line in result.lines():

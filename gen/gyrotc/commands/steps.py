@@ -50,6 +50,7 @@ def fit(
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
     applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Train a model: DIR/model.json and DIR/training.json; what followed from an earlier model there goes.
@@ -63,7 +64,7 @@ def fit(
     options = FitOptions(method, seed, centers, rho, block_s, average_s)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
-        recordings = load(dataset, axis=axis, applied=known)
+        recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
         fitted = fit_dataset(recordings, options, progress=say)
         fitted.model.save(stage.folder / "model.json")

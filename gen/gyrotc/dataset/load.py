@@ -19,6 +19,7 @@ from .problems import Problems
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run
 from .schema import FILE, Description, RunEntry, check_serial, parse_description
+from .trust import check_channel_units, judge, suspected, suspected_of_earth
 
 __all__ = ["axes_of", "load", "survey"]
 
@@ -26,7 +27,12 @@ _KINDS = (".csv", ".parquet")
 
 
 def load(
-    folder: Path, *, axis: str | None = None, applied: Applied | None = None, exam_only: bool = False
+    folder: Path,
+    *,
+    axis: str | None = None,
+    applied: Applied | None = None,
+    exam_only: bool = False,
+    trust_units: bool = False,
 ) -> Dataset:
     """Reads the description of a data set and checks every file.
 
@@ -35,11 +41,15 @@ def load(
         axis: Axis of three-axis recordings, "x", "y" or "z"; None where there is one rate.
         applied: Model that was subtracted while recording, if the data set says that there was one.
         exam_only: A data set without a training run will do.
+        trust_units: Values that contradict their units are taken nevertheless.
 
     Raises:
         InputError: Something is wrong; the first thing found is told.
     """
-    dataset = survey(folder, Problems(collect=False), axis=axis, applied=applied, exam_only=exam_only)
+    problems = Problems(collect=False)
+    dataset = survey(
+        folder, problems, axis=axis, applied=applied, exam_only=exam_only, trust_units=trust_units
+    )
     assert dataset is not None
     return dataset
 
@@ -66,6 +76,7 @@ def survey(
     axis: str | None = None,
     applied: Applied | None = None,
     exam_only: bool = False,
+    trust_units: bool = False,
 ) -> Dataset | None:
     """As `load`, with problems told to `problems`.
 
@@ -90,6 +101,7 @@ def survey(
             reader = Reader(
                 file=recording.file,
                 layout=recording.layout,
+                units=recording.units,
                 axis=axis,
                 channels=channels,
                 pulse_weight_arcsec=description.pulse_weight_arcsec,
@@ -103,7 +115,12 @@ def survey(
         for r in recordings.values()
         if r.file.torn
     ]
-    return _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings))
+    check_channel_units(description, recordings, problems)
+    doubted = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
+    trusted = judge(doubted, trust_units or description.trust_units, problems)
+    warnings += [f"{name}: units are trusted: {text}" for name, text in trusted]
+    trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
+    return _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings), trusted_texts)
 
 
 def _description(folder: Path, problems: Problems) -> Description | None:
@@ -147,7 +164,12 @@ def _recordings(
     with_rows: set[int] = set()
     for name in dict.fromkeys(entry.file for entry in description.run):
         recording = open_recording(
-            name, folder / name, description.columns, description.pulse_weight_arcsec, problems
+            name,
+            folder / name,
+            description.columns,
+            description.units,
+            description.pulse_weight_arcsec,
+            problems,
         )
         if recording is None:
             continue
@@ -232,6 +254,7 @@ def _dataset(
     runs: tuple[Run, ...],
     channels: tuple[str, ...],
     warnings: tuple[str, ...],
+    trusted: tuple[str, ...],
 ) -> Dataset:
     noise = description.noise
     return Dataset(
@@ -246,4 +269,7 @@ def _dataset(
         runs=runs,
         channels=channels,
         warnings=warnings,
+        units=dict(description.units),
+        trusted=trusted,
+        sources=tuple(entry.model_dump() for entry in description.source),
     )

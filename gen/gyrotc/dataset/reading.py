@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import numpy as np
 from ..errors import InputError
 from .columns import Layout, arrange
 from .csvfile import CsvFile
+from .evidence import Evidence
 from .parquetfile import ParquetFile
 from .problems import Problems
 from .records import Applied, EarthRate, Floats, Rows
 from .schema import Columns
 from .source import Source
+from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, faults, rate_faults
 
 __all__ = ["Reader", "Recording", "open_file", "open_recording"]
@@ -29,6 +32,8 @@ class Recording:
     Attributes:
         file: The file.
         layout: Its columns.
+        units: Conversions to gyrotc's units, by column.
+        evidence: What its units can be judged by.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -36,6 +41,8 @@ class Recording:
 
     file: Source
     layout: Layout
+    units: dict[str, Conversion]
+    evidence: Evidence
     time_s: Floats
     n_rows: int
     row_period_s: float
@@ -46,6 +53,7 @@ class Reader:
     """Reads the rows of one axis of a file.
 
     Attributes:
+        units: Conversions to gyrotc's units, by column.
         pulse_weight_arcsec: Angle of one pulse, arcsec; used where pulses were counted.
         earth: Earth's rate to take off.
         applied: Correction to add back.
@@ -53,6 +61,7 @@ class Reader:
 
     file: Source
     layout: Layout
+    units: dict[str, Conversion]
     axis: str | None
     channels: tuple[str, ...]
     pulse_weight_arcsec: float | None
@@ -72,6 +81,7 @@ class Reader:
         columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
         if columns is None:
             columns, _, _ = self.file.scan()
+        columns = _converted(columns, self.units)
         time, rate = columns[layout.time], columns[value]
         if layout.pulses:
             rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
@@ -85,6 +95,11 @@ class Reader:
         return rows
 
 
+def _converted(columns: dict[str, Floats], units: Mapping[str, Conversion]) -> dict[str, Floats]:
+    """Columns in gyrotc's units."""
+    return {name: units[name](values) if name in units else values for name, values in columns.items()}
+
+
 def rate_of_pulses(time_s: Floats, pulses: Floats, weight_arcsec: float) -> Floats:
     """Mean rate since the last row, deg/h (1 arcsec/s = 1 deg/h); NaN in the first row."""
     rate = np.full(len(time_s), np.nan)
@@ -93,7 +108,12 @@ def rate_of_pulses(time_s: Floats, pulses: Floats, weight_arcsec: float) -> Floa
 
 
 def open_recording(
-    name: str, path: Path, columns: Columns, pulse_weight_arcsec: float | None, problems: Problems
+    name: str,
+    path: Path,
+    columns: Columns,
+    units: Mapping[str, str],
+    pulse_weight_arcsec: float | None,
+    problems: Problems,
 ) -> Recording | None:
     """Opens and checks one file; None (and problems) if it is not in order."""
     before = len(problems)
@@ -104,7 +124,10 @@ def open_recording(
             return None
         if layout.pulses and pulse_weight_arcsec is None:
             raise InputError(f"{name}, column pulses", "no weight", "pulse_weight_arcsec in dataset.toml")
-        time = _checked(file, layout, pulse_weight_arcsec, problems)
+        if layout.pulses and "rate" in units:
+            raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
+        conversions = declared(units, _by_kind(layout))
+        time, evidence = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
@@ -115,7 +138,16 @@ def open_recording(
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, time, len(time), period)
+    return Recording(file, layout, conversions, evidence, time, len(time), period)
+
+
+def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
+    return {
+        "time": [layout.time],
+        "temperature": [layout.temperature],
+        "rate": list(layout.axes.values()) or [layout.value],
+        "channels": layout.channels,
+    }
 
 
 def open_file(name: str, path: Path) -> Source:
@@ -127,8 +159,14 @@ def open_file(name: str, path: Path) -> Source:
     return ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
 
 
-def _checked(file: Source, layout: Layout, pulse_weight_arcsec: float | None, problems: Problems) -> Floats:
-    """Reads all columns and checks them; the times."""
+def _checked(
+    file: Source,
+    layout: Layout,
+    units: Mapping[str, Conversion],
+    pulse_weight_arcsec: float | None,
+    problems: Problems,
+) -> tuple[Floats, Evidence]:
+    """Reads all columns and checks them; the times, and what the units can be judged by."""
     values = file.read(file.names)
     lines = None
     if values is None:
@@ -138,6 +176,7 @@ def _checked(file: Source, layout: Layout, pulse_weight_arcsec: float | None, pr
         keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
         values = {name: column[keep] for name, column in values.items()}
         lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
+    values = _converted(values, units)
     time = values[layout.time]
     found = list(faults(values, layout))
     if layout.pulses and not found:
@@ -145,14 +184,19 @@ def _checked(file: Source, layout: Layout, pulse_weight_arcsec: float | None, pr
             layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0)
         )
     for fault in found:
-        problems.add(_problem(file, fault, lines[fault.row] if lines else file.place(fault.row)))
+        place = lines[fault.row] if lines else file.place(fault.row)
+        problems.add(_problem(file, fault, place, units.get(fault.column)))
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
-    return time
+    rates = list(layout.axes.values()) or [layout.value]
+    evidence = Evidence(len(rates))
+    evidence.add(time, values[layout.temperature], [values[name] for name in rates])
+    return time, evidence
 
 
-def _problem(file: Source, fault: Fault, place: int) -> InputError:
-    unit = file.row_unit
-    where = f"{file.name}, {unit} {place}" + (f", column {fault.column}" if fault.column else "")
-    more = f" (and {fault.rows - 1} more {unit}s)" if fault.rows > 1 else ""
-    return InputError(where, fault.found + more, fault.expected)
+def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:
+    rows = file.row_unit
+    where = f"{file.name}, {rows} {place}" + (f", column {fault.column}" if fault.column else "")
+    more = f" (and {fault.rows - 1} more {rows}s)" if fault.rows > 1 else ""
+    declared_as = f" after conversion from {unit.unit}" if unit else ""
+    return InputError(where, fault.found + declared_as + more, fault.expected)

@@ -170,6 +170,9 @@ class Dataset:
         runs: In the order of the description.
         channels: Auxiliary channels that every run has.
         warnings: What a user should know of what was done to the data.
+        units: `[units]` as declared.
+        trusted: What the values look like against their units, where the user's word was taken for them.
+        sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
     """
 
     folder: Path
@@ -183,3 +186,6 @@ class Dataset:
     runs: tuple[Run, ...]
     channels: tuple[str, ...]
     warnings: tuple[str, ...]
+    units: dict[str, str] = field(default_factory=dict)
+    trusted: tuple[str, ...] = ()
+    sources: tuple[dict[str, Any], ...] = ()

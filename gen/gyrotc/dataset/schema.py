@@ -124,6 +124,22 @@ class NoiseEntry(_Part):
     quantum_arcsec: Level | None = None
 
 
+class SourceEntry(_Part):
+    """`[source]`: the logger's file that a run was imported from."""
+
+    file: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    bytes: Annotated[int, Field(ge=0)]
+    imported_by: str
+    map: str
+    run: str = ""
+
+
+Sources = Annotated[
+    tuple[SourceEntry, ...], BeforeValidator(lambda value: (value,) if isinstance(value, dict) else value)
+]
+
+
 class ExcludeEntry(_Part):
     """A stretch of a run that does not count."""
 
@@ -160,6 +176,9 @@ class Description(_Part):
     applied_table: Annotated[str, Field(pattern="^(none|[0-9a-f]{64})$")] = "none"
     pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
     columns: Columns = Columns()
+    units: dict[Name, Name] = {}
+    trust_units: bool = False
+    source: Sources = ()
     meta: Annotated[dict[str, Any], BeforeValidator(_json_value)] = {}
     noise: NoiseEntry | None = None
     run: Annotated[tuple[RunEntry, ...], Field(min_length=1)]

@@ -74,7 +74,7 @@ def _temperature(name: str, values: Floats) -> Iterator[Fault]:
     for fault in _within(name, values, _TEMPERATURE_C, "C"):
         wrong = values > _TEMPERATURE_C[1]
         kelvin = bool(np.all((values[wrong] >= _KELVIN[0]) & (values[wrong] <= _KELVIN[1])) and wrong.any())
-        hint = "; kelvin?" if kelvin else ""
+        hint = '; kelvin? [units] temperature = "K" in dataset.toml' if kelvin else ""
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
 
 

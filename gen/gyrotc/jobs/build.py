@@ -21,7 +21,7 @@ from ..model import Model
 from ..outputs import MARKER, result_folder, sha256, write_atomically
 from ..pages.report import write_report
 from ..quantise.applied import applied_of
-from ..train.fitting import FitOptions, Fitted, fit_dataset
+from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
 from .axes import join_axes
 
@@ -66,6 +66,7 @@ def build(
     axis: str | None = None,
     numerics: Sequence[str] | None = None,
     applied: Path | None = None,
+    trust_units: bool = False,
     extend: bool = False,
     limits: Path | None = None,
     previous: Path | None = None,
@@ -80,6 +81,7 @@ def build(
         axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
             `out/c` the runtime once with all tables.
         applied: Model that was subtracted while recording.
+        trust_units: Values that contradict their units are taken nevertheless.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
         limits: A limits file that the result is held against.
         previous: An earlier result of the same gyro, to say what changed.
@@ -98,12 +100,12 @@ def build(
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
     with result_folder(out, "build", inputs=[source]) as stage:
         if not axes:
-            dataset = load(source, axis=axis, applied=known)
+            dataset = load(source, axis=axis, applied=known, trust_units=trust_units)
             stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
             return [_build_axis(dataset, stage.folder, options, order, say)]
         built = []
         for name in axes:
-            dataset = load(source, axis=name, applied=known)
+            dataset = load(source, axis=name, applied=known, trust_units=trust_units)
             stage.of(dataset.serial, any_serial=any_serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
@@ -218,5 +220,7 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         "refused": refused,
         "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
         "meta": dict(dataset.meta),
+        "units": units_of(dataset),
+        "sources": list(dataset.sources),
         "files": {p.relative_to(folder).as_posix(): sha256(p) for p in files},
     }

@@ -35,7 +35,6 @@ _COARSE_STEP_C = 0.25
 _HOLDS = 0.8
 _STUCK_S = 60.0
 _STUCK_ROWS = 30
-_HOT_C = 125.0
 _LATE_S = 3.0e8  # ten years: a time since some epoch, not since power-on
 _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
 _PERIODS = 0.01
@@ -118,6 +117,7 @@ def check(
     axis: str | None = None,
     envelope: Envelope | None = None,
     applied: Applied | None = None,
+    trust_units: bool = False,
 ) -> CheckResult:
     """Checks a data set as `fit` would read it, and looks for what is doubtful.
 
@@ -126,6 +126,7 @@ def check(
         axis: Axis of three-axis recordings, or "all".
         envelope: Temperatures and rates that the training runs should cover.
         applied: Model that was subtracted while recording, if the data set says that there was one.
+        trust_units: Values that contradict their units are a doubt, not a problem.
     """
     problems: dict[str, InputError] = {}
     doubts: dict[Doubt, list[str | None]] = {}
@@ -134,7 +135,7 @@ def check(
     axes = _axes(folder, axis)
     for one in axes:
         told = Problems(collect=True)
-        dataset = survey(folder, told, axis=one, applied=applied)
+        dataset = survey(folder, told, axis=one, applied=applied, trust_units=trust_units)
         problems |= {str(problem): problem for problem in told.found}
         if dataset is not None:
             serial = dataset.serial
@@ -194,9 +195,6 @@ def _doubts_of_temperature(f: RunFacts) -> Iterator[Doubt]:
         what = "whole degrees" if step % 1.0 == 0.0 else f"steps of {step:.3g} C"
         text = f"temperature comes in {what}: its rate is the difference of two such steps"
         yield Doubt("coarse_temperature", where, text)
-    if f.temperature_c[1] > _HOT_C:
-        text = f"temperature reaches {f.temperature_c[1]:.4g} C; is it in fahrenheit?"
-        yield Doubt("hot", where, text)
 
 
 def _doubts_of_rate(f: RunFacts) -> Iterator[Doubt]:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dataset.text import dataset_toml
 from ..errors import InputError
 from ..outputs import result_folder
 from .biasmap import BiasMap, draw
@@ -21,7 +22,7 @@ from .recording import RowLength, rows
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
 from .truth import SCHEMA
-from .write import Format, RunFile, dataset_toml
+from .write import Format, RunFile
 
 __all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
 

@@ -1,4 +1,4 @@
-"""Writes simulated runs in chunks, and the text of `dataset.toml`."""
+"""Writes simulated runs in chunks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from ..texts import toml_key, toml_value
 from .recording import Chunk
 
-__all__ = ["Format", "RunFile", "dataset_toml"]
+__all__ = ["Format", "RunFile"]
 
 Format = Literal["csv", "parquet"]
 _RATE_DECIMALS = 9
@@ -83,17 +82,3 @@ class RunFile:
     def __exit__(self, *error: object) -> None:
         self._writer.close()
         self._sink.close()
-
-
-def dataset_toml(head: dict[str, Any], tables: dict[str, dict[str, Any]], runs: list[dict[str, Any]]) -> str:
-    """`dataset.toml` as text: keys of the head, tables of plain values, then the runs."""
-    lines = [*_pairs(head)]
-    for name, table in tables.items():
-        lines += ["", f"[{toml_key(name)}]", *_pairs(table)]
-    for run in runs:
-        lines += ["", "[[run]]", *_pairs(run)]
-    return "\n".join(lines) + "\n"
-
-
-def _pairs(table: dict[str, Any]) -> list[str]:
-    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]

@@ -23,7 +23,16 @@ from . import NETWORK_METHODS, Fit, TrainingData, coverage, fit, predict, uncert
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 
-__all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of", "training_of"]
+__all__ = [
+    "FitOptions",
+    "Fitted",
+    "fit_dataset",
+    "front_end",
+    "model_of",
+    "samples_of",
+    "training_of",
+    "units_of",
+]
 
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0
@@ -285,6 +294,7 @@ def training_of(
         "gyrotc_version": __version__,
         "serial": dataset.serial,
         "axis": dataset.axis,
+        "units": units_of(dataset),
         "method": fitted.method,
         "seed": options.seed,
         "samples": int(data.bias_dph.size),
@@ -304,6 +314,11 @@ def training_of(
         "findings": [dict(f) for f in fitted.findings],
         "curves": dict(fitted.curves),
     }
+
+
+def units_of(dataset: Dataset) -> dict[str, Any]:
+    """Units as declared, and what the user's word was taken against, for `training.json` and `manifest.json`."""
+    return {"declared": dict(dataset.units), "trusted": list(dataset.trusted)}
 
 
 def _noise(data: TrainingData, fitted: Fit, block_s: float) -> dict[str, Any]:

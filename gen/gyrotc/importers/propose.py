@@ -1,0 +1,379 @@
+"""A map for a file that has none, or what a map leaves open: which column is what, in which unit, and why.
+
+Names and units decide, never values. Where two columns are as likely, or a unit stands nowhere, nothing is guessed:
+the refusal names the choices and the option that makes one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..dataset.units import NATIVE, UnitError, channel_unit, conversion
+from ..errors import InputError
+from .mapping import Map
+from .names import Meaning, meaning, split_unit, words
+from .tables import Column, LoggerFile, Table
+
+__all__ = ["Choice", "Plan", "propose"]
+
+Ask = Callable[[str], str | None]
+"""Asks a person on a terminal; None where there is none."""
+
+_OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
+_EXAMPLES = {"time": "s, ms, us, min", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
+_CHANNELS = {
+    "supply": "V", "voltage": "V", "vbat": "V", "vcc": "V", "vdd": "V", "pressure": "hPa", "humidity": "%", "current": "A",
+    "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "", "fan": "",
+}  # fmt: skip
+_MOST_CHANNELS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One column and what it is taken for.
+
+    Attributes:
+        role: "time", "temperature", "rate", "rate_x", ..., "pulses", or the name of a channel.
+        table: The table that holds it.
+        column: The column.
+        unit: Its unit; None for stamps, pulses and channels without one.
+        why: The reasons, in words.
+    """
+
+    role: str
+    table: Table
+    column: Column
+    unit: str | None
+    why: str
+
+    @property
+    def source(self) -> str:
+        """The column as a map names it."""
+        return f"{self.table.name}/{self.column.name}" if self.table.name else self.column.name
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is read of a file.
+
+    Attributes:
+        main: The table with the rates; its rows are the rows of the run.
+        time: Columns of time, one or two; none where rows are counted.
+        temperature: The temperature; its table may be another one.
+        values: Rates by axis, one rate, or pulses.
+        channels: Auxiliary channels of the main table.
+        rate_hz: Rows per second where rows are counted, with the reason in `why_rate`.
+        left_out: Numeric columns of the main table that are not taken.
+    """
+
+    main: Table
+    time: tuple[Choice, ...]
+    temperature: Choice
+    values: tuple[Choice, ...]
+    channels: tuple[Choice, ...]
+    rate_hz: float | None
+    why_rate: str
+    left_out: tuple[str, ...]
+
+
+def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
+    """What is read of a file under a map, the open choices made from names.
+
+    Args:
+        chosen: What is stated already, by a map and options.
+        ask: Asks for a unit that stands nowhere.
+
+    Raises:
+        InputError: A column that is not there, two that are as likely, a unit that stands nowhere.
+    """
+    tables = _tables(file, chosen)
+    values = _values(file, tables, chosen)
+    main = values[0][1]
+    time, rate_hz, why_rate = _time(file, main, chosen)
+    temperature = _temperature(file, tables, main, chosen)
+    missing: list[str] = []
+    unit = _Units(file.path.name, chosen.units, ask, missing)
+    picked_values = tuple(
+        Choice(role, table, column, None if role == "pulses" else unit.of("rate", column, table), why)
+        for role, table, column, why in values
+    )
+    picked_temperature = Choice(
+        "temperature",
+        temperature[0],
+        temperature[1],
+        unit.of("temperature", temperature[1], temperature[0]),
+        temperature[2],
+    )
+    picked_time = tuple(
+        Choice("time", main, column, unit.of("time", column, main) if column.kind == "number" else None, why)
+        for column, why in time
+    )
+    if missing:
+        raise InputError(file.path.name, "; ".join(_said(missing)), " ".join(dict.fromkeys(_asked(missing))))
+    taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
+    channels = tuple(_channels(file, main, chosen, taken))
+    taken |= {c.column.name for c in channels}
+    left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
+    return Plan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
+
+
+def _tables(file: LoggerFile, chosen: Map) -> list[Table]:
+    if chosen.table is None:
+        return list(file.tables)
+    found = [t for t in file.tables if t.name == chosen.table]
+    if not found:
+        names = ", ".join(t.name for t in file.tables)
+        raise InputError(file.path.name, f"no table {chosen.table!r}", f"--table with one of: {names}")
+    return found
+
+
+def _find(file: LoggerFile, name: str, near: Table | None = None) -> tuple[Table, Column]:
+    """The column that a map names, in any table of the file.
+
+    Raises:
+        InputError: There is none.
+    """
+    tables = sorted(file.tables, key=lambda t: t is not near)
+    for table in tables:
+        for column in table.columns:
+            if name in (column.name, f"{table.name}/{column.name}", split_unit(column.name)[0]):
+                return table, column
+    every = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
+    raise InputError(file.path.name, f"no column {name!r}", f"one of: {', '.join(every[:40])}")
+
+
+def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tuple[str, Table, Column, str]]:
+    """Roles, tables, columns and reasons of what is measured; all of one table."""
+    stated = chosen.columns.values()
+    if stated:
+        found = [(role, *_find(file, name), "named by the map") for role, name in stated.items()]
+        if len({id(table) for _, table, _, _ in found}) > 1:
+            raise InputError(file.path.name, "rates of several tables", "rates of one table under [columns]")
+        return found
+    likely = [(table, *_rates(table)) for table in tables]
+    likely = [one for one in likely if one[1]]
+    best = max((one[2] for one in likely), default=0)
+    top = [one for one in likely if one[2] == best]
+    if not top:
+        raise InputError(
+            file.path.name, f"no column that a rate is told from among {_listed(file)}", _name_it("rate")
+        )
+    if len(top) > 1:
+        names = ", ".join(repr(table.name) for table, _, _ in top)
+        raise InputError(
+            file.path.name, f"rates in {names}", f"--table with one of them, e.g. --table {top[0][0].name!r}"
+        )
+    table, columns, _ = top[0]
+    return [(role, table, column, why) for role, column, why in columns]
+
+
+def _rates(table: Table) -> tuple[list[tuple[str, Column, str]], int]:
+    """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
+    pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
+    if pulses:
+        return [("pulses", pulses[0], "its name")], 5
+    found = [(c, meaning(c.name, c.unit, table.name)) for c in table.columns if c.kind == "number"]
+    rates = [(c, m) for c, m in found if m.kind == "rate"]
+    if not rates:
+        rates = [
+            (c, m)
+            for c, m in found
+            if c.name in ("x", "y", "z") and "gyro" in words(table.name.replace("_", " "))
+        ]
+    if not rates:
+        return [], 0
+    axes: dict[str, list[tuple[Column, Meaning]]] = {}
+    for column, one in rates:
+        axes.setdefault(one.axis, []).append((column, one))
+    best = max(one.score for _, one in rates)
+    triad = [sorted(axes.get(axis, []), key=lambda cm: -cm[1].score) for axis in "xyz"]
+    if all(triad) and all(len(t) == 1 or t[0][1].score > t[1][1].score for t in triad):
+        return [
+            (f"rate_{a}", t[0][0], f"its name, axis {a}") for a, t in zip("xyz", triad, strict=True)
+        ], best + 1
+    top = [(column, one) for column, one in rates if one.score == best]
+    if len(top) > 1:
+        raise InputError(
+            f"table {table.name}" if table.name else "columns",
+            f"{', '.join(repr(c.name) for c, _ in top)} could be the rate",
+            f'--column rate="{top[0][0].name}" (or another of them)',
+        )
+    return [("rate", top[0][0], "its name")], best
+
+
+def _temperature(
+    file: LoggerFile, tables: Sequence[Table], main: Table, chosen: Map
+) -> tuple[Table, Column, str]:
+    if chosen.columns.temperature:
+        return (*_find(file, chosen.columns.temperature, main), "named by the map")
+    number = _instance(main.name)
+    likely: list[tuple[int, Table, Column]] = []
+    for table in file.tables:
+        for column in table.columns:
+            one = meaning(column.name, column.unit, table.name)
+            if column.kind == "number" and one.kind == "temperature":
+                near = 8 * (table is main) + 2 * (bool(number) and _instance(table.name) == number)
+                likely.append((one.score + near, table, column))
+    best = max((score for score, _, _ in likely), default=0)
+    top = [(table, column) for score, table, column in likely if score == best]
+    if not top:
+        raise InputError(
+            file.path.name,
+            f"no column that a temperature is told from among {_listed(file)}",
+            _name_it("temperature"),
+        )
+    if len(top) > 1:
+        names = [f"{t.name}/{c.name}" if t.name else c.name for t, c in top]
+        raise InputError(
+            file.path.name,
+            f"{', '.join(map(repr, names))} could be the temperature of the gyro",
+            f'--column temperature="{names[0]}" (or another of them)',
+        )
+    where = "its name" if top[0][0] is main else "its name; the last reading holds until the next"
+    return (*top[0], where)
+
+
+def _instance(name: str) -> str:
+    return "".join(mark for mark in name if mark.isdigit())
+
+
+def _time(file: LoggerFile, main: Table, chosen: Map) -> tuple[list[tuple[Column, str]], float | None, str]:
+    """Columns of time with reasons; or rows per second with the reason."""
+    if chosen.time.rate_hz is not None:
+        return [], chosen.time.rate_hz, "rows are counted, as stated"
+    if chosen.columns.time:
+        return [(_find(file, name, main)[1], "named by the map") for name in chosen.columns.time], None, ""
+    stamps = [c for c in main.columns if c.kind == "stamp"]
+    if stamps:
+        return _stamps(file, stamps), None, ""
+    found = [(c, meaning(c.name, c.unit, main.name)) for c in main.columns if c.kind == "number"]
+    likely = [(m.score, c) for c, m in found if m.kind == "time"]
+    best = max((score for score, _ in likely), default=0)
+    top = [c for score, c in likely if score == best]
+    if top:
+        return [(top[0], "its name" if len(top) == 1 else "its name, the first of that kind")], None, ""
+    if main.rate_hz is not None:
+        return [], main.rate_hz, main.why_rate
+    expected = (
+        '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
+    )
+    raise InputError(file.path.name, f"no column that a time is told from among {_listed(file)}", expected)
+
+
+def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
+    """One column of dates and times, or a date and a time of day."""
+    from .stamps import forms_of
+
+    parts = [(c, forms_of([s for s in c.sample if s])) for c in stamps]
+    if not any(c.sample for c in stamps):
+        return [(stamps[0], "it holds dates and times")]
+    whole = [c for c, f in parts if any("%d" in form and ("%H" in form or "%I" in form) for form in f)]
+    if whole:
+        return [(whole[0], "it holds dates and times")]
+    dates = [c for c, f in parts if any("%d" in form for form in f)]
+    clocks = [c for c, f in parts if any("%M" in form for form in f)]
+    if dates and clocks:
+        return [(dates[0], "it holds dates"), (clocks[0], "it holds times of day")]
+    return [((clocks or stamps)[0], "it holds times of day")]
+
+
+def _channels(file: LoggerFile, main: Table, chosen: Map, taken: set[str]) -> Iterator[Choice]:
+    if chosen.channels is not None:
+        for name, source in chosen.channels.items():
+            table, column = _find(file, source, main)
+            if table is not main:
+                raise InputError(
+                    file.path.name, f"channel {name} of another table", f"a column of {main.name!r}"
+                )
+            yield Choice(name, main, column, chosen.units.get(name, column.unit), "named by the map")
+        return
+    count = 0
+    for column in main.columns:
+        parts = words(split_unit(column.name)[0])
+        known = next((w for w in parts if w in _CHANNELS), None)
+        if column.name in taken or column.kind != "number" or known is None or count >= _MOST_CHANNELS:
+            continue
+        if column.sample and not any(column.sample):
+            continue
+        count += 1
+        unit = column.unit or split_unit(column.name)[1]
+        yield Choice(
+            _channel_name(column.name, unit, _CHANNELS[known]), main, column, unit, "its name: a channel"
+        )
+
+
+def _channel_name(name: str, unit: str | None, native: str) -> str:
+    """A plain name; with the ending of the unit that it is converted to, where its unit is known."""
+    plain = "_".join(words(split_unit(name)[0])).encode("ascii", "ignore").decode() or "channel"
+    endings = {"V": "v", "hPa": "hpa", "A": "ma", "uT": "ut", "degC": "c"}
+    if unit and native in endings and channel_unit(f"{plain}_{endings[native]}") is not None:
+        try:
+            conversion(unit, str(channel_unit(f"x_{endings[native]}")))
+        except UnitError:
+            return plain
+        return f"{plain}_{endings[native]}"
+    return plain
+
+
+class _Units:
+    """Units of the three kinds: stated, in the file, or asked for."""
+
+    def __init__(self, file: str, stated: Mapping[str, str], ask: Ask, missing: list[str]) -> None:
+        self._file, self._stated, self._ask, self._missing = file, stated, ask, missing
+        self._asked: dict[str, str] = {}
+
+    def of(self, kind: str, column: Column, table: Table) -> str:
+        """The unit of a column of a kind; empty (and noted as missing) where it stands nowhere."""
+        if kind in self._stated:
+            return self._checked(kind, self._stated[kind], _OPTIONS[kind])
+        in_file = column.unit or meaning(column.name, None, table.name).unit
+        if in_file is not None:
+            try:
+                conversion(in_file, kind)
+            except UnitError:
+                found = f"the file gives it in {in_file!r}, which is no {kind}"
+                expected = f"{_OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
+                raise InputError(f"{self._file}, column {column.name}", found, expected) from None
+            return in_file
+        if kind not in self._asked:
+            answer = self._ask(
+                f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})"
+            )
+            if answer:
+                self._asked[kind] = self._checked(kind, answer, "the answer")
+        if kind not in self._asked:
+            self._missing.append(f"{kind}\t{column.name}")
+            return ""
+        return self._asked[kind]
+
+    def _checked(self, kind: str, unit: str, where: str) -> str:
+        try:
+            conversion(unit, kind)
+        except UnitError as error:
+            raise InputError(where, str(error), f"one of {_EXAMPLES[kind]}") from error
+        return unit
+
+
+def _said(missing: Sequence[str]) -> Iterator[str]:
+    seen = set()
+    for one in missing:
+        kind, column = one.split("\t")
+        if kind not in seen:
+            seen.add(kind)
+            yield f"no unit of the {kind} in column {column!r}"
+
+
+def _asked(missing: Sequence[str]) -> Iterator[str]:
+    for one in missing:
+        kind = one.split("\t")[0]
+        yield f'{_OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
+
+
+def _listed(file: LoggerFile) -> str:
+    names = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def _name_it(kind: str) -> str:
+    return f'--column {kind}="..." with one of them, and {_OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
