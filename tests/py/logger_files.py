@@ -72,7 +72,9 @@ class Case:
     environment: dict[str, str] = field(default_factory=dict)
 
 
-def text(encoding: str = "utf-8", end: str = "\n") -> Callable[[Callable[[Truth], list[str]]], Callable[[Path, Truth], None]]:
+def text(
+    encoding: str = "utf-8", end: str = "\n"
+) -> Callable[[Callable[[Truth], list[str]]], Callable[[Path, Truth], None]]:
     """Writes lines in an encoding."""
 
     def outer(lines: Callable[[Truth], list[str]]) -> Callable[[Path, Truth], None]:
@@ -104,7 +106,10 @@ def plain(t: Truth) -> list[str]:
 
 @text("cp1252", "\r\n")
 def german(t: Truth) -> list[str]:
-    return ["Zeit [s];Temperatur [°C];Drehrate [°/s]", *_rows(t, lambda k, s, c, r: f"{_de(s)};{_de(c)};{_de(r[0] / 3600, 12)}")]
+    return [
+        "Zeit [s];Temperatur [°C];Drehrate [°/s]",
+        *_rows(t, lambda k, s, c, r: f"{_de(s)};{_de(c)};{_de(r[0] / 3600, 12)}"),
+    ]
 
 
 @text("utf-8-sig", "\r\n")
@@ -141,12 +146,19 @@ def american(t: Truth) -> list[str]:
 
 @text()
 def units_row(t: Truth) -> list[str]:
-    return ["Time\tTemperature\tRate", "ms\t°C\t°/s", *_rows(t, lambda k, s, c, r: f"{s * 1e3:.0f}\t{c!r}\t{r[0] / 3600!r}")]
+    return [
+        "Time\tTemperature\tRate",
+        "ms\t°C\t°/s",
+        *_rows(t, lambda k, s, c, r: f"{s * 1e3:.0f}\t{c!r}\t{r[0] / 3600!r}"),
+    ]
 
 
 @text("utf-16")
 def sixteen(t: Truth) -> list[str]:
-    return ["t [min]\tTemp [K]\tRate [rad/s]", *_rows(t, lambda k, s, c, r: f"{s / 60!r}\t{c + 273.15!r}\t{radians(r[0] / 3600)!r}")]
+    return [
+        "t [min]\tTemp [K]\tRate [rad/s]",
+        *_rows(t, lambda k, s, c, r: f"{s / 60!r}\t{c + 273.15!r}\t{radians(r[0] / 3600)!r}"),
+    ]
 
 
 @text()
@@ -156,7 +168,10 @@ def savetxt(t: Truth) -> list[str]:
 
 @text()
 def aligned(t: Truth) -> list[str]:
-    return ["  time_s     temp_C      rate_dph", *_rows(t, lambda k, s, c, r: f"{s:10.1f} {c:14.9f} {r[0]:14.9f}")]
+    return [
+        "  time_s     temp_C      rate_dph",
+        *_rows(t, lambda k, s, c, r: f"{s:10.1f} {c:14.9f} {r[0]:14.9f}"),
+    ]
 
 
 @text()
@@ -178,7 +193,12 @@ def arduino(t: Truth) -> list[str]:
 
 @text()
 def fixed_rate(t: Truth) -> list[str]:
-    return ["Serial: RLG-77", "Sample rate: 0.1 Hz", "Temperature [degC];Rate [deg/h]", *_rows(t, lambda k, s, c, r: f"{c!r};{r[0]!r}")]
+    return [
+        "Serial: RLG-77",
+        "Sample rate: 0.1 Hz",
+        "Temperature [degC];Rate [deg/h]",
+        *_rows(t, lambda k, s, c, r: f"{c!r};{r[0]!r}"),
+    ]
 
 
 @text()
@@ -186,7 +206,12 @@ def grouped(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{s!r},{c!r},0.1,0.2,9.8,{r[0] / 3600!r},{r[1] / 3600!r},{r[2] / 3600!r}"
 
-    return [",,Accel,,,Gyro,,", "Time,Temp,X,Y,Z,X,Y,Z", "[s],[degC],[m/s^2],[m/s^2],[m/s^2],[deg/s],[deg/s],[deg/s]", *_rows(t, row)]
+    return [
+        ",,Accel,,,Gyro,,",
+        "Time,Temp,X,Y,Z,X,Y,Z",
+        "[s],[degC],[m/s^2],[m/s^2],[m/s^2],[deg/s],[deg/s],[deg/s]",
+        *_rows(t, row),
+    ]
 
 
 @text()
@@ -196,13 +221,18 @@ def trailing(t: Truth) -> list[str]:
 
 @text()
 def quoted(t: Truth) -> list[str]:
-    return ['"Time (s)","Temperature (°C)","Rate (°/h)","Status"', *_rows(t, lambda k, s, c, r: f'"{s!r}","{c!r}","{r[0]!r}","OK"')]
+    return [
+        '"Time (s)","Temperature (°C)","Rate (°/h)","Status"',
+        *_rows(t, lambda k, s, c, r: f'"{s!r}","{c!r}","{r[0]!r}","OK"'),
+    ]
 
 
 @text()
 def missing(t: Truth) -> list[str]:
     """Readings that were lost, a header in the middle, an unfinished last line."""
-    lines = _rows(t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}")
+    lines = _rows(
+        t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}"
+    )
     head = "time_s,temp_c,rate_dph"
     return [head, *lines[:100], head, *lines[100:]]
 
@@ -214,12 +244,18 @@ def old_mac(t: Truth) -> list[str]:
 
 @text()
 def epoch(t: Truth) -> list[str]:
-    return ["timestamp_ns|temperature_c|rate_dph", *_rows(t, lambda k, s, c, r: f"{1772352000_000000000 + round(s * 1e9)}|{c!r}|{r[0]!r}")]
+    return [
+        "timestamp_ns|temperature_c|rate_dph",
+        *_rows(t, lambda k, s, c, r: f"{1772352000_000000000 + round(s * 1e9)}|{c!r}|{r[0]!r}"),
+    ]
 
 
 @text()
 def days(t: Truth) -> list[str]:
-    return ["excel time,temp K,rate", *_rows(t, lambda k, s, c, r: f"{46082.0 + s / 86400:.12f},{c + 273.15!r},{r[0]!r}")]
+    return [
+        "excel time,temp K,rate",
+        *_rows(t, lambda k, s, c, r: f"{46082.0 + s / 86400:.12f},{c + 273.15!r},{r[0]!r}"),
+    ]
 
 
 @text()
@@ -232,31 +268,71 @@ def midnight(t: Truth) -> list[str]:
 
 @text()
 def julian(t: Truth) -> list[str]:
-    return ["stamp,T [degC],rate [deg/h]", *_rows(t, lambda k, s, c, r: f"{_at(s):%Y-%j %H:%M:%S},{c!r},{r[0]!r}")]
+    return [
+        "stamp,T [degC],rate [deg/h]",
+        *_rows(t, lambda k, s, c, r: f"{_at(s):%Y-%j %H:%M:%S},{c!r},{r[0]!r}"),
+    ]
 
 
 @text()
 def two_lines(t: Truth) -> list[str]:
-    return ["%% rate table log", "% operator: B", "Elapsed Time;Housing Temp;Angular Rate;Supply", "(sec);(K);(arcsec/s);(mV)", *_rows(t, lambda k, s, c, r: f"{s!r};{c + 273.15!r};{r[0]!r};{5000 + k}")]
+    return [
+        "%% rate table log",
+        "% operator: B",
+        "Elapsed Time;Housing Temp;Angular Rate;Supply",
+        "(sec);(K);(arcsec/s);(mV)",
+        *_rows(t, lambda k, s, c, r: f"{s!r};{c + 273.15!r};{r[0]!r};{5000 + k}"),
+    ]
 
 
 CSV_CASES = [
     Case("gyrotc's own names", "own.csv", plain),
     Case("German, semicolons, decimal commas, cp1252", "messung.csv", german),
-    Case("date-time dd.mm.yyyy, preamble, BOM", "klima.csv", german_stamps, ("--time-zone", "UTC"), started=True),
+    Case(
+        "date-time dd.mm.yyyy, preamble, BOM",
+        "klima.csv",
+        german_stamps,
+        ("--time-zone", "UTC"),
+        started=True,
+    ),
     Case("ISO 8601 with Z, comments, kelvin, deg/s", "iso.csv", iso_stamps, started=True, tolerance=1e-6),
-    Case("local stamps with a zone", "local.csv", local_stamps, ("--time-zone", "Europe/Berlin"), started=True),
-    Case("date and time apart, AM/PM, fahrenheit", "us.csv", american, ("--time-format", "%m/%d/%Y %I:%M:%S %p"), tolerance=1e-6),
+    Case(
+        "local stamps with a zone", "local.csv", local_stamps, ("--time-zone", "Europe/Berlin"), started=True
+    ),
+    Case(
+        "date and time apart, AM/PM, fahrenheit",
+        "us.csv",
+        american,
+        ("--time-format", "%m/%d/%Y %I:%M:%S %p"),
+        tolerance=1e-6,
+    ),
     Case("tabs, a row of units, ms", "tabs.txt", units_row),
     Case("UTF-16, minutes, kelvin, rad/s", "export.txt", sixteen),
     Case("numpy.savetxt, header in a comment", "np.txt", savetxt),
     Case("aligned by spaces", "aligned.dat", aligned, tolerance=1e-8, temperature_tolerance=1e-8),
-    Case("32-bit microseconds that wrap, three axes", "imu.csv", micros, axes=True, starts_at=(2**32 - 600_000_000) / 1e6),
+    Case(
+        "32-bit microseconds that wrap, three axes",
+        "imu.csv",
+        micros,
+        axes=True,
+        starts_at=(2**32 - 600_000_000) / 1e6,
+    ),
     Case(
         "no header, no times, raw counts",
         "raw.csv",
         arduino,
-        ("--column", "temperature=column 1", "--column", "rate=column 2", "--rate-hz", "0.1", "--rate-unit", "deg/s/131", "--temperature-unit", "degC"),
+        (
+            "--column",
+            "temperature=column 1",
+            "--column",
+            "rate=column 2",
+            "--rate-hz",
+            "0.1",
+            "--rate-unit",
+            "deg/s/131",
+            "--temperature-unit",
+            "degC",
+        ),
     ),
     Case("fixed rate stated above the rows", "fixed.csv", fixed_rate),
     Case("two header lines and a row of units", "grouped.csv", grouped, axes=True),
@@ -265,7 +341,14 @@ CSV_CASES = [
     Case("lost readings, a repeated header", "lost.csv", missing, rows=ROWS - 10),
     Case("line ends of an old Mac", "mac.csv", old_mac),
     Case("nanoseconds of an epoch", "epoch.csv", epoch),
-    Case("days of a spreadsheet", "days.csv", days, ("--time-unit", "day", "--temperature-unit", "K", "--rate-unit", "deg/h"), time_tolerance=1e-3, starts_at=46082 * 86400.0 * 0),
+    Case(
+        "days of a spreadsheet",
+        "days.csv",
+        days,
+        ("--time-unit", "day", "--temperature-unit", "K", "--rate-unit", "deg/h"),
+        time_tolerance=1e-3,
+        starts_at=46082 * 86400.0 * 0,
+    ),
     Case("times of day over midnight", "night.csv", midnight),
     Case("day of the year", "julian.csv", julian, ("--time-format", "%Y-%j %H:%M:%S")),
     Case("units in a second line of brackets", "table.csv", two_lines),

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.dataset import load
-
+from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
 
 
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> tuple[int, str, str]:
+def run(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object
+) -> tuple[int, str, str]:
     """Exit status, stdout and stderr of the command as a user types it, in this process."""
     from gyrotc.cli import _status
 
@@ -22,7 +24,7 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *ar
     return status, captured.out, captured.err
 
 
-@pytest.mark.parametrize("case", CSV_CASES, ids=lambda c: c.id)
+@pytest.mark.parametrize("case", [*CSV_CASES, *BINARY_CASES], ids=lambda c: c.id)
 def test_a_file_comes_in_by_one_command(
     case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -31,7 +33,9 @@ def test_a_file_comes_in_by_one_command(
     seen = truth()
     case.write(tmp_path / case.file, seen)
     out = tmp_path / "RLG-1"
-    status, told, error = run(capsys, monkeypatch, "import", tmp_path / case.file, "--out", out, *case.options)
+    status, told, error = run(
+        capsys, monkeypatch, "import", tmp_path / case.file, "--out", out, *case.options
+    )
     assert status == 0, error + told
     for k, axis in enumerate("xyz") if case.axes else [(0, None)]:
         rows = (dataset := load(out, axis=axis)).runs[0].rows()
@@ -39,6 +43,8 @@ def test_a_file_comes_in_by_one_command(
         kept = np.isin(np.round(seen.time_s, 6), np.round(rows.time_s - case.starts_at, 3))
         assert kept.sum() == case.rows
         np.testing.assert_allclose(rows.time_s - case.starts_at, seen.time_s[kept], atol=case.time_tolerance)
-        np.testing.assert_allclose(rows.temperature_c, seen.temperature_c[kept], atol=case.temperature_tolerance)
+        np.testing.assert_allclose(
+            rows.temperature_c, seen.temperature_c[kept], atol=case.temperature_tolerance
+        )
         np.testing.assert_allclose(rows.rate_dph, seen.rate_dph[kept, k], atol=case.tolerance)
         assert (dataset.runs[0].started == START) == case.started

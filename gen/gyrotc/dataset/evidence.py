@@ -35,7 +35,9 @@ class Evidence:
         """Adds rows; those without a finite value in every column are left out."""
         for start in range(0, len(time_s), _PART):
             part = slice(start, start + _PART)
-            self._add(np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)]))
+            self._add(
+                np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)])
+            )
 
     def _add(self, block: Floats) -> None:
         whole = np.isfinite(block).all(axis=1)

@@ -146,7 +146,7 @@ class Clock:
             first = raw[np.argmax(finite)].item()
             self.origin = first if abs(first * factor) > _EPOCH_S else 0
         origin = self.origin or 0
-        since = (raw - raw.dtype.type(origin)).astype(np.float64)
+        since: Floats = (raw - raw.dtype.type(origin)).astype(np.float64)
         whole = round(1.0 / factor) if factor < 1.0 else 0
         return since / whole if whole and abs(whole * factor - 1.0) < 1e-12 else since * factor
 

@@ -260,8 +260,7 @@ def _with_lf(block: bytes, *, last: bool) -> bytes:
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
-    for k, line in enumerate(lines.decode("utf-8", "replace").split("\n"), start=number):
-        yield k, line
+    yield from enumerate(lines.decode("utf-8", "replace").split("\n"), start=number)
 
 
 def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:

@@ -74,8 +74,8 @@ _RATE = {
 }  # fmt: skip
 _NO_RATE = {
     "acc", "accel", "acceleration", "mag", "magnetic", "sample", "sampling", "frame", "baud", "temp", "temperature",
-    "pressure", "count", "counter", "quality", "status", "hz", "integral", "dt", "clip", "clipping", "error", "covariance",
-    "command", "setpoint", "table", "orientation",
+    "pressure", "count", "counter", "quality", "status", "hz", "integral", "dt", "clip", "clipping", "error",
+    "covariance", "command", "setpoint", "table", "orientation",
 }  # fmt: skip
 _NEAR_GYRO = {
     "gyro",
@@ -164,11 +164,16 @@ def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
     parts = words(base)
     scores: dict[Kind, int] = dict.fromkeys([kind] if kind else [], 4)
     around = set(parts) | set(words(table))
-    for one, known in (("time", _TIME), ("temperature", _TEMPERATURE), ("rate", _RATE)):
+    kinds: tuple[tuple[Kind, set[str]], ...] = (
+        ("time", _TIME),
+        ("temperature", _TEMPERATURE),
+        ("rate", _RATE),
+    )
+    for one, known in kinds:
         hits = known & set(parts)
         if kind is None and unit is not None and in_name is None and one != "time":
             continue  # a unit of something else
-        scores[one] = scores.get(one, 0) + 3 * bool(hits - {"t"}) + 1 * bool(hits & {"t"})  # type: ignore[index,arg-type]
+        scores[one] = scores.get(one, 0) + 3 * bool(hits - {"t"}) + 1 * bool(hits & {"t"})
     if kind != "rate" and _NO_RATE & around:
         scores["rate"] = 0
     if kind is not None:

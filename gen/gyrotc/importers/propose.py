@@ -23,8 +23,9 @@ Ask = Callable[[str], str | None]
 _OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
 _EXAMPLES = {"time": "s, ms, us, min", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
 _CHANNELS = {
-    "supply": "V", "voltage": "V", "vbat": "V", "vcc": "V", "vdd": "V", "pressure": "hPa", "humidity": "%", "current": "A",
-    "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "", "fan": "",
+    "supply": "V", "voltage": "V", "vbat": "V", "vcc": "V", "vdd": "V", "pressure": "hPa", "humidity": "%",
+    "current": "A", "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "",
+    "fan": "",
 }  # fmt: skip
 _MOST_CHANNELS = 12
 

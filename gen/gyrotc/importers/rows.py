@@ -149,7 +149,9 @@ class Rows:
         if not columns and table.rate_hz is None:
             found = f"table {table.name!r} has no column of time like that of {self.plan.main.name!r}"
             raise InputError(self.file, found, "--column temperature=... of the table with the rates")
-        unit = columns[0].unit or (self.plan.time[0].unit if self.plan.time else None) if columns else None
+        unit = None
+        if columns and columns[0].kind == "number":
+            unit = columns[0].unit or (self.plan.time[0].unit if self.plan.time else None)
         clock = Clock(self.file, table, columns, unit, table.rate_hz, self.stated)
         clock.origin = self.clock.origin
         return clock

@@ -1,4 +1,4 @@
-"""One run of an imported data set on disk: Parquet (exact numbers, a third of the bytes, read without parsing) or CSV."""
+"""One run of an imported data set on disk: Parquet (exact numbers, few bytes, read without parsing) or CSV."""
 
 from __future__ import annotations
 

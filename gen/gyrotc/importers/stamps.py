@@ -202,7 +202,7 @@ class Stamps:
         chosen = ns[good]
         before = np.r_[self._last if self._last >= 0 else chosen[:1], chosen[:-1]]
         falls = np.cumsum(chosen < before - _DAY_NS // 2)
-        result = ns.copy()
+        result: Ints = ns.copy()
         result[good] = chosen + (self._midnights + falls) * _DAY_NS
         if len(chosen):
             self._midnights += int(falls[-1])
@@ -233,8 +233,9 @@ class _Parts:
     def hours(self) -> Ints:
         if not self.has("I"):
             return self.whole("H")
-        first = np.asarray(pc.utf8_lower(pc.fill_null(self.text("p"), "a")).to_numpy(zero_copy_only=False))
-        return self.whole("I") % 12 + 12 * (first == "p").astype(np.int64)
+        after_noon = pc.equal(pc.utf8_lower(pc.fill_null(self.text("p"), "a")), "p")
+        half: Ints = np.asarray(after_noon.to_numpy(zero_copy_only=False)).astype(np.int64)
+        return self.whole("I") % 12 + 12 * half
 
     def fraction(self) -> Ints:
         """Nanoseconds of the fraction."""
@@ -272,7 +273,7 @@ def _days(get: _Parts) -> tuple[Ints, NDArray[np.bool_]]:
         year = np.where(short < 69, 2000 + short, 1900 + short)
     if get.has("j"):
         start = (year - 1970).astype("datetime64[Y]").astype("datetime64[D]").astype(np.int64)
-        return start + get.whole("j", 1) - 1, np.ones(n, dtype=bool)
+        return np.asarray(start + get.whole("j", 1) - 1), np.ones(n, dtype=bool)
     month = get.whole("m", 1)
     if get.has("b"):
         names = pc.utf8_lower(get.text("b"))
