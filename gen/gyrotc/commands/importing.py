@@ -50,6 +50,13 @@ def import_(
         str | None,
         typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00."),
     ] = None,
+    csv: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--csv",
+            help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
+        ),
+    ] = None,
     format: Annotated[str, typer.Option("--format", help="Of the runs written: parquet or csv.")] = "parquet",
     trust_units: TrustUnitsOption = False,
     dry_run: Annotated[
@@ -68,7 +75,9 @@ def import_(
     known = load_map(map_file) if map_file else Map()
     units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
     stated = {"rate_hz": rate_hz, "format": time_format, "zone": time_zone}
-    chosen = _stated(known.model_dump(), units, stated, _columns(column or []), table)
+    content = known.model_dump()
+    content["csv"] |= _csv(csv or [], content["csv"])
+    chosen = _stated(content, units, stated, _columns(column or []), table)
     options = ImportOptions(serial, format, trust_units, dry_run)  # type: ignore[arg-type]
     with _share() as progress:
         result = import_files(
@@ -104,6 +113,20 @@ def _columns(stated: list[str]) -> dict[str, Any]:
             raise InputError("--column", repr(one), f"ROLE=NAME with ROLE one of {', '.join(_ROLES)}")
         columns[role] = (*columns.get("time", ()), name) if role == "time" else name
     return columns
+
+
+def _csv(stated: list[str], known: dict[str, Any]) -> dict[str, Any]:
+    """`key=value` options as `[csv]` of a map; `missing` and `comment` add to what is there."""
+    keys: dict[str, Any] = {}
+    for one in stated:
+        key, _, value = one.partition("=")
+        if key not in known or not value:
+            raise InputError("--csv", repr(one), f"KEY=VALUE with KEY one of {', '.join(known)}")
+        many = key in ("missing", "comment")
+        keys[key] = (
+            (*keys.get(key, known[key]), value) if many else int(value) if value.isdecimal() else value
+        )
+    return keys
 
 
 def _ask(question: str) -> str | None:

@@ -184,17 +184,17 @@ def _of_noise(
     unit = units.get(column)
     if walk == 0.0:
         return None
-    for likely, factor in _other_rates(unit):
-        if factor <= 1.0:
-            continue
-        least = _QUIETEST if not noise else noise / np.sqrt(factor)
-        if walk < least and (walk * factor >= _QUIETEST):
-            found = (
-                f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, below that of any gyro made, and a mean of "
-                f"{np.mean(rate):.4g} deg/h; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and "
-                f"{np.mean(rate) * factor:.4g} deg/h"
-            )
-            return Suspicion("rate", column, found, likely)
+    larger = [(likely, factor) for likely, factor in _other_rates(unit) if factor > 1.0]
+    for least in (_FLOWN, _QUIETEST):
+        for likely, factor in larger:
+            bound = _QUIETEST if not noise else noise / np.sqrt(factor)
+            if walk < bound and walk * factor >= least:
+                found = (
+                    f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, below that of any gyro made, and a mean of "
+                    f"{np.mean(rate):.4g} deg/h; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and "
+                    f"{np.mean(rate) * factor:.4g} deg/h"
+                )
+                return Suspicion("rate", column, found, likely)
     return None
 
 

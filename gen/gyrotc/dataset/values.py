@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .columns import Layout
 from .records import Floats
 
-__all__ = ["MIN_ROWS", "Fault", "faults", "rate_faults"]
+__all__ = ["MIN_ROWS", "Fault", "faults", "likely_temperature", "rate_faults"]
 
 MIN_ROWS = 10
 _TEMPERATURE_C = (-90.0, 200.0)
@@ -72,10 +72,20 @@ def _order(name: str, time: Floats) -> Iterator[Fault]:
 
 def _temperature(name: str, values: Floats) -> Iterator[Fault]:
     for fault in _within(name, values, _TEMPERATURE_C, "C"):
-        wrong = values > _TEMPERATURE_C[1]
-        kelvin = bool(np.all((values[wrong] >= _KELVIN[0]) & (values[wrong] <= _KELVIN[1])) and wrong.any())
-        hint = '; kelvin? [units] temperature = "K" in dataset.toml' if kelvin else ""
+        high = values[values > _TEMPERATURE_C[1]]
+        likely = likely_temperature(float(high.max())) if len(high) else None
+        word = {"K": "kelvin", "degF": "fahrenheit"}.get(likely or "", "")
+        hint = f'; {word}? [units] temperature = "{likely}" in dataset.toml' if likely else ""
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
+
+
+def likely_temperature(value: float) -> str | None:
+    """The unit in which a temperature beyond the plausible would be plausible: "K", "degF" or None."""
+    if value > _TEMPERATURE_C[1]:
+        if _KELVIN[0] <= value <= _KELVIN[1]:
+            return "K"
+        return "degF" if (value - 32.0) / 1.8 <= _TEMPERATURE_C[1] else None
+    return None
 
 
 def _within(name: str, values: Floats, limits: tuple[float, float], unit: str) -> Iterator[Fault]:

@@ -126,7 +126,7 @@ class Clock:
         if np.any(held & ~good):
             row = int(np.argmax(held & ~good))
             where = f"{self._file}, {self._table.place(chunk.first + row)}, column {self._columns[0].name}"
-            hint = f"a stamp of the form {self.form}; format under [time] of --map (or --time-format) names another"
+            hint = f"a stamp of the form {self.form}; --time-format names another"
             raise InputError(where, repr(texts[row].as_py()), hint)
         return ns, good
 

@@ -184,6 +184,11 @@ def _encoding(head: bytes) -> str:
 
 
 def _text(name: str, head: bytes, encoding: str) -> str:
+    strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
+    if strange > 0.01 * len(head) or (b"\x00" in head and not encoding.startswith("utf-16")):
+        raise InputError(
+            name, "binary data of no known format", "text, or a format that docs/import.md lists"
+        )
     try:
         text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
     except LookupError as error:
@@ -193,19 +198,15 @@ def _text(name: str, head: bytes, encoding: str) -> str:
     except UnicodeDecodeError as error:
         line = head[: error.start].count(b"\n") + 1
         found = f"bytes that are no {encoding}"
-        raise InputError(
-            f"{name}, line {line}", found, 'encoding = "cp1252" or another under [csv] of a map'
-        ) from error
-    if "\x00" in text:
-        raise InputError(name, "binary data", "text, or a format that gyrotc import knows (docs/import.md)")
+        raise InputError(f"{name}, line {line}", found, "another --csv encoding=...") from error
     return text
 
 
 def _comments(lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, ...]:
     stated = given.get("comment")
-    if stated:
-        return (stated,) if isinstance(stated, str) else tuple(stated)
-    return tuple(mark for mark in _COMMENTS if any(line.startswith(mark) for line in lines)) or ("#",)
+    more = (stated,) if isinstance(stated, str) else tuple(stated or ())
+    seen = tuple(mark for mark in _COMMENTS if any(line.startswith(mark) for line in lines)) or ("#",)
+    return tuple(dict.fromkeys((*seen, *more)))
 
 
 def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, str]:
@@ -226,7 +227,9 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
     if not best[2][0]:
         found = f"no columns of numbers: {sample[-1][:60]!r}"
         raise InputError(
-            name, found, "rows of numbers; delimiter and decimal under [csv] of a map name others"
+            name,
+            found,
+            "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen",
         )
     return best[2]
 
@@ -246,7 +249,9 @@ def _first_row(
             following = [_like(cells, kinds, decimal, count) for _, cells in split[k : k + 8]]
             if sum(following) >= _ENOUGH * len(following):
                 return k
-    raise InputError(name, "no rows of numbers", "rows of numbers; header_line under [csv] of a map")
+    raise InputError(
+        name, "no rows of numbers", "rows of numbers; --csv header_line=N names the line of the header"
+    )
 
 
 def _like(cells: Sequence[str], kinds: Sequence[str], decimal: str, count: int) -> bool:

@@ -181,10 +181,8 @@ class CsvTable(Table):
         where = f"{self.path.name}, line {line}"
         if len(row) != len(self.columns):
             found = f"{len(row)} cells: {self.dialect.delimiter.join(row)[:60]!r}"
-            hint = f'comment = ["{self.dialect.comment[0]}", "{_beginning(row)}"] under [csv] of --map'
-            raise InputError(
-                where, found, f"{len(self.columns)} as in the first rows; {hint} leaves such lines out"
-            )
+            hint = f'--csv comment="{_beginning(row)}" leaves out lines that begin so'
+            raise InputError(where, found, f"{len(self.columns)} as in the first rows; {hint}")
         values: dict[str, Any] = {}
         for name in names:
             cell = row[index[name]]
@@ -195,7 +193,7 @@ class CsvTable(Table):
             else:
                 plain = cell.replace(",", ".", 1) if self.dialect.decimal == "," else cell
                 if not _NUMBER.fullmatch(plain) and plain.lower().lstrip("+-") not in ("inf", "infinity"):
-                    hint = f'missing = ["{cell[:20]}"] under [csv] of --map takes it as no reading'
+                    hint = f'--csv missing="{cell[:20]}" takes it as no reading'
                     raise InputError(f"{where}, column {name}", repr(cell[:40]), f"a number; {hint}")
                 values[name] = int(plain) if self._type(name) == pa.int64() else float(plain)
         return values
@@ -231,7 +229,7 @@ def _blocks(path: Path, dialect: Dialect, size: int) -> Iterator[tuple[bytes, in
             except UnicodeDecodeError as error:
                 found = f"bytes that are no {dialect.encoding}"
                 place = f"{path.name}, after line {number + rest.count(10)}"
-                raise InputError(place, found, "encoding under [csv] of --map") from error
+                raise InputError(place, found, "another --csv encoding=...") from error
             block = _with_lf(rest + text, last=not left)
             end = len(block) if not left else block.rfind(b"\n") + 1
             if end == 0 and len(block) > _LONGEST_LINE:

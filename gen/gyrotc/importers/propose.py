@@ -328,7 +328,10 @@ class _Units:
         """The unit of a column of a kind; empty (and noted as missing) where it stands nowhere."""
         if kind in self._stated:
             return self._checked(kind, self._stated[kind], _OPTIONS[kind])
+        _, in_name, how = split_unit(column.name)
         in_file = column.unit or meaning(column.name, None, table.name).unit
+        if in_file is None and how.startswith(("in brackets", "after")):
+            in_file = in_name
         if in_file is not None:
             try:
                 conversion(in_file, kind)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..dataset.columns import Layout
 from ..dataset.evidence import Evidence
 from ..dataset.units import Conversion, UnitError, channel_unit, conversion
-from ..dataset.values import faults
+from ..dataset.values import faults, likely_temperature
 from ..errors import InputError
 from .clock import Clock
 from .mapping import TimeMap
@@ -219,9 +219,12 @@ class Rows:
             kind = {"time_s": "time", "temperature_c": "temperature"}.get(fault.column, "rate")
             unit = self.units.get(fault.column)
             read = f" (read as {unit.unit})" if unit else ""
-            expected = (
-                f"{fault.expected.split(';')[0]}: another --{kind}-unit, or another --column {kind}=..."
+            value = float(kept[fault.column][fault.row])
+            likely = (
+                likely_temperature(value) if kind == "temperature" and not (unit and unit.changes) else None
             )
+            option = f"--{kind}-unit {likely}" if likely else f"another --{kind}-unit"
+            expected = f"{fault.expected.split(';')[0]}: {option}, or another --column {kind}=..."
             raise InputError(f"{self.file}, {place}, column {fault.column}", fault.found + read, expected)
 
 

@@ -1,0 +1,302 @@
+"""What `gyrotc import` refuses: each refusal names the place, what stood there, and the one change that goes on."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from gyrotc.dataset import load
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """The command as a user types it, in this process: exit status, stdout, stderr."""
+    from gyrotc.cli import _status
+
+    def one(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["gyrotc", *map(str, arguments)])
+        status = _status()
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return one
+
+
+def lines(head: str, row: Callable[[int, float, float], str], rows: int = 600) -> str:
+    """A laser gyro with Earth's rate in it: 0.0005 deg/sqrt(h), 20 to 50 C and back in 100 minutes."""
+    rng = np.random.default_rng(3)
+    temperature = (
+        20.0 + 30.0 * (1.0 - np.abs(2.0 * np.arange(rows) / rows - 1.0)) + rng.normal(0.0, 0.01, rows)
+    )
+    rate = 10.0 + rng.normal(0.0, 0.01, rows)
+    every = zip(temperature.tolist(), rate.tolist(), strict=True)
+    return "\n".join([head, *(row(k, t, r) for k, (t, r) in enumerate(every))]) + "\n"
+
+
+OWN = "time_s,temperature_c,rate_dph"
+PLAIN = "time,temperature,gyro"
+
+REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "no units": (
+        lines(PLAIN, lambda k, t, r: f"{10 * k},{t},{r}"),
+        (),
+        ("no unit of the rate in column 'gyro'", "--rate-unit", "--temperature-unit", "--time-unit"),
+        ("--rate-unit", "deg/h", "--temperature-unit", "degC", "--time-unit", "s"),
+    ),
+    "one unit missing": (
+        lines("t_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
+        (),
+        ("no unit of the rate", "--rate-unit"),
+        ("--rate-unit", "deg/h"),
+    ),
+    "deg/s taken for deg/h": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{r / 3600}"),
+        (),
+        ("white noise", "below that of any gyro", '--rate-unit "deg/s"', "--trust-units"),
+        ("--rate-unit", "deg/s"),
+    ),
+    "rad/s taken for deg/h": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{np.radians(r / 3600)}"),
+        (),
+        ("below that of any gyro", "rad/s", "--trust-units"),
+        ("--rate-unit", "rad/s"),
+    ),
+    "minutes taken for seconds": (
+        lines(OWN, lambda k, t, r: f"{k / 6},{t},{r}"),
+        (),
+        ("C/min", "faster than a chamber", '--time-unit "min"'),
+        ("--time-unit", "min"),
+    ),
+    "hours taken for seconds": (
+        lines(OWN, lambda k, t, r: f"{k / 360},{t},{r}"),
+        (),
+        ("faster than a chamber", "C/min"),
+        ("--time-unit", "h"),
+    ),
+    "kelvin taken for C": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t + 273.15},{r}"),
+        (),
+        ("line 2", "--temperature-unit K"),
+        ("--temperature-unit", "K"),
+    ),
+    "fahrenheit taken for C": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{(t + 15) * 1.8 + 32},{r}"),
+        (),
+        ("fahrenheit", '--temperature-unit "degF"'),
+        ("--temperature-unit", "degF"),
+    ),
+    "a word among numbers": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{'OVR' if k == 300 else r}"),
+        (),
+        ("line 302, column rate_dph", "'OVR'", "--csv missing"),
+        ("--csv", "missing=OVR"),
+    ),
+    "a line of words": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}" if k != 300 else "Logger restarted"),
+        (),
+        ("line 302", "Logger restarted", "--csv comment"),
+        ("--csv", "comment=Logger"),
+    ),
+    "day or month": (
+        lines(
+            "time,temp_c,rate_dph",
+            lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}",
+        ),
+        (),
+        ("cannot be told apart", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
+        ("--time-format", "%d/%m/%Y %H:%M:%S"),
+    ),
+    "stamps too coarse": (
+        lines(
+            "time,temp_c,rate_dph", lambda k, t, r: f"2026-03-01 08:{k // 100:02d}:{k // 10 % 60:02d},{t},{r}"
+        ),
+        (),
+        ("line 3", "the time of the row before", "--rate-hz"),
+        ("--rate-hz", "0.1"),
+    ),
+    "two thermometers": (
+        lines("time_s,T1 [C],T2 [C],rate_dph", lambda k, t, r: f"{10 * k},{t},{t},{r}"),
+        (),
+        ("'T1 [C]', 'T2 [C]' could be the temperature", "--column temperature="),
+        ("--column", "temperature=T2 [C]"),
+    ),
+    "no times": (
+        lines("temp_c,rate_dph", lambda k, t, r: f"{t},{r}"),
+        (),
+        ("no column that a time is told from", "--rate-hz"),
+        ("--rate-hz", "0.1"),
+    ),
+    "a unit that is none": (
+        lines("time_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
+        ("--rate-unit", "furlongs"),
+        ("--rate-unit", "furlongs", "deg/s"),
+        ("--rate-unit", "deg/h"),
+    ),
+    "a unit of something else": (
+        lines("time_s,temp_c,gyro [V]", lambda k, t, r: f"{10 * k},{t},{r}"),
+        ("--column", "rate=gyro [V]"),
+        ("'V'", "no rate", "--rate-unit"),
+        ("--column", "rate=gyro [V]", "--rate-unit", "deg/h"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_refusal_names_what_goes_on_and_that_goes_on(case: str, tmp_path: Path, run: Run) -> None:
+    text, options, words, mended = REFUSED[case]
+    (tmp_path / "log.csv").write_text(text)
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", *options)
+    assert status == 2, out
+    assert all(word in error for word in words), error
+    assert not (tmp_path / "RLG-1").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv"]
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", *mended)
+    assert status == 0, error
+    rows = load(tmp_path / "RLG-1").runs[0].rows()
+    assert rows.rate_dph.mean() == pytest.approx(10.0, abs=0.01)
+    assert rows.temperature_c.max() == pytest.approx(50.0, abs=15.1)
+    assert rows.time_s[-1] - rows.time_s[0] == pytest.approx(5990.0, rel=0.01)
+
+
+def test_values_that_are_right_as_they_are_come_in_and_it_is_recorded(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(REFUSED["deg/s taken for deg/h"][0])
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", "--trust-units")
+    assert status == 0, error
+    assert "units are trusted: rate_dph: white noise" in out
+    dataset = load(tmp_path / "RLG-1")
+    assert "white noise" in dataset.trusted[0]
+
+
+def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_path: Path, run: Run) -> None:
+    text = lines("t;T;G", lambda k, t, r: f"{10 * k};{t};{r / 3600}".replace(".", ","))
+    stated = [
+        "--column",
+        "rate=G",
+        "--column",
+        "temperature=T",
+        "--rate-unit",
+        "deg/s",
+        "--temperature-unit",
+        "degC",
+    ]
+    (tmp_path / "one.csv").write_text(text)
+    first = run(
+        "import",
+        tmp_path / "one.csv",
+        "--out",
+        tmp_path / "A",
+        *stated,
+        "--time-unit",
+        "s",
+        "--serial",
+        "RLG-1",
+    )
+    assert first[0] == 0, first[2]
+    (tmp_path / "one-again.csv").write_text(text)
+    kept = tmp_path / "A" / "map.toml"
+    second = run("import", tmp_path / "one.csv", "--out", tmp_path / "B", "--map", kept)
+    third = run(
+        "import", tmp_path / "one-again.csv", "--out", tmp_path / "C", "--map", kept, "--serial", "RLG-2"
+    )
+    assert second[0] == third[0] == 0, second[2] + third[2]
+    for name in ("dataset.toml", "map.toml", "one.parquet"):
+        assert (tmp_path / "A" / name).read_bytes() == (tmp_path / "B" / name).read_bytes(), name
+    assert load(tmp_path / "C").serial == "RLG-2"
+    source = load(tmp_path / "A").sources[0]
+    assert source["file"] == "one.csv" and source["bytes"] == len(text)
+
+
+def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    result = tmp_path / "import.json"
+    status, _, error = run(
+        "import",
+        tmp_path / "a.csv",
+        tmp_path / "b.csv",
+        "--out",
+        tmp_path / "R",
+        "--format",
+        "csv",
+        "--json",
+        result,
+    )
+    assert status == 0, error
+    dataset = load(tmp_path / "R")
+    assert [run.file for run in dataset.runs] == ["a.csv", "b.csv"]
+    assert [source["file"] for source in dataset.sources] == ["a.csv", "b.csv"]
+    assert json.loads(result.read_text())["schema"] == "gyrotc.import/1"
+    assert dataset.runs[0].power_on_s is None
+
+
+def test_a_folder_that_import_did_not_make_is_left_alone(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    (tmp_path / "R").mkdir()
+    (tmp_path / "R" / "thesis.tex").write_text("mine")
+    status, _, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "R")
+    assert status == 2 and "R" in error
+    assert [p.name for p in (tmp_path / "R").iterdir()] == ["thesis.tex"]
+
+
+def test_a_dry_run_writes_nothing(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    status, out, _ = run("import", tmp_path / "log.csv", "--out", tmp_path / "R", "--dry-run")
+    assert status == 0 and "row 1:" in out and "nothing was written" in out
+    assert not (tmp_path / "R").exists()
+
+
+def test_a_missing_library_is_one_line_that_says_what_to_install(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
+    status, _, error = run("import", tmp_path / "flight.ulg", "--out", tmp_path / "R")
+    assert status == 2 and "pip install 'gyrotc[ulog]'" in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"", b"ULog\x01\x12\x35\x01\0", b"\x89HDF\r\n\x1a\n\0\0", b"MATLAB 5.0 MAT-file\0\0", b"TDSm\0\0\0", b"#ROSBAG V2.0\n\0",
+     b"MDF     4.10    \0", b"\xa3\x95\x80\0\0", b"PAR1\0\0", b"SQLite format 3\x00\0", b"PK\x03\x04", bytes(range(256)) * 9],
+    ids=lambda head: repr(head[:8]),
+)  # fmt: skip
+def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.bin").write_bytes(head)
+    status, _, error = run("import", tmp_path / "log.bin", "--out", tmp_path / "R")
+    assert status == 2, error
+    assert error.splitlines()[-1].startswith("gyrotc: ") and not (tmp_path / "R").exists()
+
+
+def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
+    """Twelve megabytes and four times that need the same memory within 60 MiB: nothing is kept of the rows."""
+    peaks = []
+    row = "{},{:.3f},20.123456,0.123456\n"
+    for k, blocks in enumerate((1, 4)):
+        path = tmp_path / f"{k}.csv"
+        with path.open("w") as file:
+            file.write("time_s,temperature_c,rate_dph,supply_v\n")
+            for block in range(blocks):
+                start = block * 400_000
+                file.writelines(
+                    row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000)
+                )
+        program = (
+            "import resource, sys; from gyrotc.cli import _status; sys.argv[0] = 'gyrotc'; status = _status(); "
+            "print(status, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+        )
+        command = [sys.executable, "-c", program, "import", str(path), "--out", str(tmp_path / f"R{k}")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        status, peak = done.stdout.splitlines()[-1].split()
+        assert status == "0", done.stderr
+        peaks.append(int(peak))
+        assert pq.ParquetFile(tmp_path / f"R{k}" / f"{k}.parquet").metadata.num_rows == blocks * 400_000
+    assert peaks[1] < peaks[0] + 60, peaks
+    assert peaks[1] < 700, peaks
