@@ -70,7 +70,6 @@ DOUBTS: dict[str, Callable[[Columns], Mapping[str, np.ndarray]]] = {
     "gaps": _gap,
     "time_since_epoch": lambda c: c | {"time_s": c["time_s"] + 1.7e9},
     "small_rates": lambda c: c | {"rate_dph": c["rate_dph"] / 3600.0**2},
-    "hot": lambda c: c | {"temperature_c": 1.8 * c["temperature_c"] + 60.0},
 }
 
 

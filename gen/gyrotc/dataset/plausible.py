@@ -27,9 +27,8 @@ _FASTEST_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress scre
 _RISE_C = 5.0  # of a change that is looked at, in four steps of which none is most of it
 _STEPS = 4
 _LARGEST_STEP = 0.6
-_QUIETEST = (
-    5e-6  # deg/sqrt(h): a tenth of the quietest gyros flown, hemispherical resonators and long fibre coils
-)
+_FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
+_QUIETEST = 0.1 * _FLOWN
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
 _FEWEST_CELLS = 30  # less is not judged
 _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
