@@ -264,8 +264,9 @@ def test_a_missing_library_is_one_line_that_says_what_to_install(
 
 @pytest.mark.parametrize(
     "head",
-    [b"", b"ULog\x01\x12\x35\x01\0", b"\x89HDF\r\n\x1a\n\0\0", b"MATLAB 5.0 MAT-file\0\0", b"TDSm\0\0\0", b"#ROSBAG V2.0\n\0",
-     b"MDF     4.10    \0", b"\xa3\x95\x80\0\0", b"PAR1\0\0", b"SQLite format 3\x00\0", b"PK\x03\x04", bytes(range(256)) * 9],
+    [b"", b"ULog\x01\x12\x35\x01\0", b"\x89HDF\r\n\x1a\n\0\0", b"MATLAB 5.0 MAT-file\0\0", b"TDSm\0\0\0",
+     b"#ROSBAG V2.0\n\0", b"MDF     4.10    \0", b"\xa3\x95\x80\0\0", b"PAR1\0\0", b"SQLite format 3\x00\0",
+     b"PK\x03\x04", bytes(range(256)) * 9],
     ids=lambda head: repr(head[:8]),
 )  # fmt: skip
 def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) -> None:

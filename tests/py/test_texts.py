@@ -21,6 +21,7 @@ from gyrotc.commands.results import evaluation_table, verify_table
 from gyrotc.dataset import load
 from gyrotc.dataset.problems import Problems
 from gyrotc.dataset.schema import parse_description
+from gyrotc.dataset.text import dataset_toml
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import InputError
 from gyrotc.jobs.diagnosis import extended_scenario
@@ -33,7 +34,6 @@ from gyrotc.pages import report
 from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
 from gyrotc.simulate import scenario
-from gyrotc.simulate.write import dataset_toml
 from gyrotc.texts import (
     C_COMMENT,
     c_code,

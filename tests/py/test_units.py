@@ -181,7 +181,7 @@ def test_earths_rate_along_the_axis_tells_the_unit(factor: float, refused: bool,
         run='file = "a.csv"\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0',
     )
     if refused:
-        with pytest.raises(InputError, match="Earth's rate along the axis|below that of any gyro"):
+        with pytest.raises(InputError, match=r"Earth's rate along the axis|below that of any gyro"):
             load(folder)
     else:
         load(folder)

@@ -27,6 +27,7 @@ from .base import (
     RhoOption,
     SeedOption,
     TrustOption,
+    TrustUnitsOption,
     app,
     json_text,
     numerics_of,
@@ -147,6 +148,7 @@ def verify(
         Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
     ] = None,
     trust_code: TrustOption = False,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
@@ -167,7 +169,7 @@ def verify(
     with progress() as say:
         for part in [folder / axis for axis in axes] or [folder]:
             axis = load_model(part / "model.json").axis
-            recordings = load(dataset, axis=axis) if dataset else None
+            recordings = load(dataset, axis=axis, trust_units=trust_units) if dataset else None
             with result_folder(part, "verify", entries=("verify.json",)) as stage:
                 results[str(axis)] = run(
                     part,
@@ -207,6 +209,7 @@ def evaluate(
     average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
     applied: AppliedOption = None,
     trust_code: TrustOption = False,
+    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -219,7 +222,8 @@ def evaluate(
     from ..quantise.applied import applied_of
 
     axis = load_model(folder / "model.json").axis
-    recordings = load(dataset, axis=axis, applied=applied_of(applied) if applied else None, exam_only=True)
+    subtracted = applied_of(applied) if applied else None
+    recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
         result = run(
             folder,

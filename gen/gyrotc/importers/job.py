@@ -17,7 +17,7 @@ from ..dataset.schema import FILE, check_serial
 from ..dataset.text import dataset_toml
 from ..dataset.values import MIN_ROWS
 from ..errors import InputError
-from .folder import whole_folder
+from ..outputs import result_folder
 from .formats import open_logger_file
 from .mapping import MAP_FILE, Map, TimeMap, map_text
 from .propose import Ask, Plan, propose
@@ -115,7 +115,8 @@ def _imported(
     entries: list[dict[str, Any]] = []
     names: set[str] = set()
     serial = ""
-    with whole_folder(out) as folder:
+    with result_folder(out, "import", inputs=files) as stage:
+        folder = stage.folder
         for path in files:
             file = open_logger_file(path, chosen)
             plan = propose(file, chosen, ask)
@@ -123,7 +124,9 @@ def _imported(
             for line in proposal(file, plan, rows):
                 tell(line)
             chosen = _kept(chosen, file, plan, rows)
-            serial = serial or _serial(options.serial, chosen, file, out)
+            if not serial:
+                serial = _serial(options.serial, chosen, file, out)
+                stage.of(serial)
             target = folder / f"{_run_name(path, names)}.{options.format}"
             entries.append(_run(file, rows, target, chosen, options, tell, progress))
         chosen = chosen.model_copy(update={"serial": serial})

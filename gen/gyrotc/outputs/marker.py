@@ -37,6 +37,7 @@ KINDS = {
     "plan": "plan",
     "compare": "comparison",
     "simulate": "data set",
+    "import": "data set",
     "fleet": "fleet",
 }
 """Kind of folder that a command writes."""
