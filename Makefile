@@ -111,6 +111,13 @@ bench:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
+## a CSV file of 2 GB through gyrotc import, pandas, polars and pyarrow (in build/bench): docs/results.md
+bench-import:
+	@tools/setup.sh test
+	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
+	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
+	@build/bench/bin/python -m bench.importing docs $(MEGABYTES)
+
 ## a thousand gyros through gyrotc fleet: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
@@ -127,4 +134,4 @@ blind: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench fleet kills blind clean
+.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind clean

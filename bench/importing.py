@@ -1,7 +1,7 @@
 """`python -m bench.importing docs [MEGABYTES]`: a long CSV file through `gyrotc import`, pandas, polars and pyarrow.
 
-Each turns the same file (time in ms, temperature in K, rate in deg/s) into a Parquet file of s, C and deg/h, in a process
-of its own; CPU time, elapsed time and peak memory are those of that process.
+Each turns the same file (time in ms, temperature in K, rate in deg/s) into a Parquet file of s, C and deg/h, in a
+process of its own; CPU time, elapsed time and peak memory are those of that process.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _MEGABYTES = 2000
 _ROWS_AT_ONCE = 2**20
 _SECTION = """## A long file in (`make bench-import`)
 
-{machine}. One CSV file of {megabytes:.0f} MB, {rows:,} rows of time in ms, temperature in K and rate in deg/s, into a Parquet
-file of s, C and deg/h. `gyrotc import` also tells the dialect and the units, checks every value, judges the units, and
-hashes the file; it reads a block at a time on one processor. The load is that of the machine before the job.
+{machine}. One CSV file of {megabytes:.0f} MB, {rows:,} rows of time in ms, temperature in K and rate in deg/s, into a
+Parquet file of s, C and deg/h. `gyrotc import` also tells the dialect and the units, checks every value, judges the
+units, and hashes the file; it reads a block at a time on one processor. The load is that of the machine before the job.
 
 | reader | elapsed | CPU | peak memory |
 | --- | --- | --- | --- |
@@ -44,7 +44,8 @@ _PEERS = {
     "pandas": (
         "import sys, pandas as pd\n"
         "t = pd.read_csv(sys.argv[1])\n"
-        "o = pd.DataFrame({'time_s': t['time_ms'] / 1e3, 'temperature_c': t['temp_K'] - 273.15, 'rate_dph': t['rate_dps'] * 3600})\n"
+        "o = pd.DataFrame({'time_s': t['time_ms'] / 1e3, 'temperature_c': t['temp_K'] - 273.15,\n"
+        "                  'rate_dph': t['rate_dps'] * 3600})\n"
         "o.to_parquet(sys.argv[2])\n"
     ),
     "polars": (

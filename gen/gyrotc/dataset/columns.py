@@ -50,7 +50,11 @@ def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problem
         if name not in names:
             found = f"no column {name} among {_list(names)}"
             problems.add(
-                InputError(f"{file}, line 1", found, f"the {kind} in {name}, or [columns] {kind} = ...")
+                InputError(
+                    f"{file}, line 1",
+                    found,
+                    f"the {kind} in {name}, or [columns] {kind} = ... (`gyrotc import` finds it)",
+                )
             )
     axes = {axis: name for name, axis in AXES.items() if name in names and name != columns.rate}
     given = [columns.rate] * (columns.rate in names) + [PULSES] * (PULSES in names)
@@ -59,7 +63,7 @@ def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problem
         problems.add(InputError(f"{file}, line 1", f"both {' and '.join(given)}", "one of them"))
     elif not given:
         found = f"no column {columns.rate} among {_list(names)}"
-        expected = f"{columns.rate}, pulses, or rate_x_dph, rate_y_dph, rate_z_dph"
+        expected = f"{columns.rate}, pulses, or rate_x_dph, rate_y_dph, rate_z_dph (`gyrotc import` finds it)"
         problems.add(InputError(f"{file}, line 1", found, expected))
     if len(problems) > before:
         return None

@@ -30,6 +30,7 @@ _BLOCK_BYTES = 2**20
 _LONGEST_LINE = 2**20
 _LF, _CR = 10, 13
 _COPIES = 2.0  # of the columns while they are checked
+_IMPORT = "`gyrotc import` reads other forms"
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
 
@@ -180,7 +181,7 @@ class _Faults:
         if not cell:
             self.add(line, column, "empty", "an empty cell", "a number")
         else:
-            self.add(line, column, "text", repr(cell[:40]), "a number with a decimal point")
+            self.add(line, column, "text", repr(cell[:40]), f"a number with a decimal point; {_IMPORT}")
         return float("nan")
 
     def faults(self) -> list[Fault]:
@@ -195,24 +196,26 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
     if not head:
         raise InputError(name, "is empty", "a header and rows")
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError(name, "UTF-16 text", "UTF-8 text")
+        raise InputError(name, "UTF-16 text", f"UTF-8 text; {_IMPORT}")
     if b"\x00" in head or len(head) == _LONGEST_LINE:
-        raise InputError(name, "binary data", "CSV text with a header")
+        raise InputError(name, "binary data", f"CSV text with a header; {_IMPORT}")
     try:
         text = head.decode("utf-8-sig").rstrip("\r\n")
     except UnicodeDecodeError:
-        raise InputError(where, "bytes that are no UTF-8", "CSV text in UTF-8") from None
+        raise InputError(where, "bytes that are no UTF-8", f"CSV text in UTF-8; {_IMPORT}") from None
     if "\r" in text:
         raise InputError(where, "carriage returns inside a line", "line ends of LF or CRLF")
     if "," not in text:
         for mark, what in ((";", "semicolons"), ("\t", "tabs")):
             if mark in text:
-                expected = "commas between columns and points in decimals"
+                expected = f"commas between columns and points in decimals; {_IMPORT}"
                 raise InputError(where, f"{what} between columns", expected)
     cells = next(csv.reader([text], skipinitialspace=True), [])
     names = tuple(_bare(cell) for cell in cells)
     if not names or all(_NUMBER.fullmatch(cell) for cell in names):
-        raise InputError(where, "no header" if names else "an empty line", "the names of the columns")
+        raise InputError(
+            where, "no header" if names else "an empty line", f"the names of the columns; {_IMPORT}"
+        )
     return names
 
 

@@ -57,7 +57,11 @@ class ParquetFile(Source):
         _refuse_bomb(name, self.size, max(unpacked, 8 * self._n_rows * len(self.names)))
         for field in schema:
             if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
-                raise InputError(f"{name}, column {field.name}", f"holds {field.type}", "numbers")
+                raise InputError(
+                    f"{name}, column {field.name}",
+                    f"holds {field.type}",
+                    "numbers; `gyrotc import` reads stamps and more",
+                )
 
     def read(self, columns: Sequence[str]) -> dict[str, Floats]:
         """As `Source.read`, row group by row group; never None."""

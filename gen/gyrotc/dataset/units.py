@@ -86,7 +86,7 @@ _ENDINGS = {
 """Endings of names of channels that say their unit, as in `case_temperature_c`."""
 
 _ALLOWED = re.compile(r"[\w\s.°*/^()+\-µ%]{1,60}")
-_LARGE_POWER = re.compile(r"(\*\*|\^)\s*[-+]?\s*\d{2,}|(\*\*|\^).*(\*\*|\^).*(\*\*|\^)")
+_LARGE_POWER = re.compile(r"(\*\*|\^)(?!\s*[-+]?[1-3](?!\s*(\d|\*\*|\^|\.)))")  # pint would compute any
 _ROUNDING = 1e-13  # what pint's products of binary numbers may be off, relative
 _DENOMINATOR = 1000
 
