@@ -24,9 +24,9 @@ Floats = NDArray[np.float64]
 _HOTTEST_C = 125.0  # upper end of the military range; beyond it are down-hole gyros, whose owners know
 _COLDEST_C = -90.0
 _FASTEST_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
-_RISE_C = 5.0  # of a change that is looked at, in four steps of which none is most of it
-_STEPS = 4
-_LARGEST_STEP = 0.6
+_RISE_C = 5.0  # of a change that is looked at, in six steps of which none is nearly half of it
+_STEPS = 6
+_LARGEST_STEP = 0.4
 _FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
 _QUIETEST = 0.1 * _FLOWN
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
@@ -142,7 +142,7 @@ def _of_time(
 
 
 def _sustained(time: Floats, temperature: Floats) -> float:
-    """Fastest change of temperature that lasts, C/min: four steps of one sign, 5 C or more, no step most of it.
+    """Fastest change of temperature that lasts, C/min: six steps of one sign, 5 C or more, no step nearly half of it.
 
     It is sought on every scale: cells are merged in pairs until too few are left.
     """

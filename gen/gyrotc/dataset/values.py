@@ -72,20 +72,25 @@ def _order(name: str, time: Floats) -> Iterator[Fault]:
 
 def _temperature(name: str, values: Floats) -> Iterator[Fault]:
     for fault in _within(name, values, _TEMPERATURE_C, "C"):
-        high = values[values > _TEMPERATURE_C[1]]
-        likely = likely_temperature(float(high.max())) if len(high) else None
+        likely = likely_temperature(values)
         word = {"K": "kelvin", "degF": "fahrenheit"}.get(likely or "", "")
         hint = f'; {word}? [units] temperature = "{likely}" in dataset.toml' if likely else ""
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
 
 
-def likely_temperature(value: float) -> str | None:
-    """The unit in which a temperature beyond the plausible would be plausible: "K", "degF" or None."""
-    if value > _TEMPERATURE_C[1]:
-        if _KELVIN[0] <= value <= _KELVIN[1]:
-            return "K"
-        return "degF" if (value - 32.0) / 1.8 <= _TEMPERATURE_C[1] else None
-    return None
+def likely_temperature(values: Floats) -> str | None:
+    """The unit in which temperatures beyond the plausible would all be plausible: "K", "degF" or None."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    if high <= _TEMPERATURE_C[1]:
+        return None
+    if _KELVIN[0] <= low and high <= _KELVIN[1]:
+        return "K"
+    return (
+        "degF"
+        if (high - 32.0) / 1.8 <= _TEMPERATURE_C[1] and (low - 32.0) / 1.8 >= _TEMPERATURE_C[0]
+        else None
+    )
 
 
 def _within(name: str, values: Floats, limits: tuple[float, float], unit: str) -> Iterator[Fault]:

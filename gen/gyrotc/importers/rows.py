@@ -219,10 +219,8 @@ class Rows:
             kind = {"time_s": "time", "temperature_c": "temperature"}.get(fault.column, "rate")
             unit = self.units.get(fault.column)
             read = f" (read as {unit.unit})" if unit else ""
-            value = float(kept[fault.column][fault.row])
-            likely = (
-                likely_temperature(value) if kind == "temperature" and not (unit and unit.changes) else None
-            )
+            guess = kind == "temperature" and not (unit and unit.changes)
+            likely = likely_temperature(kept[fault.column]) if guess else None
             option = f"--{kind}-unit {likely}" if likely else f"another --{kind}-unit"
             expected = f"{fault.expected.split(';')[0]}: {option}, or another --column {kind}=..."
             raise InputError(f"{self.file}, {place}, column {fault.column}", fault.found + read, expected)
