@@ -15,7 +15,12 @@ _WHY = "PX4's definition of the message"
 _UNITS: dict[str, dict[str, str]] = {
     "sensor_gyro": {"x": "rad/s", "y": "rad/s", "z": "rad/s", "temperature": "degC"},
     "sensor_gyro_fifo": {},
-    "sensor_combined": {"gyro_rad[0]": "rad/s", "gyro_rad[1]": "rad/s", "gyro_rad[2]": "rad/s"},
+    "sensor_combined": {
+        "gyro_rad[0]": "rad/s",
+        "gyro_rad[1]": "rad/s",
+        "gyro_rad[2]": "rad/s",
+        "baro_temp_celcius": "degC",
+    },
     "sensor_accel": {"temperature": "degC"},
     "sensor_baro": {"temperature": "degC"},
     "vehicle_imu_status": {"temperature_gyro": "degC", "temperature_accel": "degC"},
