@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from ..dataset.units import Conversion, conversion
 from ..errors import InputError
+from .forms import forms_of
 from .mapping import TimeMap
-from .stamps import Stamps, forms_of
+from .stamps import Stamps
 from .tables import Chunk, Column, Table
 
 __all__ = ["Clock"]

@@ -14,14 +14,14 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from ..errors import InputError
-from .csvdialect import MISSING, Dialect, cells_of, dialect_of, kind_of_cells
+from .csvblocks import blocks_of, lines_of
+from .csvcells import MISSING, cells_of, kind_of_cells
+from .csvdialect import Dialect, dialect_of
 from .tables import Chunk, Column, LoggerFile, Table
 
 __all__ = ["CsvTable", "open_csv"]
 
 _HEAD_BYTES = 2**18
-_BLOCK_BYTES = 2**23
-_LONGEST_LINE = 2**20
 _SAMPLE = 40
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -73,7 +73,7 @@ class CsvTable(Table):
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`: a chunk for each block of lines."""
         first = 0
-        for lines, number, done in _blocks(self.path, self.dialect, self.size):
+        for lines, number, done in blocks_of(self.path, self.dialect, self.size):
             rows = self._rows(lines, number, names, last=done >= 1.0)
             if rows is not None and len(next(iter(rows.values()))):
                 yield Chunk(rows, first, done)
@@ -82,8 +82,8 @@ class CsvTable(Table):
     def place(self, row: int) -> str:
         """Number of the line of a row."""
         at = 0
-        for lines, number, _ in _blocks(self.path, self.dialect, self.size):
-            for line, text in _lines_of(lines, number):
+        for lines, number, _ in blocks_of(self.path, self.dialect, self.size):
+            for line, text in lines_of(lines, number):
                 if self._is_row(text):
                     if at == row:
                         return f"line {line}"
@@ -152,7 +152,7 @@ class CsvTable(Table):
         """
         index = {column.name: k for k, column in enumerate(self.columns)}
         cells: dict[str, list[Any]] = {name: [] for name in names}
-        every = list(_lines_of(lines, number))
+        every = list(lines_of(lines, number))
         torn = last and not lines.endswith((b"\n", b"\r"))
         for k, (line, text) in enumerate(every):
             if not self._is_row(text):
@@ -207,58 +207,6 @@ def _values(column: Any) -> Any:
     if pa.types.is_string(joined.type):
         return joined
     return joined.to_numpy(zero_copy_only=False)
-
-
-def _blocks(path: Path, dialect: Dialect, size: int) -> Iterator[tuple[bytes, int, float]]:
-    """Blocks of whole lines of rows in UTF-8 with LF, the number of their first line, and the share read.
-
-    Raises:
-        InputError: Bytes that the encoding does not know, or a line without end.
-    """
-    decoder = codecs.getincrementaldecoder(dialect.encoding)("strict")
-    plain = dialect.encoding in ("utf-8", "utf-8-sig", "ascii")
-    rest, number, left = b"", 1, size
-    with path.open("rb") as file:
-        while left:
-            block = file.read(min(_BLOCK_BYTES, left))
-            if not block:
-                break
-            left -= len(block)
-            try:
-                text = block if plain else decoder.decode(block, final=not left).encode()
-            except UnicodeDecodeError as error:
-                found = f"bytes that are no {dialect.encoding}"
-                place = f"{path.name}, after line {number + rest.count(10)}"
-                raise InputError(place, found, "another --csv encoding=...") from error
-            block = _with_lf(rest + text, last=not left)
-            end = len(block) if not left else block.rfind(b"\n") + 1
-            if end == 0 and len(block) > _LONGEST_LINE:
-                raise InputError(
-                    f"{path.name}, line {number}", f"{len(block)} bytes and no end", "lines of cells"
-                )
-            lines, rest = block[:end], block[end:]
-            count = lines.count(b"\n")
-            if number < dialect.data_line:
-                skipped = min(dialect.data_line - number, count)
-                lines = lines.split(b"\n", skipped)[skipped] if skipped else lines
-                number += skipped
-                count -= skipped
-            if number >= dialect.data_line and lines:
-                yield lines.removeprefix(codecs.BOM_UTF8), number, 1.0 - left / size
-            number += count
-
-
-def _with_lf(block: bytes, *, last: bool) -> bytes:
-    """Line ends of any kind as LF; a carriage return that ends the block waits for the next one."""
-    if b"\r" not in block:
-        return block
-    if block.endswith(b"\r") and not last:
-        return block[:-1].replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\r"
-    return block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-
-
-def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
-    yield from enumerate(lines.decode("utf-8", "replace").split("\n"), start=number)
 
 
 def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-import hashlib
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import PydanticCustomError
-
 from .. import __version__
 from ..dataset.plausible import Suspicion, suspicions
-from ..dataset.schema import FILE, check_serial
-from ..dataset.text import dataset_toml
+from ..dataset.schema import FILE
 from ..dataset.values import MIN_ROWS
 from ..errors import InputError
 from ..outputs import result_folder
+from .described import description_of, kept_map, run_name, serial_of, sha256_of, size_of
 from .formats import open_logger_file
-from .mapping import MAP_FILE, Map, TimeMap, map_text
-from .propose import Ask, Plan, propose
+from .mapping import MAP_FILE, Map, map_text
+from .propose import propose
 from .rows import Rows
 from .runfile import Format, RunFile
 from .tables import LoggerFile
+from .unitchoice import Ask
 from .words import preview, proposal, summary
 
 __all__ = ["ImportOptions", "Imported", "import_files"]
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
-_BLOCK_BYTES = 2**22
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,15 +119,15 @@ def _imported(
             rows = Rows(path.name, plan, chosen.time)
             for line in proposal(file, plan, rows):
                 tell(line)
-            chosen = _kept(chosen, file, plan, rows)
+            chosen = kept_map(chosen, file, plan, rows)
             if not serial:
-                serial = _serial(options.serial, chosen, file, out)
+                serial = serial_of(options.serial, chosen, file, out)
                 stage.of(serial)
-            target = folder / f"{_run_name(path, names)}.{options.format}"
+            target = folder / f"{run_name(path, names)}.{options.format}"
             entries.append(_run(file, rows, target, chosen, options, tell, progress))
         chosen = chosen.model_copy(update={"serial": serial})
         (folder / MAP_FILE).write_text(map_text(chosen), "utf-8")
-        (folder / FILE).write_text(_description(serial, chosen, entries), "utf-8")
+        (folder / FILE).write_text(description_of(serial, chosen, entries), "utf-8")
     for line in summary(out, entries):
         tell(line)
     return Imported(serial, chosen, tuple(entries))
@@ -183,8 +179,8 @@ def _run(
         "evidence": rows.evidence,
         "source": {
             "file": file.path.name,
-            "sha256": _sha256(file.path),
-            "bytes": _size(file.path),
+            "sha256": sha256_of(file.path),
+            "bytes": size_of(file.path),
             "imported_by": f"gyrotc {__version__}",
             "map": MAP_FILE,
             "run": target.name,
@@ -211,94 +207,3 @@ def _judged(file: LoggerFile, rows: Rows, chosen: Map, options: ImportOptions) -
             )
             raise InputError(f"{file.path.name}, column {one.column}", one.found, expected)
     return [f"{one.column}: {one.found}" for one in found]
-
-
-def _kept(chosen: Map, file: LoggerFile, plan: Plan, rows: Rows) -> Map:
-    """The map with every choice that was made."""
-    columns: dict[str, Any] = {choice.role: choice.source for choice in (*plan.values, plan.temperature)}
-    if plan.time:
-        columns["time"] = tuple(choice.column.name for choice in plan.time)
-    units = dict(chosen.units)
-    if plan.time and plan.time[0].unit:
-        units["time"] = plan.time[0].unit
-    units["temperature"] = plan.temperature.unit or ""
-    if plan.values[0].unit:
-        units["rate"] = plan.values[0].unit
-    units |= {
-        choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units
-    }
-    time = TimeMap(format=rows.clock.form or None, zone=chosen.time.zone, rate_hz=plan.rate_hz)
-    csv = {
-        k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal")
-    } | chosen.csv.given()
-    update = {
-        "columns": columns,
-        "channels": {choice.role: choice.source for choice in plan.channels},
-        "units": units,
-        "csv": csv,
-        "time": time.model_dump(),
-    }
-    return Map.model_validate(chosen.model_dump() | update)
-
-
-def _serial(stated: str | None, chosen: Map, file: LoggerFile, out: Path) -> str:
-    in_file = next(
-        (v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None
-    )
-    told = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
-    serial = told or out.resolve().name
-    try:
-        return check_serial(serial)
-    except PydanticCustomError as error:
-        where = (
-            "--serial" if stated else f"the serial {'in the file' if told else 'from the name of the folder'}"
-        )
-        raise InputError(where, repr(serial), f"{error.message()}; --serial names one") from error
-
-
-def _run_name(path: Path, taken: set[str]) -> str:
-    """A plain name for a run, from that of its file."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-.") or "run"
-    name, k = plain, 2
-    while name in taken:
-        name, k = f"{plain}-{k}", k + 1
-    taken.add(name)
-    return name
-
-
-def _description(serial: str, chosen: Map, entries: Sequence[Mapping[str, Any]]) -> str:
-    head: dict[str, Any] = {"schema": 1, "serial": serial}
-    for key in ("description", "earth_rate", "latitude_deg", "pulse_weight_arcsec"):
-        if getattr(chosen, key) not in (None, ""):
-            head[key] = getattr(chosen, key)
-    if any(entry["trusted"] for entry in entries):
-        head["trust_units"] = True
-    sources = [entry["source"] for entry in entries]
-    tables: dict[str, Any] = {"source": sources[0] if len(sources) == 1 else sources}
-    if chosen.meta:
-        tables["meta"] = chosen.meta
-    if chosen.noise:
-        tables["noise"] = chosen.noise
-    return dataset_toml(head, tables, [dict(_run_entry(entry)) for entry in entries])
-
-
-def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    yield "file", entry["file"]
-    if entry["started"] is not None:
-        yield "started", entry["started"]
-    if not entry["since_power_on"]:
-        yield "power_on_s", "unknown"
-
-
-def _sha256(path: Path) -> str:
-    """Of a file; of a folder: of its files one after the other, in the order of their names."""
-    digest = hashlib.sha256()
-    for one in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with one.open("rb") as file:
-            while block := file.read(_BLOCK_BYTES):
-                digest.update(block)
-    return digest.hexdigest()
-
-
-def _size(path: Path) -> int:
-    return sum(one.stat().st_size for one in path.iterdir()) if path.is_dir() else path.stat().st_size

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..errors import InputError
-from .csvdialect import kind_of_cells
+from .csvcells import kind_of_cells
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, Table, numbers
 
 __all__ = ["open_parquet"]

@@ -6,76 +6,25 @@ the refusal names the choices and the option that makes one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
 from ..dataset.units import NATIVE, UnitError, channel_unit, conversion
 from ..errors import InputError
 from .mapping import Map
 from .names import Meaning, meaning, split_unit, words
+from .plan import Choice, Plan
 from .tables import Column, LoggerFile, Table
+from .unitchoice import OPTIONS, Ask, Units, asked, said
 
-__all__ = ["Choice", "Plan", "propose"]
+__all__ = ["propose"]
 
-Ask = Callable[[str], str | None]
-"""Asks a person on a terminal; None where there is none."""
 
-_OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
-_EXAMPLES = {"time": "s, ms, us, min", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
 _CHANNELS = {
     "supply": "V", "voltage": "V", "vbat": "V", "vcc": "V", "vdd": "V", "pressure": "hPa", "humidity": "%",
     "current": "A", "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "",
     "fan": "",
 }  # fmt: skip
 _MOST_CHANNELS = 12
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """One column and what it is taken for.
-
-    Attributes:
-        role: "time", "temperature", "rate", "rate_x", ..., "pulses", or the name of a channel.
-        table: The table that holds it.
-        column: The column.
-        unit: Its unit; None for stamps, pulses and channels without one.
-        why: The reasons, in words.
-    """
-
-    role: str
-    table: Table
-    column: Column
-    unit: str | None
-    why: str
-
-    @property
-    def source(self) -> str:
-        """The column as a map names it."""
-        return f"{self.table.name}/{self.column.name}" if self.table.name else self.column.name
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What is read of a file.
-
-    Attributes:
-        main: The table with the rates; its rows are the rows of the run.
-        time: Columns of time, one or two; none where rows are counted.
-        temperature: The temperature; its table may be another one.
-        values: Rates by axis, one rate, or pulses.
-        channels: Auxiliary channels of the main table.
-        rate_hz: Rows per second where rows are counted, with the reason in `why_rate`.
-        left_out: Numeric columns of the main table that are not taken.
-    """
-
-    main: Table
-    time: tuple[Choice, ...]
-    temperature: Choice
-    values: tuple[Choice, ...]
-    channels: tuple[Choice, ...]
-    rate_hz: float | None
-    why_rate: str
-    left_out: tuple[str, ...]
 
 
 def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
@@ -94,7 +43,7 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
     time, rate_hz, why_rate = _time(file, main, chosen)
     temperature = _temperature(file, tables, main, chosen)
     missing: list[str] = []
-    unit = _Units(file.path.name, chosen.units, ask, missing)
+    unit = Units(file.path.name, chosen.units, ask, missing)
     picked_values = tuple(
         Choice(role, table, column, None if role == "pulses" else unit.of("rate", column, table), why)
         for role, table, column, why in values
@@ -111,7 +60,7 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
         for column, why in time
     )
     if missing:
-        raise InputError(file.path.name, "; ".join(_said(missing)), " ".join(dict.fromkeys(_asked(missing))))
+        raise InputError(file.path.name, "; ".join(said(missing)), " ".join(dict.fromkeys(asked(missing))))
     taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
     channels = tuple(_channels(file, main, chosen, taken))
     taken |= {c.column.name for c in channels}
@@ -264,7 +213,7 @@ def _time(file: LoggerFile, main: Table, chosen: Map) -> tuple[list[tuple[Column
 
 def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
     """One column of dates and times, or a date and a time of day."""
-    from .stamps import forms_of
+    from .forms import forms_of
 
     parts = [(c, forms_of([s for s in c.sample if s])) for c in stamps]
     if not any(c.sample for c in stamps):
@@ -317,67 +266,10 @@ def _channel_name(name: str, unit: str | None, native: str) -> str:
     return plain
 
 
-class _Units:
-    """Units of the three kinds: stated, in the file, or asked for."""
-
-    def __init__(self, file: str, stated: Mapping[str, str], ask: Ask, missing: list[str]) -> None:
-        self._file, self._stated, self._ask, self._missing = file, stated, ask, missing
-        self._asked: dict[str, str] = {}
-
-    def of(self, kind: str, column: Column, table: Table) -> str:
-        """The unit of a column of a kind; empty (and noted as missing) where it stands nowhere."""
-        if kind in self._stated:
-            return self._checked(kind, self._stated[kind], _OPTIONS[kind])
-        _, in_name, how = split_unit(column.name)
-        in_file = column.unit or meaning(column.name, None, table.name).unit
-        if in_file is None and how.startswith(("in brackets", "after")):
-            in_file = in_name
-        if in_file is not None:
-            try:
-                conversion(in_file, kind)
-            except UnitError:
-                found = f"the file gives it in {in_file!r}, which is no {kind}"
-                expected = f"{_OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
-                raise InputError(f"{self._file}, column {column.name}", found, expected) from None
-            return in_file
-        if kind not in self._asked:
-            answer = self._ask(
-                f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})"
-            )
-            if answer:
-                self._asked[kind] = self._checked(kind, answer, "the answer")
-        if kind not in self._asked:
-            self._missing.append(f"{kind}\t{column.name}")
-            return ""
-        return self._asked[kind]
-
-    def _checked(self, kind: str, unit: str, where: str) -> str:
-        try:
-            conversion(unit, kind)
-        except UnitError as error:
-            raise InputError(where, str(error), f"one of {_EXAMPLES[kind]}") from error
-        return unit
-
-
-def _said(missing: Sequence[str]) -> Iterator[str]:
-    seen = set()
-    for one in missing:
-        kind, column = one.split("\t")
-        if kind not in seen:
-            seen.add(kind)
-            yield f"no unit of the {kind} in column {column!r}"
-
-
-def _asked(missing: Sequence[str]) -> Iterator[str]:
-    for one in missing:
-        kind = one.split("\t")[0]
-        yield f'{_OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
-
-
 def _listed(file: LoggerFile) -> str:
     names = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
 
 def _name_it(kind: str) -> str:
-    return f'--column {kind}="..." with one of them, and {_OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
+    return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'

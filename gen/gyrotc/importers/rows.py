@@ -16,7 +16,7 @@ from ..errors import InputError
 from .clock import Clock
 from .mapping import TimeMap
 from .names import meaning
-from .propose import Choice, Plan
+from .plan import Choice, Plan
 from .tables import Chunk, Column, Table
 
 __all__ = ["NAMES", "Rows", "conversion_of"]

@@ -6,9 +6,7 @@ A form is written with the codes of `strptime`; `%f` stands for a fraction of an
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
-from functools import cache
 from typing import Any
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
@@ -18,124 +16,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .forms import MONTHS, pattern_of
 
-__all__ = ["Stamps", "forms_of", "zone_of"]
+__all__ = ["Stamps", "zone_of"]
 
 Ints = NDArray[np.int64]
-_CODES = {
-    "Y": r"(?P<Y>\d{4})",
-    "y": r"(?P<y>\d{2})",
-    "m": r"(?P<m>\d{1,2})",
-    "d": r"(?P<d>\d{1,2})",
-    "b": r"(?P<b>[A-Za-z]{3})",
-    "j": r"(?P<j>\d{1,3})",
-    "H": r"(?P<H>\d{1,2})",
-    "I": r"(?P<I>\d{1,2})",
-    "M": r"(?P<M>\d{2})",
-    "S": r"(?P<S>\d{2})",
-    "f": r"(?P<f>\d{1,9})",
-    "p": r"(?P<p>[AaPp])\.?[Mm]\.?",
-    "z": r"(?P<z>[Zz]|[+-]\d{2}:?\d{2})",
-}
-_MONTHS = pa.array(["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"])
-_DATES = (
-    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y",
-    "%d %b %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y-%j", "%Y%m%d",
-)  # fmt: skip
-_TIMES = (
-    "%H:%M:%S.%f",
-    "%H:%M:%S,%f",
-    "%H:%M:%S:%f",
-    "%H:%M:%S",
-    "%I:%M:%S.%f %p",
-    "%I:%M:%S %p",
-    "%H%M%S",
-    "%H:%M",
-)
-_JOINTS = (" ", "T", "  ", "_", " - ", ", ")
-_MAYBE = re.compile(r"\d{1,4}[-/.: ]|\d{8}|\d{6}")
-_DIGITS_ONLY = re.compile(r"(%[A-Za-z])+")
 _DAY_NS = 86_400_000_000_000
-
-
-def forms_of(sample: Sequence[str]) -> list[str]:
-    """Forms that all texts of a sample have; two where day and month cannot be told apart.
-
-    Forms with a fraction that none of the texts has are left out.
-    """
-    texts = [text.strip().strip('"') for text in sample if text.strip()]
-    if not texts:
-        return []
-    found = [form for form in _candidates(texts[0]) if all(_fits(form, text) for text in texts)]
-    with_fraction = [form for form in found if "%f" in form and any(_fraction(form, text) for text in texts)]
-    plain = [form for form in found if "%f" not in form]
-    return list(dict.fromkeys(plain or with_fraction))
-
-
-_ZONES = ("", "%z", " %z", " UTC", " GMT")
-
-
-def _candidates(text: str) -> Iterator[str]:
-    """Forms that one text has: a date, a time of day, or both and perhaps a zone."""
-    if not _MAYBE.match(text):
-        return
-    for date in _DATES:
-        begins = _compiled(date).match(text)
-        if begins is None:
-            continue
-        rest = text[begins.end() :]
-        if not rest and not _DIGITS_ONLY.fullmatch(date):
-            yield date
-        for joint in _JOINTS:
-            if rest.startswith(joint):
-                yield from (f"{date}{joint}{time}" for time in _clocks(rest[len(joint) :]))
-    yield from (time for time in _clocks(text) if not _DIGITS_ONLY.fullmatch(time))
-
-
-def _clocks(text: str) -> Iterator[str]:
-    """Forms of times of day, perhaps with a zone, that a text has."""
-    for time in _TIMES:
-        begins = _compiled(time).match(text)
-        if begins is not None:
-            yield from (time + zone for zone in _ZONES if _compiled(zone).fullmatch(text[begins.end() :]))
-
-
-def _fits(form: str, text: str) -> bool:
-    found = _compiled(form).fullmatch(text)
-    return found is not None and _possible(found.groupdict())
-
-
-@cache
-def _compiled(form: str) -> re.Pattern[str]:
-    return re.compile(_pattern(form))
-
-
-def _possible(parts: dict[str, str | None]) -> bool:
-    limits = {"m": (1, 12), "d": (1, 31), "H": (0, 23), "I": (1, 12), "M": (0, 59), "S": (0, 60)}
-    if any(not low <= int(parts[k] or low) <= high for k, (low, high) in limits.items() if k in parts):
-        return False
-    return parts.get("b") is None or str(parts["b"]).lower() in _MONTHS.to_pylist()
-
-
-def _fraction(form: str, text: str) -> bool:
-    found = _compiled(form).fullmatch(text)
-    return bool(found and found["f"])
-
-
-def _pattern(form: str) -> str:
-    """The form as a regular expression that both `re` and RE2 read."""
-    parts = re.split(r"([.,:]?%[A-Za-z])", form)
-    pattern = ""
-    for part in parts:
-        if re.fullmatch(r"[.,:]?%[A-Za-z]", part):
-            code = _CODES.get(part[-1])
-            if code is None:
-                raise InputError("[time] format", f"the code %{part[-1]}", f"one of %{' %'.join(_CODES)}")
-            mark = re.escape(part[:-2])
-            pattern += f"(?:{mark}{code})?" if part[-1] == "f" and mark else mark + code
-        else:
-            pattern += re.escape(part).replace(r"\ ", " ")
-    return pattern
 
 
 def zone_of(text: str) -> ZoneInfo | int:
@@ -169,7 +55,7 @@ class Stamps:
 
     def __init__(self, form: str, zone: str | None) -> None:
         self._form = form
-        self._pattern = f"^{_pattern(form)}$"
+        self._pattern = f"^{pattern_of(form)}$"
         re.compile(self._pattern)
         self._zone = zone_of(zone) if zone else None
         utc = form.endswith((" UTC", " GMT"))
@@ -277,7 +163,7 @@ def _days(get: _Parts) -> tuple[Ints, NDArray[np.bool_]]:
     month = get.whole("m", 1)
     if get.has("b"):
         names = pc.utf8_lower(get.text("b"))
-        found = pc.fill_null(pc.index_in(names, _MONTHS), -1)
+        found = pc.fill_null(pc.index_in(names, MONTHS), -1)
         month = np.asarray(found.to_numpy(zero_copy_only=False), dtype=np.int64) + 1
     day = get.whole("d", 1)
     months = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .propose import Choice, Plan
+from .plan import Choice, Plan
 from .rows import NAMES, Rows
 from .tables import LoggerFile
 
