@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from gyrotc.dataset import load
+from gyrotc.importers import ImportOptions, Map, import_files, load_map
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -212,6 +213,24 @@ def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_pat
     assert load(tmp_path / "C").serial == "RLG-2"
     source = load(tmp_path / "A").sources[0]
     assert source["file"] == "one.csv" and source["bytes"] == len(text)
+
+
+def test_a_person_on_a_terminal_is_asked_for_a_unit(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(lines(PLAIN, lambda k, t, r: f"{k / 6},{t + 273.15},{r / 3600}"))
+    answers = {"rate": "deg/s", "temperature": "K", "time": "min"}
+    asked: list[str] = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return next(unit for kind, unit in answers.items() if f"unit of the {kind}" in question)
+
+    import_files([tmp_path / "log.csv"], tmp_path / "R", Map(), ImportOptions(), ask=ask)
+    assert len(asked) == 3 and all("log.csv" in question for question in asked)
+    rows = load(tmp_path / "R").runs[0].rows()
+    assert rows.rate_dph.mean() == pytest.approx(10.0, abs=0.01)
+    assert rows.time_s[-1] == pytest.approx(5990.0)
+    kept = load_map(tmp_path / "R" / "map.toml")
+    assert kept.units == answers
 
 
 def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
