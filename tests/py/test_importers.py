@@ -10,6 +10,7 @@ import pytest
 from gyrotc.dataset import load
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
+from logger_table import PAGE, cases, filled
 
 
 def run(
@@ -48,3 +49,10 @@ def test_a_file_comes_in_by_one_command(
         )
         np.testing.assert_allclose(rows.rate_dph, seen.rate_dph[kept, k], atol=case.tolerance)
         assert (dataset.runs[0].started == START) == case.started
+
+
+def test_the_table_in_the_manual_is_that_of_the_tests() -> None:
+    """Made again by `python tests/py/logger_table.py`."""
+    page = PAGE.read_text("utf-8")
+    assert filled(page) == page
+    assert len(cases()) >= 30
