@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
+from datetime import datetime, timezone
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from gyrotc.dataset import load
+from gyrotc.importers.stamps import Stamps
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
 from logger_table import PAGE, cases, filled
@@ -56,3 +60,16 @@ def test_the_table_in_the_manual_is_that_of_the_tests() -> None:
     page = PAGE.read_text("utf-8")
     assert filled(page) == page
     assert len(cases()) >= 30
+
+
+@pytest.mark.parametrize("chunk", [7, 1000])
+def test_the_hour_that_comes_twice_when_summer_time_ends(chunk: int) -> None:
+    """Local stamps of Berlin over the end of summer time, in pieces of any length, are those of UTC again."""
+    utc = np.arange("2026-10-24T23:00", "2026-10-25T03:00", 60, dtype="datetime64[s]")
+    berlin = ZoneInfo("Europe/Berlin")
+    instants = [datetime.fromtimestamp(int(s), timezone.utc).astimezone(berlin) for s in utc.astype(np.int64)]
+    texts = [f"{one:%Y-%m-%d %H:%M:%S}" for one in instants]
+    assert texts.count("2026-10-25 02:30:00") == 2
+    stamps = Stamps("%Y-%m-%d %H:%M:%S", "Europe/Berlin")
+    parsed = [stamps.parse(pa.array(texts[k : k + chunk]))[0] for k in range(0, len(texts), chunk)]
+    np.testing.assert_array_equal(np.concatenate(parsed).astype("datetime64[ns]"), utc)

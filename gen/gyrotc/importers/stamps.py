@@ -62,6 +62,8 @@ class Stamps:
         self.known_zone = "%z" in form or utc or self._zone is not None
         self.dated = any(code in form for code in ("%d", "%j"))
         self._midnights = 0
+        self._again = 0
+        self._local = np.iinfo(np.int64).min
         self._last = -1
 
     def parse(self, texts: Any) -> tuple[Ints, NDArray[np.bool_]]:
@@ -80,8 +82,27 @@ class Stamps:
         if not self.dated:
             ns = self._over_midnight(ns, good)
         if self._zone is not None and "%z" not in self._form:
-            ns -= _offsets(ns, self._zone, good)
+            ns -= self._ahead(ns, good)
         return ns, good
+
+    def _ahead(self, local: Ints, good: NDArray[np.bool_]) -> Ints:
+        """Nanoseconds that local times are ahead of UTC. The hour that comes twice when summer time ends is told from
+        the local time going back in it.
+        """
+        if isinstance(self._zone, int) or self._zone is None:
+            return np.full(len(local), (self._zone or 0) * 1_000_000_000, dtype=np.int64)
+        first, second = _offsets(local, self._zone, good)
+        twice = (first != second) & good
+        if twice.any():
+            before = np.r_[self._local, local[:-1]]
+            again = np.cumsum(twice & (local < before)) + self._again
+            first = np.where(twice & (again > 0), second, first)
+            self._again = int(again[-1]) if twice[-1] else 0
+        else:
+            self._again = 0
+        if len(local):
+            self._local = int(local[-1])
+        return first
 
     def _over_midnight(self, ns: Ints, good: NDArray[np.bool_]) -> Ints:
         """Times of day that go on after midnight."""
@@ -172,17 +193,21 @@ def _days(get: _Parts) -> tuple[Ints, NDArray[np.bool_]]:
     return dates.astype(np.int64), np.asarray(fits)
 
 
-def _offsets(ns: Ints, zone: ZoneInfo | int, good: NDArray[np.bool_]) -> Ints:
-    """Nanoseconds that local times are ahead of UTC; the zone's rules are asked once for each quarter of an hour."""
-    if isinstance(zone, int):
-        return np.full(len(ns), zone * 1_000_000_000, dtype=np.int64)
+def _offsets(ns: Ints, zone: ZoneInfo, good: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Nanoseconds that local times are ahead of UTC, the first and the second time that they come.
+
+    The zone's rules are asked once for each quarter of an hour.
+    """
     quarters = np.where(good, ns, 0) // (900 * 1_000_000_000)
     unique, index = np.unique(quarters, return_inverse=True)
-    ahead = [_ahead_s(int(q) * 900, zone) for q in unique]
-    return np.array(ahead, dtype=np.int64)[index] * 1_000_000_000
+    ahead = np.array(
+        [[_ahead_s(int(q) * 900, zone, fold) for fold in (0, 1)] for q in unique], dtype=np.int64
+    )
+    both = ahead.reshape(-1, 2)[index] * 1_000_000_000
+    return both[:, 0], both[:, 1]
 
 
-def _ahead_s(local_s: int, zone: ZoneInfo) -> int:
+def _ahead_s(local_s: int, zone: ZoneInfo, fold: int) -> int:
     local = datetime.fromisoformat("1970-01-01") + timedelta(seconds=local_s)
-    offset = local.replace(tzinfo=zone).utcoffset()
+    offset = local.replace(tzinfo=zone, fold=fold).utcoffset()
     return int(offset.total_seconds()) if offset is not None else 0
