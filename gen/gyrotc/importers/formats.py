@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import InputError
+from ..inputs import open_input
 from .csvtable import open_csv
 from .mapping import Map
 from .tables import LoggerFile
@@ -45,11 +46,9 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
         if (path / "metadata.yaml").is_file():
             return _opener("rosbag")(path)
         raise InputError(str(path), "is a folder", "files of a logger, or the folder of a ROS 2 bag")
-    try:
-        with path.open("rb") as file:
-            head = file.read(1024)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read ({error.strerror})", "a readable file") from error
+    opened, _ = open_input(path, path.name, "a file of a logger")
+    with opened as file:
+        head = file.read(1024)
     for magic, what, instead in _REFUSED:
         if head.startswith(magic):
             raise InputError(path.name, what, instead)

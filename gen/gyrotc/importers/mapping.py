@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,16 +9,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from ..dataset.text import dataset_toml
 from ..errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from ..inputs import read_toml
 
 __all__ = ["MAP_FILE", "ColumnMap", "CsvMap", "Map", "TimeMap", "load_map", "map_text"]
 
 MAP_FILE = "map.toml"
-_MOST_BYTES = 2**20
 
 Text = Annotated[str, Field(min_length=1, max_length=256)]
 Texts = Annotated[
@@ -97,18 +91,7 @@ def load_map(path: Path) -> Map:
         InputError: It is no map; the field is named.
     """
     name = path.name
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(name, f"{path.stat().st_size} bytes", f"at most {_MOST_BYTES}")
-        content = tomllib.loads(path.read_text("utf-8-sig"))
-    except OSError as error:
-        raise InputError(
-            str(path), f"cannot be read ({error.strerror})", "a map that gyrotc import wrote"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(name, f"no UTF-8 text ({error.reason})", "a TOML file") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(name, f"no TOML: {error}", "a TOML file") from error
+    content = read_toml(path, "a map that gyrotc import wrote")
     try:
         return Map.model_validate(content)
     except ValidationError as error:
