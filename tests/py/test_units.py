@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.check import check
 from gyrotc.dataset import load
 from gyrotc.dataset.earth import EARTH_RATE_DPH, earth_rate
 from gyrotc.dataset.units import UnitError, channel_unit, conversion, kind_of
 from gyrotc.errors import InputError
-from gyrotc.fitting import FitOptions, fit_dataset
+from gyrotc.judge.check import check
+from gyrotc.train.fitting import FitOptions, fit_dataset
 from recordings import Columns, columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "RLG-1"\nearth_rate = "removed"\n'
