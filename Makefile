@@ -99,8 +99,9 @@ picture: demo
 paper: setup
 	@$(PYTHON) -m gyrotc.paper docs
 
-## measured recordings with their last span left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
+## measured recordings with runs or spans left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
 real: setup
+	@$(PYTHON) -c "import sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@$(PYTHON) tools/real.py "$$SET_REAL" docs build/real
 	@$(PYTHON) tools/real_diagnosis.py "$$SET_REAL" docs build/real
 
@@ -130,8 +131,12 @@ kills: setup
 blind: setup
 	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## training on 2,000 odd but valid data sets (SETS=2000, minutes)
+odd: setup
+	@GYROTC_ODD=$(or $(SETS),2000) $(PYTHON) -m pytest -q tests/py/test_odd_training.py
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind clean
+.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd clean

@@ -60,11 +60,12 @@ NB_MODULE(_core, m) {
         .def(
             "__init__",
             [](EvidenceModel *self, VectorXd t, VectorXd r, VectorXd count, VectorXd mean, double within,
-               double samples) {
+               double samples, double least_sigma) {
                 new (self) EvidenceModel(bins(std::move(t), std::move(r), std::move(count), std::move(mean), within,
-                                              samples));
+                                              samples),
+                                         least_sigma);
             },
-            "t"_a, "r"_a, "count"_a, "mean"_a, "within"_a, "samples"_a)
+            "t"_a, "r"_a, "count"_a, "mean"_a, "within"_a, "samples"_a, "least_sigma"_a = 0.0)
         .def("objective",
              [](const EvidenceModel &self, const EvidenceParameters &p) {
                  EvidenceParameters gradient;

@@ -60,7 +60,8 @@ double reach_of(const VectorXd &x) { return kReach * std::max(x.cwiseAbs().maxCo
 
 }  // namespace
 
-EvidenceModel::EvidenceModel(const Bins &bins) : samples_(bins.samples) {
+EvidenceModel::EvidenceModel(const Bins &bins, double least_sigma)
+    : samples_(bins.samples), least_sigma_(least_sigma) {
     if (bins.t.size() == 0) throw std::invalid_argument("evidence: no bins");
     reach_t_ = reach_of(bins.t);
     reach_r_ = reach_of(bins.r);
@@ -174,7 +175,10 @@ void EvidenceModel::optimise(const EvidenceParameters *start) {
     const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> opt(
         nlopt_create(NLOPT_LD_LBFGS, kEvidenceParameters), nlopt_destroy);
     if (!opt) throw std::bad_alloc();
-    const EvidenceParameters low = kPriorMean - 5.0 * kPriorSd, high = kPriorMean + 5.0 * kPriorSd;
+    EvidenceParameters low = kPriorMean - 5.0 * kPriorSd, high = kPriorMean + 5.0 * kPriorSd;
+    const int sigma = kEvidenceParameters - 1;
+    if (least_sigma_ > 0.0) low[sigma] = std::clamp(std::log(least_sigma_), low[sigma], high[sigma]);
+    for (EvidenceParameters &one : starts) one = one.cwiseMax(low).cwiseMin(high);
     nlopt_set_min_objective(opt.get(), call, &search);
     nlopt_set_lower_bounds(opt.get(), low.data());
     nlopt_set_upper_bounds(opt.get(), high.data());

@@ -30,7 +30,9 @@ using EvidenceParameters = Eigen::Matrix<double, kEvidenceParameters, 1>;
 // The process conditioned on bins, and its evidence.
 class EvidenceModel {
   public:
-    explicit EvidenceModel(const Bins &bins);
+    // `least_sigma` truncates the prior of sigma from below: less than it is not believed, whatever the evidence says.
+    // 0: the log-normal prior alone.
+    explicit EvidenceModel(const Bins &bins, double least_sigma = 0.0);
 
     // Negative log posterior of the parameters (up to a constant) and its gradient.
     // The gradient is with respect to the logarithms. Not finite input gives +inf.
@@ -56,6 +58,7 @@ class EvidenceModel {
     Eigen::VectorXd prior_variance(const EvidenceParameters &log_parameters, Eigen::MatrixXd *derivative) const;
 
     double samples_ = 0.0;
+    double least_sigma_ = 0.0;
     double squares_ = 0.0;               // y'y
     double reach_t_ = 0.0, reach_r_ = 0.0;  // half lengths of the domain
     Eigen::MatrixXd gram_;               // Phi' N Phi

@@ -24,7 +24,14 @@ def kohonen(
 
 class EvidenceModel:
     def __init__(
-        self, t: _Floats, r: _Floats, count: _Floats, mean: _Floats, within: float, samples: float
+        self,
+        t: _Floats,
+        r: _Floats,
+        count: _Floats,
+        mean: _Floats,
+        within: float,
+        samples: float,
+        least_sigma: float = 0.0,
     ) -> None: ...
     def objective(self, log_parameters: _Floats) -> tuple[float, _Floats]: ...
     def optimise(self) -> None: ...

@@ -85,7 +85,7 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     rows = columns(360)
     table = {name: rows[name] for name in ("time_s", "temperature_c")}
     write_csv(tmp_path / "IMU" / "a.csv", table | {f"rate_{a}_dph": rows["rate_dph"] - 20.0 for a in "xy"})
-    (tmp_path / "product.toml").write_text("schema = 1\n[at_most]\ncenters = 0\n")
+    (tmp_path / "product.toml").write_text("schema = 1\n[at_most]\ntable_bytes = 8\n")
     manifest = tmp_path / "fleet.toml"
     manifest.write_text(
         'schema = 1\ndatasets = ["a/*"]\nlimits = "product.toml"\nnumeric = ["f32"]\n'
@@ -95,7 +95,7 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     assert [unit.name for unit in fleet.units] == ["RLG-1", "IMU-x", "IMU-y"]
     entries = run_fleet(fleet, tmp_path / "out", jobs=2)
     assert [entry["status"] for entry in entries] == ["failed"] * 3
-    assert "at_most.centers 0.0 is not met" in entries[0]["reason"]
+    assert "at_most.table_bytes 8.0 is not met" in entries[0]["reason"]
     assert json.loads((tmp_path / "out" / "IMU-x" / "model.json").read_text())["block_s"] == 20.0
     assert json.loads((tmp_path / "out" / "IMU-y" / "limits.json").read_text())["met"] is False
 

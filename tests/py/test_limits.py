@@ -131,6 +131,18 @@ def test_a_wrong_limits_file_is_refused(case: str, tmp_path: Path) -> None:
     assert told in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("shown", "met"), [(True, True), (False, False), (None, False)])
+def test_a_product_can_ask_for_a_correction_that_generalises(
+    shown: bool | None, met: bool, tmp_path: Path, model: Model
+) -> None:
+    """A constant that was emitted because nothing holds, and a method that nobody judged, do not keep it."""
+    (tmp_path / "product.toml").write_text("schema = 1\n[needs]\ngeneralises = true\n")
+    result = held_against(
+        load_limits(tmp_path / "product.toml"), model, EVALUATION | {"generalises": shown}, VERIFICATION
+    )
+    assert result["limits"] == [{"limit": "needs.generalises", "measured": shown, "bound": True, "met": met}]
+
+
 def recording(folder: Path, serial: str, shift: float = 0.0) -> None:
     """Six hours of a small gyro; `shift` moves its bias."""
     described(folder, head=f'schema = 1\nserial = "{serial}"\nearth_rate = "none"')
@@ -142,11 +154,11 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     """A build that misses a limit ends with 1 and is written all the same; the next one says what changed."""
     recording(tmp_path / "first", "RLG-1")
     product = tmp_path / "product.toml"
-    product.write_text('schema = 1\nproduct = "NAV"\n[at_most]\ntable_bytes = 30\nrms_dph = 1.0\n')
+    product.write_text('schema = 1\nproduct = "NAV"\n[at_most]\ntable_bytes = 20\nrms_dph = 1.0\n')
     build = ("build", "--numeric", "f32", "--limits", product)
     done = gyrotc(*build, tmp_path / "first", "--out", tmp_path / "one")
     assert done.returncode == 1
-    assert "limit at_most.table_bytes = 30.0 is not met" in done.stderr and "rms_dph" not in done.stderr
+    assert "limit at_most.table_bytes = 20.0 is not met" in done.stderr and "rms_dph" not in done.stderr
     limits = json.loads((tmp_path / "one" / "limits.json").read_text())
     assert (limits["schema"], limits["met"], limits["product"]) == ("gyrotc.limits/1", False, "NAV")
     assert "not met" in (tmp_path / "one" / "report.html").read_text()

@@ -59,7 +59,13 @@ AxisOption = Annotated[
 AverageOption = Annotated[
     float, typer.Option("--average-s", min=0.001, help="Averaging of all RMS figures, s.")
 ]
-MethodOption = Annotated[str, typer.Option("--method", help="mrbf (default), mrbf_paper, rbf_ols, ...")]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ...",
+    ),
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.")]
 CentersOption = Annotated[
     int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")

@@ -33,7 +33,15 @@ from .base import (
     write_json,
 )
 from .diagnosis_lines import diagnosis_lines, extension_lines
-from .results import change_lines, evaluation_table, limit_lines, span_lines, summary, verify_table
+from .results import (
+    change_lines,
+    evaluation_table,
+    ladder_lines,
+    limit_lines,
+    span_lines,
+    summary,
+    verify_table,
+)
 
 if TYPE_CHECKING:
     from ..jobs.build import Built
@@ -43,7 +51,7 @@ if TYPE_CHECKING:
 def build(
     dataset: DatasetArg,
     out: OutOption = Path("build"),
-    method: MethodOption = "mrbf",
+    method: MethodOption = "auto",
     axis: AxisOption = None,
     seed: SeedOption = 0,
     centers: CentersOption = None,
@@ -105,7 +113,7 @@ def build(
 def _print_built(result: Built) -> None:
     OUT.print(evaluation_table(result.evaluation))
     OUT.print(verify_table(result.verification))
-    for line in span_lines(result.training):
+    for line in (*span_lines(result.training), *ladder_lines(result.training)):
         tell(line)
     for name, reason in result.refused.items():
         tell(f"{name} left out: {reason}")
@@ -169,7 +177,7 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
-    method: MethodOption = "mrbf",
+    method: MethodOption = "auto",
     axis: AxisOption = None,
     seed: SeedOption = 0,
     centers: CentersOption = None,

@@ -47,6 +47,18 @@ def span_lines(training: dict[str, Any]) -> Iterator[str]:
             yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
 
 
+def ladder_lines(training: dict[str, Any]) -> Iterator[str]:
+    """Which correction was chosen, why, and what each leaves on history that it has not seen."""
+    if training.get("ladder"):
+        yield f"correction {training['method']}: {training['reason']}"
+        tried = (
+            f"{r['id']} {r['left_out_rms_dph']:.3g}"
+            for r in training["ladder"]
+            if r["left_out_rms_dph"] is not None
+        )
+        yield f"  left-out RMS, deg/h: {', '.join(tried)}"
+
+
 def prediction_line(training: dict[str, Any]) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
     ratio = training["predicted_rms_ratio"]

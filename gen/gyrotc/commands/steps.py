@@ -35,7 +35,15 @@ from .base import (
     tell,
     write_json,
 )
-from .results import evaluation_table, file_notes, prediction_line, span_lines, verify_notes, verify_table
+from .results import (
+    evaluation_table,
+    file_notes,
+    ladder_lines,
+    prediction_line,
+    span_lines,
+    verify_notes,
+    verify_table,
+)
 from .traces import evaluation_folders
 
 
@@ -43,7 +51,7 @@ from .traces import evaluation_folders
 def fit(
     dataset: DatasetArg,
     out: OutOption,
-    method: MethodOption = "mrbf",
+    method: MethodOption = "auto",
     axis: AxisOption = None,
     seed: SeedOption = 0,
     centers: CentersOption = None,
@@ -71,7 +79,7 @@ def fit(
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training))
     write_json(json_file, fitted.training)
-    for line in span_lines(fitted.training):
+    for line in (*span_lines(fitted.training), *ladder_lines(fitted.training)):
         tell(line)
     for finding in fitted.training["findings"]:
         tell(f"finding {finding['id']}: {finding['text']}")

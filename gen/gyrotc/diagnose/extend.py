@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..dataset import Dataset
 from ..metrics import Averages
 from ..train import Fit, TrainingData
-from ..train.fitting import FitOptions, front_end
+from ..train.fitting import FitOptions, front_end, map_method
 from ..train.spans import training_spans
 from .attribute import choose
 from .cycle import cycle_of
@@ -91,7 +91,7 @@ class _Bench:
         self.average_s = options.average_s
         self._fits: list[tuple[list[Effect], bool, Fit]] = []
         self.arguments: dict[str, Any] = {
-            "method": options.method,
+            "method": map_method(options.method),
             "seed": options.seed,
             "centers": options.centers,
             "rho": options.rho,

@@ -12,7 +12,7 @@ from .. import __version__
 from ..dataset import Dataset
 from ..model import Model
 from ..terms import CATALOGUE, separate_by
-from ..train.fitting import FitOptions, front_end, model_of, training_of
+from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
 from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
 from .catalogue import diagnosed
@@ -102,7 +102,9 @@ def diagnose(
 def _options_of(model: Model | None) -> FitOptions:
     if model is None:
         return FitOptions()
-    return FitOptions(model.method, model.seed, model.n_centers, None, model.block_s, model.average_s)
+    centers = model.n_centers if map_method(model.method) == model.method else None
+    method = map_method(model.method)
+    return FitOptions(method, model.seed, centers, None, model.block_s, model.average_s)
 
 
 def _head(dataset: Dataset, verdict: str, options: FitOptions) -> dict[str, Any]:

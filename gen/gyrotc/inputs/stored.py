@@ -76,6 +76,7 @@ class _Evaluation(_Stored):
     exam: _Pooled | None
     left_out: _Pooled | None = None
     findings: list[_Finding]
+    generalises: bool | None = None
     model: _Sizes
 
 
@@ -93,7 +94,20 @@ class _Noise(_Stored):
     allan: list[_AllanPoint]
 
 
+class _Rung(_Stored):
+    id: str
+    left_out_rms_dph: Figure
+    standard_error_dph: Figure
+    beats_constant: bool
+    chosen: bool
+    refused: str | None = None
+
+
 class _Training(_Stored):
+    ladder: list[_Rung] = []
+    reason: str = ""
+    generalises: bool | None = None
+    findings: list[_Finding] = []
     predicted_rms_ratio: Figure = None
     prediction_withheld: str | None = None
     noise_floor_dph: Figure

@@ -112,6 +112,7 @@ def evaluate(
     training = training or _training_of(folder, dataset, model)
     if result["exam"] is None and training:
         result["left_out"] = training.get("left_out")
+    result["generalises"] = training.get("generalises") if training else None
     result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
     return result
 

@@ -41,6 +41,8 @@ _PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature an
 _COMMON_PLACES = 5
 _CONTRADICTION = 5.0  # times the scatter of a minute within such a place
 _LEAST_FREEDOM = 10
+_OF_TRAINING = ("does_not_generalise", "map_refused", "map_beyond_data")
+_POLYNOMIALS = ("cubic", "cubic_slope")
 
 
 def findings_of(
@@ -60,6 +62,7 @@ def findings_of(
     """
     found = [*temperature_findings(facts)]
     if not found:
+        found += _of_training(training)
         found += _unseen(result, training)
         found += _coverage(model)
     found += jump_findings(facts)
@@ -217,6 +220,13 @@ def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator
         yield _finding("earth_rate_not_stated", warning, mean_dph=mean)
 
 
+def _of_training(training: Mapping[str, Any] | None) -> Iterator[Finding]:
+    """What the choice of the correction found; `fit` wrote it."""
+    for finding in training.get("findings", ()) if training else ():
+        if finding["id"] in _OF_TRAINING:
+            yield dict(finding)
+
+
 def _unseen(result: Mapping[str, Any], training: Mapping[str, Any] | None) -> Iterator[Finding]:
     """The residual on runs or spans that were not trained on, against that of training and the noise."""
     seen, floor = _rms(result.get("train")), result.get("noise_floor_dph")
@@ -261,7 +271,12 @@ def _coverage(model: Model) -> Iterator[Finding]:
 
 
 def _weights(model: Model) -> Iterator[Finding]:
-    """Weights that cancel one another are a lever for rounding and for every input out of the ordinary."""
+    """Weights that cancel one another are a lever for rounding and for every input out of the ordinary.
+
+    Those of a polynomial written as wide Gaussians cancel as they must; it ends at the edge of the envelope.
+    """
+    if model.method in _POLYNOMIALS:
+        return
     swing = float(np.ptp(_trained_map(model)))
     total = model.sum_abs_weights_dph
     if swing > 0.0 and total > _WEIGHTS_TO_RANGE * swing:

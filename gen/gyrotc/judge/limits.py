@@ -25,6 +25,7 @@ __all__ = ["Limits", "held_against", "load_limits"]
 Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
+    "does_not_generalise", "map_refused", "map_beyond_data",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
 
@@ -91,6 +92,7 @@ class Needs(_Part):
         tuple[str, ...], BeforeValidator(_as_tuple)
     ] = ()  # bit for bit, in all their arithmetics
     no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
+    generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
 
 
 class Limits(_Part):
@@ -218,6 +220,9 @@ def _needs(needs: Needs, evaluation: dict[str, Any], verification: dict[str, Any
     for target in needs.targets:
         status = sorted({entry["status"] for entry in entries if entry["name"] == target})
         yield _Check("needs.targets", status, target, status == ["pass"])
+    if needs.generalises:
+        shown = evaluation.get("generalises")
+        yield _Check("needs.generalises", shown, True, shown is True)
     found = [finding["id"] for finding in evaluation["findings"]]
     for name in needs.no_findings:
         there = found if name == "any" else [f for f in found if f == name]

@@ -5,24 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from .bank import fit_bank
 from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
+from .guard import objection
 from .linear import fit_mlr, fit_poly
-from .mrbf import fit_mrbf
+from .mrbf import fit_mrbf, fit_mrbf_t
 from .noise import floor_dph
 from .ols import SIZE_RULES, fit_ols
+from .process import TrainingFailed
 from .result import Fit, Outcome, network, predict
+from .rungs import chosen_by_ladder
+from .simple import SIMPLE, fit_simple
 from .uncertainty import coverage, uncertainty
 
 __all__ = [
+    "AUTO",
     "METHODS",
     "NETWORK_METHODS",
+    "SIMPLE",
     "SIZE_RULES",
     "Fit",
     "Outcome",
     "TrainingData",
+    "TrainingFailed",
     "coverage",
     "fit",
     "predict",
@@ -30,9 +38,13 @@ __all__ = [
 ]
 
 METHODS = ("mlr", "poly", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
-NETWORK_METHODS = METHODS[2:]
+NETWORK_METHODS = (*SIMPLE, "mrbf_t", *METHODS[2:])
 """Those whose map is networks alone, so that a table can hold it."""
+AUTO = "auto"
+"""The ladder: the simplest correction that does on unseen history what the best one does."""
 _MAX_CENTERS = 512
+_MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
+_GUARDED = ("mrbf", "mrbf_t")
 
 
 def fit(
@@ -44,40 +56,56 @@ def fit(
     rho: float | None = None,
     size_rule: str | None = None,
     average_s: float = 100.0,
+    power_on: NDArray[np.int64] | None = None,
 ) -> Fit:
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
 
     Args:
         data: Samples; exact duplicates by run and time count once.
-        method: One of `METHODS`.
+        method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: the ladder chooses, unless a number
+            of centers or ρ is asked for.
         seed: Of everything random.
         centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
         rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
+        power_on: For the ladder: number of the power-on of each run, by its index; None: each run is one.
 
     Raises:
         InputError: Bad samples or arguments.
+        TrainingFailed: The equations of a method that was asked for by name cannot be solved.
     """
+    method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
     _check(method, centers, rho, average_s)
     samples = cleaned(data)
     scaling = scaling_of(samples)
-    findings = []
+    findings: list[dict[str, object]] = []
+    rows: list[dict[str, object]] = []
+    reason = ""
     if np.ptp(samples.temperature_c) < MIN_TEMPERATURE_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
+        method = "constant" if method == AUTO else method
+    elif method == AUTO:
+        found = chosen_by_ladder(samples, scaling, power_on, seed=seed, average_s=average_s)
+        method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
+        findings += found.findings
     else:
         outcome = _trainer(method, seed, centers, rho, size_rule, average_s)(samples, scaling)
+        against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
+        if against:
+            findings.append(_beyond(method, against))
     mean = float(np.average(samples.bias_dph, weights=samples.weight))
     bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
     residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
     floor = floor_dph(samples, residual, average_s)
-    return Fit(method, outcome, scaling, findings, floor, average_s, mean)
+    return Fit(method, outcome, scaling, findings, floor, average_s, mean, rows, reason)
 
 
 def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:
-    if method not in METHODS:
-        raise InputError("method", repr(method), "one of " + ", ".join(METHODS))
+    known = (AUTO, *dict.fromkeys((*METHODS, *NETWORK_METHODS)))
+    if method not in known:
+        raise InputError("method", repr(method), "one of " + ", ".join(known))
     if centers is not None and not 0 <= centers <= _MAX_CENTERS:
         raise InputError("centers", repr(centers), f"0 ... {_MAX_CENTERS}")
     if rho is not None and not 0.0 <= rho < 1.0:
@@ -93,8 +121,10 @@ def _trainer(
         return lambda data, scaling: fit_mlr(data, scaling, average_s)
     if method == "poly":
         return lambda data, scaling: fit_poly(data, scaling, average_s)
-    if method in ("mrbf", "bank"):
-        run = fit_mrbf if method == "mrbf" else fit_bank
+    if method in SIMPLE:
+        return lambda data, scaling: fit_simple(method, data, scaling, average_s)
+    if method in _MAPS:
+        run = _MAPS[method]
         return lambda data, scaling: run(data, scaling, seed=seed, centers=centers, average_s=average_s)
     return lambda data, scaling: fit_ols(
         method,
@@ -124,4 +154,13 @@ def _no_information(samples: TrainingData) -> dict[str, object]:
         "id": "no_temperature_information",
         "text": f"Temperature spans only {span:.2f} C: nothing can be learnt about it; the model is the mean bias.",
         "evidence": {"span_c": span, "required_c": MIN_TEMPERATURE_SPAN_C},
+    }
+
+
+def _beyond(method: str, against: str) -> dict[str, object]:
+    return {
+        "id": "map_beyond_data",
+        "text": f"The map of {method}, which was asked for by name, should not be used: {against}. Without --method "
+        "the ladder chooses a correction that keeps to the data.",
+        "evidence": {"method": method},
     }

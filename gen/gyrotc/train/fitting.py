@@ -7,7 +7,7 @@ block, window and limits, and the refits with spans left out.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,18 @@ from ..errors import InputError
 from ..frontend import Blocks, run_blocks
 from ..metrics import Averages, pooled
 from ..model import Model
-from . import NETWORK_METHODS, Fit, TrainingData, coverage, fit, predict, uncertainty
+from . import (
+    AUTO,
+    NETWORK_METHODS,
+    SIMPLE,
+    Fit,
+    TrainingData,
+    TrainingFailed,
+    coverage,
+    fit,
+    predict,
+    uncertainty,
+)
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 
@@ -28,6 +39,7 @@ __all__ = [
     "Fitted",
     "fit_dataset",
     "front_end",
+    "map_method",
     "model_of",
     "samples_of",
     "training_of",
@@ -43,13 +55,14 @@ _COVERAGE_CELLS = (32, 12)
 _UNCERTAINTY_CELLS = (6, 4)
 _MIN_SAMPLES = 8
 _CENTER_GRID = 2.0**20
+_NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """Options of `gyrotc fit`."""
+    """Options of `gyrotc fit`; the method `auto` is the ladder of corrections."""
 
-    method: str = "mrbf"
+    method: str = AUTO
     seed: int = 0
     centers: int | None = None
     rho: float | None = None
@@ -128,18 +141,22 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     Raises:
         InputError: No training run, too few usable samples, or a method whose map is no network.
     """
-    if options.method not in NETWORK_METHODS:
-        expected = f"one of {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
+    if options.method not in (AUTO, *NETWORK_METHODS):
+        expected = (
+            f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
+        )
         raise InputError("--method", repr(options.method), expected)
     runs = [run for run in dataset.runs if run.role == "train"]
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
+    stretches = _stretches(runs)
     parts = []
-    for k, run in enumerate(runs):
-        say(f"reading {run.file}")
-        parts.append(samples_of(front.blocks(run), front.block_s, k))
+    for k, stretch in enumerate(stretches):
+        for run in stretch:
+            say(f"reading {run.file}")
+            parts.append(samples_of(front.blocks(run), front.block_s, k))
     data = _joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -148,14 +165,41 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
             f"at least {_MIN_SAMPLES}",
         )
     say("training")
-    fitted = _fit(data, options)
-    spans = training_spans(runs, data)
-    left_out = _left_out(data, spans, options, say) if spans else None
+    firsts = [stretch[0] for stretch in stretches]
+    fitted = _fit(data, options, power_on=_power_ons(firsts))
+    spans = training_spans(firsts, data)
+    left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
     model = model_of(dataset, runs, data, fitted, front, options)
     return Fitted(model, training_of(dataset, data, fitted, front, options, spans, left_out))
 
 
-def _fit(data: TrainingData, options: FitOptions) -> Fit:
+def map_method(method: str) -> str:
+    """The method whose map stands for a correction where a map must stand: beside effects, in a diagnosis."""
+    return "mrbf" if method in (AUTO, *SIMPLE, "mrbf_t") else method
+
+
+def _stretches(runs: Sequence[Run]) -> list[list[Run]]:
+    """Training runs as stretches of history: spans of one file that touch are one. In order of file and time.
+
+    So neither the order of runs in a description nor where a recording is cut changes a model.
+    """
+    found: list[list[Run]] = []
+    for run in sorted(runs, key=lambda run: (run.file, -np.inf if run.from_s is None else run.from_s)):
+        last = found[-1][-1] if found else None
+        if last is not None and last.file == run.file and last.to_s is not None and last.to_s == run.from_s:
+            found[-1].append(run)
+        else:
+            found.append([run])
+    return found
+
+
+def _power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
+    """Number of the power-on of each stretch: a file is one recording, without a power-on within it."""
+    files = sorted({run.file for run in runs})
+    return np.array([files.index(run.file) for run in runs], dtype=np.int64)
+
+
+def _fit(data: TrainingData, options: FitOptions, *, power_on: NDArray[np.int64] | None = None) -> Fit:
     return fit(
         data,
         method=options.method,
@@ -163,6 +207,7 @@ def _fit(data: TrainingData, options: FitOptions) -> Fit:
         centers=options.centers,
         rho=options.rho,
         average_s=options.average_s,
+        power_on=power_on,
     )
 
 
@@ -177,7 +222,10 @@ def _left_out(
         near = span.contains(data.run, data.time_s, guard=True)
         if inside.sum() == 0 or (~near).sum() < _MIN_SAMPLES:
             continue
-        rest = _fit(data.select(~near), options)
+        try:
+            rest = _fit(data.select(~near), options)
+        except TrainingFailed:
+            continue
         held = data.select(inside)
         residual = held.bias_dph - predict(rest, held.temperature_c, held.slope_c_per_min)
         results.append(_averaged(held, residual, options.average_s))
@@ -237,12 +285,22 @@ def model_of(
             "noise_floor_dph": fitted.noise_floor_dph,
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
-            "uncertainty_dph": uncertainty(data, fitted, _UNCERTAINTY_CELLS) if fitted.n_centers else None,
+            "uncertainty_dph": _uncertainty(data, fitted),
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,
         }
     )
+
+
+def _uncertainty(data: TrainingData, fitted: Fit) -> dict[str, Any] | None:
+    """Of a map; None of what has no Gaussians, and where the process behind it cannot be solved."""
+    if not fitted.n_centers:
+        return None
+    try:
+        return uncertainty(data, fitted, _UNCERTAINTY_CELLS)
+    except TrainingFailed:
+        return None
 
 
 def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, Any]:
@@ -311,6 +369,9 @@ def training_of(
         "left_out_spans": [pooled([a]) for a in left_out or []],
         "noise": _noise(data, fitted, front.block_s),
         "sensitivity": sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
+        "ladder": [dict(row) for row in fitted.ladder],
+        "reason": fitted.reason,
+        "generalises": _generalises(fitted),
         "findings": [dict(f) for f in fitted.findings],
         "curves": dict(fitted.curves),
     }
@@ -319,6 +380,13 @@ def training_of(
 def units_of(dataset: Dataset) -> dict[str, Any]:
     """Units as declared, and what the user's word was taken against, for `training.json` and `manifest.json`."""
     return {"declared": dict(dataset.units), "trusted": list(dataset.trusted)}
+
+
+def _generalises(fitted: Fit) -> bool | None:
+    """Whether the correction was shown to hold on history that it has not seen; None: a named method, not asked."""
+    if any(f["id"] in _NOT_GENERAL for f in fitted.findings):
+        return False
+    return True if fitted.ladder else None
 
 
 def _noise(data: TrainingData, fitted: Fit, block_s: float) -> dict[str, Any]:

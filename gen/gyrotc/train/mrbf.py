@@ -10,18 +10,20 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .data import Scaling, TrainingData
+from .data import Scaling, TrainingData, scaling_of
 from .noise import not_white
 from .process import Process, fit_process
 from .result import Outcome, network
+from .simple import FLAT
 
-__all__ = ["fit_mrbf"]
+__all__ = ["fit_mrbf", "fit_mrbf_t"]
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +37,13 @@ _GAP_WEIGHT = 0.02
 
 
 def fit_mrbf(
-    data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float
+    data: TrainingData,
+    scaling: Scaling,
+    *,
+    seed: int,
+    centers: int | None,
+    average_s: float,
+    process: Process | None = None,
 ) -> Outcome:
     """Trains on cleaned samples whose temperature spans at least 2 C.
 
@@ -45,9 +53,13 @@ def fit_mrbf(
         seed: Of the Kohonen network.
         centers: Number of centers asked for; None: chosen from the data.
         average_s: Averaging of RMS figures, s.
+        process: The evidence process of these samples, where it is known already.
+
+    Raises:
+        TrainingFailed: The equations cannot be solved.
     """
     began = time.process_time()
-    process = fit_process(data, scaling)
+    process = process or fit_process(data, scaling)
     evidence_s = time.process_time() - began
     sizes, chosen, departures = _compress(process, scaling, seed, centers)
     model = process.model
@@ -83,6 +95,24 @@ def fit_mrbf(
         withheld=withheld,
         process=process,
     )
+
+
+def fit_mrbf_t(
+    data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float
+) -> Outcome:
+    """A map of T alone, valid over the rates of the samples; arguments and errors as `fit_mrbf`."""
+    still = replace(data, slope_c_per_min=np.zeros(len(data)))
+    outcome = fit_mrbf(still, scaling_of(still), seed=seed, centers=centers, average_s=average_s)
+    flat = [
+        {
+            **one,
+            "linear": [one["linear"][0], 0.0],
+            "centers": [[t, 0.0] for t, _ in one["centers"]],
+            "widths": [[width, FLAT] for width, _ in one["widths"]],
+        }
+        for one in outcome.networks
+    ]
+    return replace(outcome, networks=flat, process=None)
 
 
 def _compress(

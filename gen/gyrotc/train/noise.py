@@ -10,13 +10,14 @@ from scipy.special import chdtrc
 
 from .data import TrainingData, average
 
-__all__ = ["floor_dph", "not_white"]
+__all__ = ["difference_sigma", "floor_dph", "not_white"]
 
 Floats = NDArray[np.float64]
 _MAD_TO_SIGMA = 1.4826
 _CLIP = 4.5
 _SIGNIFICANCE = 1e-3
 _LAGS = 10
+_LEAST_DIFFERENCES = 6
 
 
 def robust_sigma(x: Floats) -> float:
@@ -38,6 +39,24 @@ def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
     if len(differences) == 0:
         return robust_sigma(means.bias_dph)
     return robust_sigma(differences) / float(np.sqrt(2.0))
+
+
+def difference_sigma(means: TrainingData, y: Floats, weight: Floats) -> float:
+    """σ of y at weight 1 from differences of neighbouring means; 0 where too few of them, or none differ.
+
+    First differences count a steady slope as noise, second differences count it as nothing: the smaller of the two.
+
+    Args:
+        means: Means in order of run and time, as `average` returns them.
+        y: Their bias in any unit.
+        weight: The noise variance of a mean is σ²/weight.
+    """
+    next_to = (np.diff(means.run) == 0) & (np.diff(means.time_s) < 1.5 * float(np.median(means.duration_s)))
+    first = np.diff(y) / np.sqrt(1.0 / weight[1:] + 1.0 / weight[:-1])
+    both = next_to[1:] & next_to[:-1]
+    second = np.diff(y, 2) / np.sqrt(1.0 / weight[2:] + 4.0 / weight[1:-1] + 1.0 / weight[:-2])
+    found = [robust_sigma(x) for x in (first[next_to], second[both]) if len(x) >= _LEAST_DIFFERENCES]
+    return min(found, default=0.0)
 
 
 def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:

@@ -1,26 +1,47 @@
 """The evidence model on training samples: means over 50 s, standardised, outliers dropped.
 
 Its mean is the target that `mrbf` compresses; its variance is the shape of the uncertainty.
+
+The evidence of a flexible process can be raised without limit by following every mean and calling what is left
+noise. So the noise that differences of neighbouring means show holds it: σ is never believed to be less than a
+quarter of it, outliers are measured by no less than it, and at most a tenth of the means is dropped.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..errors import GyrotcError
 from .data import Bins, Scaling, TrainingData, average, gather
+from .noise import difference_sigma
 
-__all__ = ["Process", "fit_process"]
+__all__ = ["MEAN_S", "Process", "TrainingFailed", "conditioned", "fit_process"]
 
 Floats = NDArray[np.float64]
 
 MEAN_S = 50.0
 _TRIM_SIGMA = 4.5
 _TRIMS = 3
+_TRIM_SHARE = (
+    0.1  # more than this share cannot be outliers: then the process does not fit, and nothing more is dropped
+)
+_TRIM_NOISE = (
+    0.8  # of what differences show, less their own scatter: a smaller residual has been followed, not left
+)
+_LEAST_NOISE = (
+    0.25  # of what differences show: smooth structure makes them larger than the noise, hardly smaller
+)
+_LEAST_SIGMA = 1e-4  # of the spread: below it the normal equations lose their last digits
 _GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
+
+
+class TrainingFailed(GyrotcError):
+    """The equations of a fit could not be solved, or what came out must not be used; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +87,13 @@ class Process:
 
 
 def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = None) -> Process:
-    """Maximum evidence on samples; |residual| beyond 4.5 robust σ is dropped; at most three rounds.
+    """Maximum evidence on samples; |residual| beyond 4.5 robust σ is dropped; at most three rounds and a tenth.
 
     Args:
         like: A process on nearly the same samples, from whose parameters the search starts.
+
+    Raises:
+        TrainingFailed: The equations cannot be solved.
     """
     means = average(data, MEAN_S)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
@@ -79,18 +103,54 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
     spread = spread if spread > 0.0 else 1.0
     y = np.round((means.bias_dph - center) / spread * _GRID) / _GRID
     kept = np.ones(len(y), dtype=bool)
+    scale = difference_sigma(means, y, weight)
+    least = max(_LEAST_NOISE * scale, _LEAST_SIGMA)
     start = like.model.log_parameters if like else None
     for round_ in range(_TRIMS + 1):
         bins = gather(t[kept], r[kept], y[kept], weight[kept])
-        model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
-        if start is None:
-            model.optimise()
-        else:
-            model.optimise_from(start)
+        model = _optimised(bins, least, start)
         residual = np.abs(y - model.mean(t, r)) * np.sqrt(weight)
-        inside = residual <= _TRIM_SIGMA * 1.4826 * np.median(residual[kept])
-        if round_ == _TRIMS or np.array_equal(inside, kept) or inside.sum() < 0.5 * len(kept):
+        inside = residual <= _TRIM_SIGMA * max(1.4826 * float(np.median(residual[kept])), _TRIM_NOISE * scale)
+        settled = round_ == _TRIMS or np.array_equal(inside, kept)
+        if settled or np.count_nonzero(~inside) > _TRIM_SHARE * len(inside):
             break
         kept, start = inside, model.log_parameters
     seconds = float(np.median(means.duration_s))
     return Process(model, bins, t, r, y, weight, means.run, kept, center, spread, seconds)
+
+
+def _optimised(bins: Bins, least: float, start: Floats | None) -> _core.EvidenceModel:
+    """The best process whose σ is at least `least`: searched freely first, for the bound changes a search's path."""
+    for bound in (0.0, least):
+        model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples, bound)
+        try:
+            if start is None:
+                model.optimise()
+            else:
+                model.optimise_from(start)
+        except RuntimeError as error:
+            if bound:
+                raise TrainingFailed(f"the evidence model cannot be solved ({error})") from error
+            continue
+        if model.sigma >= least:
+            break
+    return model
+
+
+def conditioned(
+    process: Process, t: Floats, r: Floats, bias_dph: Floats, weight: Floats
+) -> Callable[[Floats, Floats], Floats]:
+    """Mean, deg/h, of a process with the same parameters that has seen other means, at normalised inputs.
+
+    Raises:
+        TrainingFailed: The equations cannot be solved.
+    """
+    center = float(np.average(bias_dph, weights=weight))
+    y = (bias_dph - center) / process.spread
+    bins = gather(t, r, y, weight / np.median(weight))
+    model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
+    try:
+        model.condition(process.model.log_parameters)
+    except RuntimeError as error:
+        raise TrainingFailed(f"the evidence model cannot be solved ({error})") from error
+    return lambda t, r: center + process.spread * model.mean(t, r)

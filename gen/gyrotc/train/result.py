@@ -51,6 +51,8 @@ class Fit:
         noise_floor_dph: Estimated noise of means over `average_s`, deg/h.
         average_s: Averaging of RMS figures, s.
         fallback_dph: Weighted mean of the training bias, deg/h.
+        ladder: What was tried and chosen from, where the method was left to the data; as in `training.json`.
+        reason: Why this one was chosen, in words.
     """
 
     method: str
@@ -60,6 +62,8 @@ class Fit:
     noise_floor_dph: float
     average_s: float
     fallback_dph: float
+    ladder: Sequence[Mapping[str, Any]] = ()
+    reason: str = ""
 
     @property
     def networks(self) -> Sequence[Network]:

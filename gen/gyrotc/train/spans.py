@@ -1,9 +1,12 @@
-"""Cuts a few training runs into spans, so that each can be left out in turn.
+"""Stretches of thermal history of the training runs, so that each can be left out in turn.
 
-With fewer than three runs, whole runs are too few to learn from the rest. A run is cut at the turning points
-of its temperature (where smoothed dT/dt changes sign: the branches of a cycle, at least 5 minutes each), or,
-where it has none, into five parts of equal length. Samples within a guard gap of a span are not trained on
-while it is left out.
+`history_folds` is what the ladder of corrections is chosen by: runs, power-ons, branches, the fastest rate, and the
+hottest and the coldest tenth, each with a guard gap; never random samples, which lie between samples that were seen.
+
+`training_spans` is what a model of few runs is judged by: with fewer than three runs, whole runs are too few to learn
+from the rest. A run is cut at the turning points of its temperature (where smoothed dT/dt changes sign: the branches
+of a cycle, at least 5 minutes each), or, where it has none, into five parts of equal length. Samples within a guard
+gap of a span are not trained on while it is left out.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..dataset import Run
 
-__all__ = ["Span", "training_spans"]
+__all__ = ["Fold", "Span", "history_folds", "training_spans"]
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +32,10 @@ _SMOOTHING_S = 60.0
 _GUARD_S = 100.0
 _SMALLEST_TURN_C = 1.0  # a smaller swing of temperature is noise or control, not a branch
 _SMALLEST_TURN_SHARE = 0.05
+_LEAST_SPAN_C = 2.0  # less temperature than this has no branches and no ends
+_TAIL_SHARE = 0.1  # of the range of temperature, at either end
+_FAST_SHARE = 0.8  # of the largest |dT/dt|
+_LEAST_REST = 8  # samples that must remain to train on
 
 
 class Samples(Protocol):
@@ -71,6 +78,95 @@ class Span:
 
     def __str__(self) -> str:
         return f"{self.file} {self.from_s:g} ... {self.to_s:g} s ({self.kind})"
+
+
+class Rated(Samples, Protocol):
+    """Samples with the rate of temperature."""
+
+    @property
+    def slope_c_per_min(self) -> Floats: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """A stretch of thermal history that is left out.
+
+    Attributes:
+        kind: What is left out.
+        run: The run that it belongs to, −1 where it is a range of temperatures or rates of all runs.
+        power_on: The power-on that it belongs to, −1 likewise.
+        held: Samples that are left out, shape (n,).
+        near: These and the samples within the guard gap of them: none of them is trained on.
+    """
+
+    kind: Literal["run", "power_on", "branch", "part", "hottest", "coldest", "fastest"]
+    run: int
+    power_on: int
+    held: NDArray[np.bool_]
+    near: NDArray[np.bool_]
+
+
+def history_folds(samples: Rated, power_on: NDArray[np.int64]) -> tuple[Fold, ...]:
+    """Every stretch that can be left out while enough remains; in an order that does not hang on numbers of runs.
+
+    Args:
+        samples: In order of time within each run.
+        power_on: Number of the power-on of every sample, shape (n,).
+    """
+    runs, power_ons = np.unique(samples.run), np.unique(power_on)
+    found: list[Fold] = []
+
+    def add(kind: Any, held: NDArray[np.bool_], run: int = -1, of: int = -1) -> None:
+        near = _with_guard(samples, held)
+        if held.any() and np.count_nonzero(~near) >= _LEAST_REST:
+            found.append(Fold(kind, run, of, held, near))
+
+    for run in runs:
+        mine = samples.run == run
+        of = int(power_on[mine][0])
+        if len(runs) > 1:
+            add("run", mine, int(run), of)
+        for span in _branches(samples, int(run), alone=len(runs) == 1):
+            add(span.kind, span.contains(samples.run, samples.time_s), int(run), of)
+    if 1 < len(power_ons) < len(runs):
+        for one in power_ons:
+            add("power_on", np.asarray(power_on == one), of=int(one))
+    t, rate = samples.temperature_c, np.abs(samples.slope_c_per_min)
+    low, high = float(t.min()), float(t.max())
+    if high - low >= _LEAST_SPAN_C:
+        add("hottest", t > high - _TAIL_SHARE * (high - low))
+        add("coldest", t < low + _TAIL_SHARE * (high - low))
+    if rate.max() > 0.0:
+        add("fastest", rate > _FAST_SHARE * float(rate.max()))
+    return tuple(found)
+
+
+def _branches(samples: Rated, run: int, *, alone: bool) -> list[Span]:
+    """Branches of a run; of the only run parts of equal length where it has none."""
+    mine = samples.run == run
+    t = samples.temperature_c[mine]
+    if np.ptp(t) < _LEAST_SPAN_C and not alone:
+        return []
+    spans = _cut(run, "", samples.time_s[mine], t)
+    return spans if alone or spans[0].kind == "branch" else []
+
+
+def _with_guard(samples: Rated, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """`held` and what lies within the guard gap of it in the same run."""
+    near = held.copy()
+    starts = np.flatnonzero(np.r_[True, np.diff(samples.run) != 0])
+    for begin, end in pairwise([*starts, len(held)]):
+        inside = held[begin:end]
+        if not inside.any() or inside.all():
+            continue
+        time = samples.time_s[begin:end]
+        of = time[inside]
+        after = np.searchsorted(of, time)
+        gap = np.minimum(
+            np.abs(time - of[np.minimum(after, len(of) - 1)]), np.abs(time - of[np.maximum(after - 1, 0)])
+        )
+        near[begin:end] |= gap < _GUARD_S
+    return np.asarray(near)
 
 
 def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:

@@ -15,7 +15,7 @@ from ...errors import GyrotcError, InputError
 from ...inputs import read_toml, refuse_above
 from ...judge.limits import Limits, load_limits
 from ...outputs import KINDS, read_marker
-from ...train import NETWORK_METHODS
+from ...train import AUTO, NETWORK_METHODS
 from ...train.fitting import FitOptions
 
 __all__ = ["SUMMARY", "Fleet", "Unit", "load_manifest", "printable"]
@@ -76,13 +76,13 @@ class _UnitEntry(_Part):
 
 
 def _method(name: str) -> str:
-    if name not in NETWORK_METHODS:
-        raise ValueError("one of " + ", ".join(NETWORK_METHODS))
+    if name not in (AUTO, *NETWORK_METHODS):
+        raise ValueError("one of " + ", ".join((AUTO, *NETWORK_METHODS)))
     return name
 
 
 class _Options(_Part):
-    method: Annotated[str, AfterValidator(_method)] = "mrbf"
+    method: Annotated[str, AfterValidator(_method)] = AUTO
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     centers: Annotated[int, Field(ge=0, le=512)] | None = None
     rho: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None

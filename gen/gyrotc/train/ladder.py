@@ -1,0 +1,264 @@
+"""The ladder of corrections, and the choice of one of them by what it does on thermal history that it has not seen.
+
+Rungs: nothing, constant, linear, cubic in T, cubic with a slope in dT/dt, map of T, map of (T, dT/dt). Each is fitted
+with every stretch of history left out in turn (`spans.history_folds`) and judged on that stretch by means over
+`average_s`. Two questions decide:
+
+1. *Which is the simplest that is not clearly worse than the best?* The one-standard-error rule (Hastie, Tibshirani,
+   Friedman, The Elements of Statistical Learning, 7.10) over all stretches, on paired differences of the score and
+   of the mean square: a richer rung has to gain on stretches as they come and on what they add up to.
+2. *Is that one better than a constant?* Paired over independent pieces of history, by a t test at 5 %. Pieces are
+   power-ons, runs of one power-on, or, of fewer than three runs, the stretches themselves: a sample beside a sample
+   that was seen proves nothing about another day, and three runs have two degrees of freedom. Where the rung leaves
+   less than the noise on every piece, pieces differ by noise alone, and all stretches count.
+
+The score of a stretch is ½ log(mean square + s²), s the noise of a mean from first differences: all stretches count
+alike, one that fails grossly does not outvote the others, and differences below the noise count for nothing.
+Where it is not, the constant is what remains. Only one rung is asked, so that luck among many has no part in it.
+
+The maps stand here as the mean of the evidence process with the parameters of the whole record, conditioned anew
+without each stretch; the network that is emitted follows it to within a tenth of its own expected error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, average
+from .noise import difference_sigma
+from .process import MEAN_S, Process, TrainingFailed, conditioned
+from .simple import SIMPLE, design, solve
+from .spans import Fold, history_folds
+
+__all__ = ["MAPS", "RUNGS", "Ladder", "climb"]
+
+Floats = NDArray[np.float64]
+Correction = Callable[[Floats, Floats], Floats]
+
+MAPS = ("mrbf_t", "mrbf")
+RUNGS = ("nothing", *SIMPLE, *MAPS)
+"""From the simplest to the richest."""
+_SIGNIFICANCE = 0.05
+_LEAST_PIECES = 3  # runs or power-ons: with fewer their scatter says nothing
+_LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by rounding only
+
+
+@dataclass(frozen=True, slots=True)
+class Ladder:
+    """What was tried.
+
+    Attributes:
+        folds: Stretches that were left out.
+        rms_dph: RMS of each stretch under each rung, shape (folds, rungs); nan: the rung could not be fitted.
+        score: ½ log(mean square + s²), same shape.
+        noise_dph: Noise of a mean over `average_s`, from differences of neighbours.
+        pieces: Which independent piece each stretch belongs to, −1: to none, shape (folds,).
+    """
+
+    folds: Sequence[Fold]
+    rms_dph: Floats
+    score: Floats
+    noise_dph: float
+    pieces: NDArray[np.int64]
+
+    def chosen(self, without: Sequence[str] = ()) -> str:
+        """The rung to emit, with some that must not be."""
+        able = [
+            k
+            for k, name in enumerate(RUNGS)
+            if name not in ("nothing", *without) and np.all(np.isfinite(self.score[:, k]))
+        ]
+        if len(self.folds) < 2 or len(able) < 2:
+            return "constant"
+        best = min(able, key=lambda k: float(self.score[:, k].mean()))
+        name = RUNGS[next(k for k in able if not self._clearly_worse(k, best))]
+        return name if self.beats_constant(name) else "constant"
+
+    def beats_constant(self, name: str) -> bool:
+        """Whether a rung is better than a constant: by a t test at 5 % over independent pieces of history.
+
+        Where it leaves less than the noise on every piece, pieces differ by noise alone: then over all stretches.
+        """
+        if name in ("nothing", "constant"):
+            return False
+        used = self.pieces >= 0
+        excess = self.rms_dph[used, RUNGS.index(name)] ** 2 - self.noise_dph**2
+        tests = [self.gain(name)]
+        if len(excess) and excess.max() < self.noise_dph**2:
+            tests.append(_t_statistic(self._gains(name)))
+        return any(n > 0 and t > stdtrit(n, 1.0 - _SIGNIFICANCE) for t, n in tests)
+
+    def gain(self, name: str) -> tuple[float, int]:
+        """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
+        used = self.pieces >= 0
+        if not used.any():
+            return 0.0, 0
+        _, index = np.unique(self.pieces[used], return_inverse=True)
+        return _t_statistic(np.bincount(index, self._gains(name)[used]) / np.bincount(index))
+
+    def _gains(self, name: str) -> Floats:
+        return np.asarray(self.score[:, RUNGS.index("constant")] - self.score[:, RUNGS.index(name)])
+
+    def _clearly_worse(self, k: int, best: int) -> bool:
+        """By more than a standard error of the paired difference, in score and in mean square."""
+        for values in (self.score, self.rms_dph**2):
+            difference = values[:, k] - values[:, best]
+            if difference.mean() <= difference.std(ddof=1) / np.sqrt(len(difference)):
+                return False
+        return True
+
+    def rows(self, chosen: str) -> list[dict[str, Any]]:
+        """`ladder` of `training.json`: RMS over the stretches, all counting alike, with its standard error."""
+        return [self._row(k, name, chosen) for k, name in enumerate(RUNGS)]
+
+    def _row(self, k: int, name: str, chosen: str) -> dict[str, Any]:
+        square = self.rms_dph[:, k] ** 2
+        known = len(square) > 0 and bool(np.all(np.isfinite(square)))
+        rms = float(np.sqrt(square.mean())) if known else None
+        error = None
+        if known and rms and len(square) > 1:
+            error = float(square.std(ddof=1) / np.sqrt(len(square)) / (2.0 * rms))
+        return {
+            "id": name,
+            "left_out_rms_dph": rms,
+            "standard_error_dph": error,
+            "beats_constant": self.beats_constant(name),
+            "chosen": name == chosen,
+        }
+
+    def stretches(self) -> list[str]:
+        """What was left out, in words: "4 runs, 11 branches, the hottest tenth, ..."."""
+        kinds = [fold.kind for fold in self.folds]
+        words = [
+            f"{kinds.count(kind)} {many if kinds.count(kind) > 1 else one}"
+            for kind, (one, many) in _COUNTED.items()
+            if kind in kinds
+        ]
+        return words + [text for kind, text in _RANGES.items() if kind in kinds]
+
+
+def _t_statistic(gains: Floats) -> tuple[float, int]:
+    """Student's t of a mean against 0, and its degrees of freedom; 0 degrees where nothing can be said."""
+    if len(gains) < 2 or not np.all(np.isfinite(gains)):
+        return 0.0, 0
+    error = float(gains.std(ddof=1)) / float(np.sqrt(len(gains)))
+    return float(gains.mean()) / max(error, 1e-12), len(gains) - 1
+
+
+_COUNTED = {
+    "run": ("whole run", "whole runs"),
+    "power_on": ("power-on", "power-ons"),
+    "branch": ("branch", "branches"),
+    "part": ("part", "parts"),
+}
+_RANGES = {"hottest": "the hottest tenth", "coldest": "the coldest tenth", "fastest": "the fastest rate"}
+
+
+def climb(
+    samples: TrainingData,
+    scaling: Scaling,
+    process: Process | None,
+    power_on: NDArray[np.int64] | None,
+    average_s: float,
+) -> Ladder:
+    """Fits every rung without every stretch of history.
+
+    Args:
+        samples: As `cleaned` returns them.
+        scaling: Of all of them.
+        process: The evidence process of all samples; None: it could not be fitted, and no map is tried.
+        power_on: Number of the power-on of each run, by the run's index; None: each run is one.
+        average_s: Averaging of what is judged, s.
+    """
+    means, kept = _means(samples, process)
+    groups = means.run if power_on is None else power_on[means.run]
+    folds = history_folds(means, groups)
+    judged = average(means, average_s)
+    noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
+    noise = max(
+        noise, _LEAST_NOISE * float(np.abs(judged.bias_dph).max()), float(np.finfo(np.float64).tiny) ** 0.5
+    )
+    square = np.array([_squares(fold, means, kept, scaling, process, average_s) for fold in folds])
+    square = square.reshape(len(folds), len(RUNGS))
+    return Ladder(folds, np.sqrt(square), 0.5 * np.log(square + noise**2), noise, _pieces(folds))
+
+
+def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData, NDArray[np.bool_]]:
+    """Means of every run once, however often it was handed over, and which of them the process kept."""
+    means = average(samples, MEAN_S)
+    kept = np.ones(len(means), dtype=bool) if process is None else process.kept
+    seen: set[bytes] = set()
+    first = np.ones(len(means), dtype=bool)
+    for run in np.unique(means.run):
+        mine = means.run == run
+        content = means.temperature_c[mine].tobytes() + means.bias_dph[mine].tobytes()
+        first[mine] = content not in seen
+        seen.add(content)
+    return means.select(first), kept[first]
+
+
+def _pieces(folds: Sequence[Fold]) -> NDArray[np.int64]:
+    """Power-ons, else runs, where there are three of them; else every stretch is a piece."""
+    power_ons = np.array([fold.power_on for fold in folds], dtype=np.int64)
+    runs = np.array([fold.run for fold in folds], dtype=np.int64)
+    whole = [fold for fold in folds if fold.kind in ("run", "power_on")]
+    if len({fold.power_on for fold in whole}) >= _LEAST_PIECES:
+        return power_ons
+    if len({fold.run for fold in whole if fold.kind == "run"}) >= _LEAST_PIECES:
+        return runs
+    return np.arange(len(folds))
+
+
+def _squares(
+    fold: Fold,
+    means: TrainingData,
+    kept: NDArray[np.bool_],
+    scaling: Scaling,
+    process: Process | None,
+    average_s: float,
+) -> list[float]:
+    """Mean square on a stretch under each rung that has not seen it, (deg/h)²."""
+    rest, held = means.select(~fold.near), means.select(fold.held)
+    limits = [(float(x.min()), float(x.max())) for x in (rest.temperature_c, rest.slope_c_per_min)]
+    at = scaling.normalise(np.clip(held.temperature_c, *limits[0]), np.clip(held.slope_c_per_min, *limits[1]))
+    flat = limits[0][1] - limits[0][0] < MIN_TEMPERATURE_SPAN_C
+    known = kept[~fold.near]
+    squares = []
+    for name in RUNGS:
+        taught = "constant" if flat and name != "nothing" else name
+        try:
+            correction = _taught(taught, rest, known, scaling, process)
+        except TrainingFailed:
+            squares.append(np.nan)
+            continue
+        left = average(replace(held, bias_dph=held.bias_dph - correction(*at)), average_s)
+        squares.append(float(np.average(left.bias_dph**2, weights=left.weight)))
+    return squares
+
+
+def _taught(
+    name: str, rest: TrainingData, known: NDArray[np.bool_], scaling: Scaling, process: Process | None
+) -> Correction:
+    """A rung fitted to what remains: a function of normalised inputs, deg/h.
+
+    Raises:
+        TrainingFailed: The map cannot be fitted.
+    """
+    if name == "nothing":
+        return lambda t, r: np.zeros(len(t))
+    t, r = scaling.normalise(rest.temperature_c, rest.slope_c_per_min)
+    if name in SIMPLE:
+        center = float(np.average(rest.bias_dph, weights=rest.weight))
+        found = solve(name, t, r, rest.bias_dph - center, rest.weight)
+        return lambda t, r: center + design(name, t, r) @ found
+    if process is None:
+        raise TrainingFailed("there is no evidence process")
+    of_rate = 1.0 if name == "mrbf" else 0.0
+    mean = conditioned(process, t[known], of_rate * r[known], rest.bias_dph[known], rest.weight[known])
+    return lambda t, r: mean(t, of_rate * r)

@@ -1,0 +1,95 @@
+"""Corrections without a search: constant, linear, cubic in T, and cubic in T with a slope in dT/dt.
+
+Each is least squares on the samples. A table knows Gaussians, so a cubic is written as a constant, a linear part and
+three or four Gaussians in T so wide that they reproduce it to 2.4e-4 of its coefficients.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .data import Scaling, TrainingData, average
+from .noise import floor_dph
+from .result import Outcome, network
+
+__all__ = ["FLAT", "SIMPLE", "design", "fit_simple", "solve"]
+
+Floats = NDArray[np.float64]
+
+FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
+SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
+    "constant": ((0, 0),),
+    "linear": ((0, 0), (1, 0)),
+    "cubic": ((0, 0), (1, 0), (2, 0), (3, 0)),
+    "cubic_slope": ((0, 0), (1, 0), (0, 1), (2, 0), (3, 0)),
+}
+"""Powers of (z_T, z_r) of each."""
+
+# Number, width and outermost center of Gaussians, in half ranges. Largest error of z² and z³ over |z| <= 1, and sum of
+# their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
+_GAUSSIANS = ((3, 1.5, 1.5), (4, 1.5, 2.0))
+_TOLERANCE = 0.01  # of the noise floor
+_GRID = 201
+
+
+def design(name: str, t: Floats, r: Floats) -> Floats:
+    """Columns of a correction at normalised inputs, shape (n, powers)."""
+    return np.stack([t**a * r**b for a, b in SIMPLE[name]], axis=1)
+
+
+def solve(name: str, t: Floats, r: Floats, y: Floats, weight: Floats) -> Floats:
+    """Weights of the columns by weighted least squares; of equally good ones the smallest."""
+    root = np.sqrt(weight / weight.max())
+    columns = design(name, t, r) * root[:, None]
+    return np.asarray(np.linalg.lstsq(columns, y * root, rcond=None)[0], dtype=np.float64)
+
+
+def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
+    """One of `SIMPLE` on cleaned samples, as a network."""
+    began = time.process_time()
+    t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
+    center = float(np.average(data.bias_dph, weights=data.weight))
+    found = solve(name, t, r, data.bias_dph - center, data.weight)
+    by_power = dict(zip(SIMPLE[name], found, strict=True))
+    w0 = center + by_power[0, 0]
+    linear = [by_power.get((1, 0), 0.0), by_power.get((0, 1), 0.0)]
+    centers, widths, weights = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
+    if (3, 0) in by_power:
+        residual = data.bias_dph - center - design(name, t, r) @ found
+        floor = floor_dph(data, residual, average_s)
+        extra, z, width, weights = _as_gaussians(by_power[2, 0], by_power[3, 0], _TOLERANCE * floor)
+        w0, linear[0] = w0 + extra[0], linear[0] + extra[1]
+        centers = np.stack([scaling.center_c + scaling.half_range_c * z, np.zeros(len(z))], axis=1)
+        widths = np.stack([np.full(len(z), width), np.full(len(z), FLAT)], axis=1)
+    means = len(average(data, average_s))
+    return Outcome(
+        networks=(network(w0, linear, centers, widths, weights),),
+        curves={
+            "sizes": [],
+            "chosen": len(weights),
+            "samples": len(data),
+            "means": means,
+            "seconds": {"total": time.process_time() - began},
+        },
+        withheld="a correction without a process predicts nothing",
+    )
+
+
+def _as_gaussians(square: float, cube: float, tolerance: float) -> tuple[Floats, Floats, float, Floats]:
+    """(constant and linear part, centers, width, weights) of square · z² + cube · z³ over |z| <= 1."""
+    z = np.linspace(-1.0, 1.0, _GRID)
+    target = square * z**2 + cube * z**3
+    trials = []
+    for number, width, reach in _GAUSSIANS:
+        centers = np.linspace(-reach, reach, number)
+        bells = np.exp(-(((z[:, None] - centers) / width) ** 2))
+        columns = np.concatenate([np.ones((_GRID, 1)), z[:, None], bells], axis=1)
+        found = np.linalg.lstsq(columns, target, rcond=1e-12)[0]
+        error = float(np.abs(columns @ found - target).max())
+        trials.append((error, (found[:2], centers, width, found[2:])))
+        if error <= tolerance:
+            return trials[-1][1]
+    return min(trials, key=lambda trial: trial[0])[1]

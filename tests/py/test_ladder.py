@@ -1,0 +1,249 @@
+"""The ladder of corrections: what is chosen, what is refused, and what the choice must not depend on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from gyrotc.dataset import load
+from gyrotc.train import Fit, TrainingData, fit, predict
+from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from gyrotc.train.guard import objection
+from gyrotc.train.ladder import RUNGS
+from gyrotc.train.simple import SIMPLE, fit_simple
+from gyrotc.train.spans import history_folds
+from recordings import toml, write_csv
+from training_data import NOISE_DPH, rms, samples, true_bias
+
+REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
+Change = Callable[[TrainingData], TrainingData]
+
+
+def auto(data: TrainingData) -> Fit:
+    return fit(data, method="auto")
+
+
+def with_bias(data: TrainingData, bias: np.ndarray, noise_dph: float = NOISE_DPH) -> TrainingData:
+    noise = np.random.default_rng(7).normal(0.0, noise_dph * np.sqrt(10.0), len(bias))
+    return replace(data, bias_dph=bias + noise)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_gyro_that_repeats_gets_a_map_that_is_as_good_as_the_default_was(seed: int) -> None:
+    data = samples(seed)
+    found = auto(data)
+    error = predict(found, data.temperature_c, data.slope_c_per_min)
+    error -= true_bias(data.temperature_c, data.slope_c_per_min)
+    assert rms(error) < 0.25 * NOISE_DPH
+    assert not found.findings
+    assert [row["id"] for row in found.ladder] == list(RUNGS)
+    assert [row["id"] for row in found.ladder if row["chosen"]] == [found.method]
+
+
+@pytest.mark.parametrize(
+    ("name", "bias"),
+    [
+        ("constant", lambda t, r: 0.0 * t + 5.0),
+        ("linear", lambda t, r: 5.0 + 4e-5 * t),
+        ("cubic", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 1e-8 * (t - 10.0) ** 3),
+        ("cubic_slope", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 8e-4 * r),
+    ],
+)
+def test_the_simplest_correction_that_does_is_taken(name: str, bias: Callable[..., np.ndarray]) -> None:
+    data = samples(0)
+    data = with_bias(data, bias(data.temperature_c, data.slope_c_per_min))
+    found = auto(data)
+    assert found.method == name, found.ladder
+    assert not found.findings, "a constant that leaves noise only is no failure"
+
+
+def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> None:
+    """Each run has a slope of its own: within a run a map looks good, on another run it does harm."""
+    data = samples(0)
+    slope = np.array([3e-4, -4e-4, 1e-4])[data.run]
+    found = auto(with_bias(data, 5.0 + slope * data.temperature_c + np.array([0.0, 5e-3, -9e-3])[data.run]))
+    assert found.method == "constant"
+    [finding] = found.findings
+    assert finding["id"] == "does_not_generalise"
+    assert "3 whole runs" in finding["text"] and "Repeat" in finding["text"]
+    assert "nothing is shown to be better" in found.reason
+
+
+def test_no_fold_is_a_random_sample_and_every_one_keeps_its_distance() -> None:
+    data = samples(0)
+    folds = history_folds(data, data.run)
+    kinds = [fold.kind for fold in folds]
+    assert {"run", "branch", "hottest", "coldest", "fastest"} == set(kinds)
+    assert kinds.count("run") == 3
+    for fold in folds:
+        assert not np.any(fold.held & ~fold.near)
+        for run in range(3):
+            mine = data.run == run
+            held, free = data.time_s[mine & fold.held], data.time_s[mine & ~fold.near]
+            if len(held) and len(free):
+                assert np.abs(held[:, None] - free[None, :]).min() >= 100.0
+
+
+def test_spans_of_one_recording_are_left_out_together_as_a_power_on() -> None:
+    data = samples(0)
+    data = replace(data, run=2 * data.run + (data.time_s > 7200.0))
+    kinds = [(fold.kind, fold.power_on) for fold in history_folds(data, data.run // 2)]
+    assert [of for kind, of in kinds if kind == "power_on"] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("name", list(SIMPLE))
+def test_a_cubic_as_gaussians_is_the_cubic(name: str) -> None:
+    """To far below the noise, with weights that add up to no more than 25 times its coefficients."""
+    data = samples(0)
+    z = (data.temperature_c - 10.0) / 50.0
+    bias = 5.0 + 2e-3 * z - 3e-3 * z**2 + 2e-3 * z**3 + 1e-4 * data.slope_c_per_min
+    powers = {p: c for p, c in zip(((2, 0), (3, 0)), (3e-3, 2e-3), strict=True) if p in SIMPLE[name]}
+    found = fit(replace(data, bias_dph=bias), method=name)
+    if name == "cubic_slope":
+        error = predict(found, data.temperature_c, data.slope_c_per_min) - bias
+        assert np.abs(error).max() < 5e-4 * 5e-3
+    assert found.sum_abs_weights <= 26.0 * sum(powers.values())
+    assert found.method == name and not found.ladder
+
+
+def test_a_map_that_leaves_its_process_or_the_data_is_refused_with_words() -> None:
+    data = samples(0)
+    found = fit(data)
+    arguments = data, found.scaling, 100.0
+    assert objection(found.outcome, *arguments) == ""
+    [good] = found.networks
+    far = replace(found.outcome, networks=[{**good, "linear": [good["linear"][0], 0.01]}])
+    assert "leaves the process" in objection(far, *arguments)
+    assert "the means span" in objection(replace(far, process=None), *arguments)
+    heavy = {**good, "weights": [1e8, *good["weights"][1:]]}
+    assert "more than a table holds" in objection(replace(far, networks=[heavy]), *arguments)
+
+
+def test_a_run_handed_over_twice_is_no_second_witness() -> None:
+    """Left out, its copy would still be trained on: every map would look perfect."""
+    data = samples(0)
+    slope = np.array([3e-4, -4e-4, 1e-4])[data.run]
+    data = with_bias(data, 5.0 + slope * data.temperature_c)
+    copies = replace(data, run=data.run + 3)
+    twice = TrainingData(
+        *(np.concatenate([getattr(data, n), getattr(copies, n)]) for n in TrainingData.__dataclass_fields__)
+    )
+    assert auto(twice).method == auto(data).method == "constant"
+
+
+def renumbered(data: TrainingData) -> TrainingData:
+    return replace(data, run=np.array([2, 0, 1])[data.run])
+
+
+def doubled(data: TrainingData) -> TrainingData:
+    return data.select(np.repeat(np.arange(len(data)), 2))
+
+
+INVARIANCES: dict[str, tuple[Change, float]] = {
+    "order of runs": (renumbered, 0.0),
+    "duplicated rows": (doubled, 0.0),
+    "constant on the rate": (lambda d: replace(d, bias_dph=d.bias_dph + 12.0), 12.0),
+    "constant on the clock": (lambda d: replace(d, time_s=d.time_s + 86400.0), 0.0),
+}
+
+
+@pytest.mark.parametrize("name", INVARIANCES)
+@pytest.mark.parametrize("repeats", [True, False])
+def test_the_choice_does_not_depend_on(name: str, repeats: bool) -> None:
+    change, shift = INVARIANCES[name]
+    data = samples(1)
+    if not repeats:
+        data = replace(
+            data, bias_dph=data.bias_dph + np.array([3e-4, -4e-4, 1e-4])[data.run] * data.temperature_c
+        )
+    same(auto(data), auto(change(data)), shift)
+
+
+def same(one: Fit, two: Fit, shift: float = 0.0, share: float = 1e-3) -> None:
+    """The same rung, the same table, and maps within a share of the noise."""
+    assert two.method == one.method
+    for a, b in zip(one.ladder, two.ladder, strict=True):
+        if a["id"] != "nothing":
+            assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=max(share, 1e-6))
+    t, r = np.meshgrid(
+        np.linspace(*one.scaling.temperature_c, 21), np.linspace(*one.scaling.slope_c_per_min, 11)
+    )
+    assert np.abs(predict(two, t, r) - shift - predict(one, t, r)).max() < share * one.noise_floor_dph
+
+
+def cycle(seed: int = 3, n: int = 5400) -> dict[str, np.ndarray]:
+    """Three branches in one recording of 2 s rows."""
+    rng = np.random.default_rng(seed)
+    time = 2.0 * np.arange(n)
+    t = np.interp(time, [0.0, 3600.0, 7200.0, 10800.0], [50.0, -20.0, 60.0, 20.0])
+    rate = 5.0 + 0.02 * t - 3e-4 * t**2 + 0.05 * np.gradient(t, time / 60.0) + rng.normal(0.0, 0.05, n)
+    return {"time_s": time, "temperature_c": np.round(t + rng.normal(0.0, 0.01, n), 4), "rate_dph": rate}
+
+
+def cut_at(folder: Path, table: dict[str, np.ndarray], cuts: list[float]) -> Fitted:
+    write_csv(folder / "a.csv", table)
+    edges = [None, *cuts, None]
+    runs = []
+    for low, high in pairwise(edges):
+        span = ([] if low is None else [f"from_s = {low}"]) + ([] if high is None else [f"to_s = {high}"])
+        runs.append("\n".join(['file = "a.csv"', *span]))
+    (folder / "dataset.toml").write_text(toml(*runs[::-1]), "utf-8")
+    return fit_dataset(load(folder), FitOptions())
+
+
+@pytest.mark.parametrize("cuts", [[5000.0], [1234.0, 5001.0, 9000.0]])
+def test_where_touching_spans_are_cut_changes_nothing_that_matters(tmp_path: Path, cuts: list[float]) -> None:
+    """Within 2 %; the description names the spans in another order, too."""
+    whole, parts = cut_at(tmp_path / "whole", cycle(), []), cut_at(tmp_path / "parts", cycle(), cuts)
+    close(whole, parts)
+
+
+def close(whole: Fitted, parts: Fitted) -> None:
+    assert parts.model.method == whole.model.method
+    for a, b in zip(whole.training["ladder"], parts.training["ladder"], strict=True):
+        assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=0.02), a["id"]
+    e = whole.model.envelope
+    t, r = np.meshgrid(np.linspace(*e.temperature_c, 21), np.linspace(*e.slope_c_per_min, 11))
+    one, two = whole.model.map_dph(t, r), parts.model.map_dph(t, r)
+    assert np.abs(two - one).max() <= 0.02 * max(float(np.ptp(one)), whole.model.noise_floor_dph or 0.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path: Path, axis: str) -> None:
+    source = REAL / "mpu6000-chamber-cycle" / "data.csv"
+    if not source.is_file():
+        pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
+    names = source.read_text("utf-8").split("\n", 1)[0].split(",")
+    table = dict(zip(names, np.loadtxt(source, delimiter=",", skiprows=1).T, strict=True))
+    table = {
+        "time_s": table["time_s"],
+        "temperature_c": table["temperature_c"],
+        "rate_dph": table[f"rate_{axis}_dph"],
+    }
+    whole = cut_at(tmp_path / "whole", table, [])
+    close(whole, cut_at(tmp_path / "two", table, [2000.0]))
+    moved = cut_at(tmp_path / "moved", table | {"rate_dph": table["rate_dph"] + 1e4}, [])
+    later = cut_at(tmp_path / "later", table | {"time_s": table["time_s"] + 4096.0}, [])
+    assert moved.model.method == later.model.method == whole.model.method
+    for row, a, b in zip(*(f.training["ladder"] for f in (whole, moved, later)), strict=True):
+        if row["id"] != "nothing":
+            assert a["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
+        assert b["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
+
+
+def test_simple_corrections_are_least_squares() -> None:
+    data = samples(2)
+    found = fit(data, method="cubic_slope")
+    t, r = found.scaling.normalise(data.temperature_c, data.slope_c_per_min)
+    columns = np.stack([t**0, t, r, t**2, t**3], axis=1)
+    expected = columns @ np.linalg.lstsq(columns, data.bias_dph, rcond=None)[0]
+    np.testing.assert_allclose(
+        predict(found, data.temperature_c, data.slope_c_per_min), expected, atol=0.01 * found.noise_floor_dph
+    )
+    assert fit_simple("linear", data, found.scaling, 100.0).networks[0]["weights"] == []
