@@ -138,9 +138,10 @@ typedef struct {
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS (26 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
 
-/* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
- * no flushed subnormals that the table needs), checksum over its values, every word within its range
- * (docs/FORMAT.md, section 3), its known answers.
+/* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
+ * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
+ * word within its range (docs/FORMAT.md, section 3), its known answers, which the generator chooses to
+ * differ where a product is fused.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: a word outside its range), GTC_E_IMAGE (checksum) or
  * GTC_E_SELF_TEST.
  * Cost: n_probes + 2 evaluations of the map and about 40 operations for each word of the table. */
