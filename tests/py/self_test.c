@@ -64,6 +64,7 @@ static void maps(const subject_t *subject)
 static void history(const subject_t *subject)
 {
     static gtc_f32_state_t state;
+    gtc_f32_angle_t sum = {{0.0F, 0.0F}};
     long t = subject->t_low + subject->t_span / 2;
     int k;
 
@@ -84,7 +85,7 @@ static void history(const subject_t *subject)
         take_word((uint_least32_t)status);
         status = gtc_f32_bias(&state, &bias);
         take_result(status, bias);
-        status = gtc_f32_angle(&state, 0x1.47ae14p-7F, &angle);
+        status = gtc_f32_angle(&sum, bias, 0x1.47ae14p-7F, &angle);
         take_result(status, angle);
     }
 }

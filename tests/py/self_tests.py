@@ -9,16 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import gyrotc
-from gyrotc.confined import run_to_end
 from gyrotc.emit import emit_texts, quantise_all
 from gyrotc.model import Model
-from gyrotc.toolchain import Target, link
+from gyrotc.verify.confined import run_to_end
+from gyrotc.verify.toolchain import Target, link
 from models import random_model, random_terms
 
 TABLES = 40
 OK = 0  # GTC_OK
 HERE = Path(__file__).resolve().parent
-BARE = Path(gyrotc.__file__).parent / "bare"
+BARE = Path(gyrotc.__file__).parent / "verify" / "bare"
 RIGHT = ("-std=c99", "-O2", "-ffp-contract=off")
 
 
