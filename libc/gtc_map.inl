@@ -65,7 +65,8 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
     return ((rest & 1U) != 0U) ? 1 : 0;
 }
 
-static int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
+/* Inlined, so that the public function costs no call of its own. */
+GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
 {
     POINT in;
     int status;

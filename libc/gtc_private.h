@@ -22,7 +22,7 @@
 #error "these sources read table layout 1: include/ and libc/ are of different versions"
 #endif
 
-/* For what stands in the loop over the centers. Where a product is one instruction, a call costs more
+/* For what stands in the loop over the centers, and the map itself. Where a product is one instruction, a call costs more
  * than it, in time and in code; but a compiler for size makes calls of whatever has two callers. */
 #if defined(__GNUC__) && defined(__OPTIMIZE__) && !GTC_HALF_MULTIPLY
 #define GTC_IN_LOOP static inline __attribute__((always_inline))
