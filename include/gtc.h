@@ -47,7 +47,8 @@ extern "C" {
 
 /* The options that set the size of structs are part of every linked name (gtc_f32_init is
  * gtc_f32_init_20blocks_4terms to the linker), so that units which were compiled with different ones do not
- * link: "undefined reference to gtc_f32_init_20blocks_1terms" says what the unit was compiled with. */
+ * link: "undefined reference to gtc_f32_init_20blocks_1terms" says what the unit was compiled with.
+ * MISRA 20.10: a name is made of the options. */
 #define GTC_LINKED_AS(name, b, t) name##_##b##blocks_##t##terms
 #define GTC_LINKED_WITH(name, b, t) GTC_LINKED_AS(name, b, t)
 #define GTC_LINKED(name) GTC_LINKED_WITH(name, GTC_MAX_SLOPE_BLOCKS, GTC_MAX_TERMS)

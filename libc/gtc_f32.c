@@ -89,6 +89,7 @@ static float FN(from_words)(const gtc_word_t words[2])
 
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
+/* MISRA 20.1: the texts use what stands above. */
 #include "gtc_selftest_f32.h"
 #include "gtc_limits.inl"
 #include "gtc_map.inl"

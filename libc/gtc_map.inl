@@ -25,6 +25,7 @@ static SHARE FN(share_in)(NUM x, const gtc_word_t region[2], const NUM envelope[
     return share;
 }
 
+/* MISRA 8.7: external, so that the map of one network does not carry its stack. */
 NUM FN(blend)(const TABLE *table, const POINT *in)
 {
     const gtc_word_t *center = table->centers;

@@ -128,6 +128,7 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
 
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
+/* MISRA 20.1: the texts use what stands above. */
 #include "gtc_selftest_q31.h"
 #include "gtc_limits.inl"
 #include "gtc_map.inl"
