@@ -13,8 +13,9 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from gyrotc.emit.files import emit, emitted_tables, vectors
-from gyrotc.emit.files.vectors import make_vectors
+from gyrotc.emit import vectors
+from gyrotc.emit.files import emit, emitted_tables
+from gyrotc.emit.vectors import make_vectors
 from gyrotc.errors import CheckFailed
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
 from gyrotc.reference import answers, evaluate_map
@@ -145,7 +146,8 @@ def _sizes(job: Job, target: Target) -> dict[str, dict[str, int]]:
     """Bytes of the map's function and of its lookup table, by arithmetic."""
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         objects = compile_objects(target, [job.c_folder / "gtc.c"], Path(work), include=job.c_folder)
-        size = {symbol.name: symbol.size for symbol in symbols(target, *objects)}
+        # Public names carry the options that the runtime was compiled with.
+        size = {s.name.partition("_20blocks")[0]: s.size for s in symbols(target, *objects)}
     return {
         n: {"map_bytes": size[f"gtc_{n}_map"], "lookup_bytes": size[f"gtc_{n}_exp2_table"]}
         for n in job.tables

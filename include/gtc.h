@@ -2,8 +2,7 @@
  *
  * The generator (`gyrotc emit`) writes one constant table for each axis of each gyro serial. The
  * functions below read it and keep their state in a struct of the caller: no heap, no libm, no
- * I/O, no writable static data. A state has one writer; any number of tasks or interrupts may
- * read one table. Every function exists for each arithmetic <n>:
+ * I/O, no writable static data, no C library. Every function exists for each arithmetic <n>:
  *
  *   f32  float32: temperatures in C, slopes in C per block, biases in deg/h
  *   q31  fixed point: temperatures in 2^-16 C, slopes in 2^-16 C per block,
@@ -18,6 +17,13 @@
  * blocks up to n-1 gave: T, the mean of the last block, and dT/dt, the least-squares slope over
  * the last `slope_blocks` blocks. From the first valid sample on there is a correction (the map
  * at that sample with slope 0, GTC_WARMING); before it the correction is 0 with GTC_HELD.
+ *
+ * Who may call what from where:
+ *   - A table is constant: any number of tasks and interrupts may read one at the same time.
+ *   - A state belongs to one task: all calls that take it, gtc_<n>_bias() and _save() too, come from there.
+ *   - A gtc_<n>_angle_t belongs to one task or interrupt, which alone calls gtc_<n>_angle() with it.
+ *   - From the one to the other goes a copy of the bias, by what the firmware has for one number: a store
+ *     that is atomic on the target, a queue, or interrupts held off for the time of it.
  *
  * A float32 build must keep to C99 arithmetic (-std=c99 -ffp-contract=off, no -ffast-math);
  * gtc_f32_check() at boot proves that it does. Fixed point needs no flag.
@@ -38,6 +44,42 @@ extern "C" {
 #define GTC_VERSION_MAJOR 0
 #define GTC_VERSION_MINOR 1
 #define GTC_VERSION_PATCH 0
+
+/* The options that set the size of structs are part of every linked name (gtc_f32_init is
+ * gtc_f32_init_20blocks_4terms to the linker), so that units which were compiled with different ones do not
+ * link: "undefined reference to gtc_f32_init_20blocks_1terms" says what the unit was compiled with.
+ * MISRA 20.10: a name is made of the options. */
+#define GTC_LINKED_AS(name, b, t) name##_##b##blocks_##t##terms
+#define GTC_LINKED_WITH(name, b, t) GTC_LINKED_AS(name, b, t)
+#define GTC_LINKED(name) GTC_LINKED_WITH(name, GTC_MAX_SLOPE_BLOCKS, GTC_MAX_TERMS)
+#define gtc_f32_check GTC_LINKED(gtc_f32_check)
+#define gtc_f32_open GTC_LINKED(gtc_f32_open)
+#define gtc_f32_map GTC_LINKED(gtc_f32_map)
+#define gtc_f32_init GTC_LINKED(gtc_f32_init)
+#define gtc_f32_sample GTC_LINKED(gtc_f32_sample)
+#define gtc_f32_missed GTC_LINKED(gtc_f32_missed)
+#define gtc_f32_bias GTC_LINKED(gtc_f32_bias)
+#define gtc_f32_save GTC_LINKED(gtc_f32_save)
+#define gtc_f32_restore GTC_LINKED(gtc_f32_restore)
+#define gtc_f32_term_memory GTC_LINKED(gtc_f32_term_memory)
+#define gtc_f32_term_play GTC_LINKED(gtc_f32_term_play)
+#define gtc_f32_term_warm_up GTC_LINKED(gtc_f32_term_warm_up)
+#define gtc_f32_term_harmonic GTC_LINKED(gtc_f32_term_harmonic)
+#define gtc_f32_term_auxiliary GTC_LINKED(gtc_f32_term_auxiliary)
+#define gtc_q31_check GTC_LINKED(gtc_q31_check)
+#define gtc_q31_open GTC_LINKED(gtc_q31_open)
+#define gtc_q31_map GTC_LINKED(gtc_q31_map)
+#define gtc_q31_init GTC_LINKED(gtc_q31_init)
+#define gtc_q31_sample GTC_LINKED(gtc_q31_sample)
+#define gtc_q31_missed GTC_LINKED(gtc_q31_missed)
+#define gtc_q31_bias GTC_LINKED(gtc_q31_bias)
+#define gtc_q31_save GTC_LINKED(gtc_q31_save)
+#define gtc_q31_restore GTC_LINKED(gtc_q31_restore)
+#define gtc_q31_term_memory GTC_LINKED(gtc_q31_term_memory)
+#define gtc_q31_term_play GTC_LINKED(gtc_q31_term_play)
+#define gtc_q31_term_warm_up GTC_LINKED(gtc_q31_term_warm_up)
+#define gtc_q31_term_harmonic GTC_LINKED(gtc_q31_term_harmonic)
+#define gtc_q31_term_auxiliary GTC_LINKED(gtc_q31_term_auxiliary)
 
 /* What a call did. 0: done. Positive: done, with remarks as bits. Negative: nothing was written.
  * A released value keeps its meaning for ever; treat an unknown negative one as a failure. */
@@ -97,7 +139,6 @@ typedef struct {
     float sum;                     /* of differences from base, C */
     float mean;                    /* last valid block mean, C */
     float bias;                    /* in force, deg/h */
-    float angle[2];                /* carried remainder, arcsec */
     uint_least32_t elapsed;        /* blocks since init */
     uint_least32_t off_blocks;     /* blocks without power before it */
     float window[GTC_MAX_SLOPE_BLOCKS];         /* block means, newest first, C */
@@ -126,7 +167,6 @@ typedef struct {
     int_least32_t mean;
     int_least32_t bias;            /* 2^-bias_frac_bits deg/h */
     int_least64_t sum;
-    int_least64_t angle;           /* carried remainder */
     uint_least32_t elapsed;
     uint_least32_t off_blocks;
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS];
@@ -135,12 +175,22 @@ typedef struct {
     uint_least32_t channel_valid[GTC_MAX_TERMS];
 } gtc_q31_state_t;
 
-/* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (26 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
+/* Sum of angle increments, owned by the caller, apart from any state. Starts as 0: `= {0}`, or static. */
+typedef struct {
+    float rest[2]; /* what rounding left, arcsec */
+} gtc_f32_angle_t;
 
-/* Boot self-test of a table: layout, arithmetic primitives (f32: rounding, ties, no contraction,
- * no flushed subnormals that the table needs), checksum over its values, every word within its range
- * (docs/FORMAT.md, section 3), its known answers.
+typedef struct {
+    int_least64_t rest; /* 10^-6 of a unit of the angle */
+} gtc_q31_angle_t;
+
+/* Words of a saved state, see gtc_<n>_save(). */
+#define GTC_SAVE_WORDS (24 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
+
+/* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
+ * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
+ * word within its range (docs/FORMAT.md, section 3), its known answers, which the generator chooses to
+ * differ where a product is fused.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: a word outside its range), GTC_E_IMAGE (checksum) or
  * GTC_E_SELF_TEST.
  * Cost: n_probes + 2 evaluations of the map and about 40 operations for each word of the table. */
@@ -193,15 +243,17 @@ GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
 GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
-/* The angle to subtract from an angle increment over dt; what rounding leaves is carried on.
- * f32: dt in s, angle in arcsec, a multiple of 2^-16 while it is below 64. q31: dt in microseconds,
- * angle in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t; in
- * f32, where angles reach 64 arcsec, within one unit or one last place of the largest. t is the sum
- * of the dt given: 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact.
- * Returns the status of the correction in force or GTC_E_ARG (NULL, dt not in 0 ... 1000 s, or an
- * angle beyond the numbers of the arithmetic); then nothing is lost, the remainder is as it was. */
-GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_state_t *state, float dt, float *angle);
-GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_state_t *state, int_least32_t dt, int_least32_t *angle);
+/* The angle to subtract from an angle increment over dt, of a bias that gtc_<n>_bias() gave; what rounding
+ * leaves is carried on. f32: dt in s, increment in arcsec, a multiple of 2^-16 while it is below 64. q31: dt
+ * in microseconds, increment in 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of
+ * bias * t; in f32, where increments reach 64 arcsec, within one unit or one last place of the largest. t is
+ * the sum of the dt given: 0.001F is not quite a millisecond (4 parts in 10^8), 2^-10 s is exact. No state is
+ * read or written: an interrupt may call it with a gtc_<n>_angle_t and a copy of the bias of its own.
+ * Returns GTC_OK or GTC_E_ARG (NULL, a bias that is none, dt not in 0 ... 1000 s, or an increment beyond the
+ * numbers of the arithmetic); then nothing is lost, the rest is as it was. */
+GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_angle_t *angle, float bias, float dt, float *increment);
+GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int_least32_t dt,
+                                 int_least32_t *increment);
 
 /* State over power cycles. `save` writes GTC_SAVE_WORDS words with version, the table's checksum
  * and a CRC. `restore` starts `state` for `table` as gtc_<n>_init() would, then takes over what

@@ -70,10 +70,11 @@ static void FN(restart)(STATE *state, NUM x)
 /* Moves the window on by one block: its mean, or a hole. */
 static void FN(push)(STATE *state, uint_least32_t is_valid)
 {
+    volatile NUM *const window = state->window; /* no memmove() */
     uint_least32_t i;
 
     for (i = state->table->slope_blocks - 1U; i > 0U; i--) {
-        state->window[i] = state->window[i - 1U];
+        window[i] = window[i - 1U];
     }
     state->window[0] = state->mean;
     state->window_valid = ((state->window_valid << 1) | is_valid) & 0xFFFFFFFFUL;
@@ -251,32 +252,78 @@ static int FN(take)(STATE *state, NUM x)
     return GTC_OK;
 }
 
-int FN(init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+/* GTC_OK, or why a state cannot be started. */
+static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t samples_per_block)
 {
-    const STATE zero = {0};
-    uint_least32_t i;
-
     if ((state == NULL) || (table == NULL) || (samples_per_block < 1U)
         || (samples_per_block > MAX_SAMPLES_PER_BLOCK)) {
         return GTC_E_ARG;
     }
-    if (!FN(is_usable)(table)) {
-        return GTC_E_LAYOUT;
-    }
-    *state = zero;
-    state->table = table;
-    state->samples_per_block = samples_per_block;
-    state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
-    state->received = NUM_MISSING_BITS;
-    state->status = GTC_HELD;
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        state->term[i][0] = FN(missing)();
-        state->term[i][1] = FN(missing)();
-    }
-    return GTC_OK;
+    return FN(is_usable)(table) ? GTC_OK : GTC_E_LAYOUT;
 }
 
-int FN(sample)(STATE *state, const NUM *channels)
+/* A term that was never begun. */
+static void FN(forget)(volatile STATE *state, uint_least32_t i)
+{
+    state->term[i][0] = FN(missing)();
+    state->term[i][1] = FN(missing)();
+    state->channel[i] = NUM_ZERO;
+    state->channel_valid[i] = 0U;
+}
+
+/* A front end that has not seen a sample yet. */
+static void FN(clear)(volatile STATE *state, uint_least32_t samples_per_block)
+{
+    uint_least32_t i;
+
+    state->samples_per_block = samples_per_block;
+    state->position = 0U;
+    state->valid = 0U;
+    state->gap = 0U;
+    state->suspects = 0U;
+    state->received = NUM_MISSING_BITS;
+    state->repeats = 0U;
+    state->held_blocks = 0U;
+    state->filled = 0U;
+    state->window_valid = 0U;
+    state->status = GTC_HELD;
+    state->last = NUM_ZERO;
+    state->candidate = NUM_ZERO;
+    state->base = NUM_ZERO;
+    state->sum = NUM_ZERO;
+    state->mean = NUM_ZERO;
+    state->bias = NUM_ZERO;
+    state->elapsed = 0U;
+    state->off_blocks = 0U;
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
+        state->window[i] = NUM_ZERO;
+    }
+}
+
+/* All of a state that can be started. */
+static void FN(start)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+{
+    uint_least32_t i;
+
+    state->table = table;
+    state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
+    FN(clear)(state, samples_per_block);
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        FN(forget)(state, i);
+    }
+}
+
+static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+{
+    const int status = FN(can_start)(state, table, samples_per_block);
+
+    if (status == GTC_OK) {
+        FN(start)(state, table, samples_per_block);
+    }
+    return status;
+}
+
+static int FN(run_sample)(STATE *state, const NUM *channels)
 {
     uint_least32_t i;
     int remark;
@@ -297,7 +344,7 @@ int FN(sample)(STATE *state, const NUM *channels)
     return (int)state->status | remark;
 }
 
-int FN(missed)(STATE *state, uint_least32_t count)
+static int FN(run_missed)(STATE *state, uint_least32_t count)
 {
     uint_least32_t rest = count;
     uint_least32_t blocks;
@@ -332,7 +379,7 @@ int FN(missed)(STATE *state, uint_least32_t count)
     return (int)state->status | GTC_HELD;
 }
 
-int FN(bias)(const STATE *state, NUM *bias)
+static int FN(run_bias)(const STATE *state, NUM *bias)
 {
     if ((state == NULL) || (bias == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;

@@ -247,10 +247,11 @@ float FN(blend)(const TABLE *table, const POINT *in);
 
 static inline void FN(edges)(const TABLE *table, float edges[4])
 {
+    const volatile gtc_word_t *const envelope = table->envelope; /* no memcpy() */
     uint_least32_t i;
 
     for (i = 0U; i < 4U; i++) {
-        edges[i] = table->envelope[i].value;
+        edges[i] = envelope[i].value;
     }
 }
 
@@ -271,22 +272,21 @@ static inline float FN(fraction)(float from, float x, float to)
     return (way > 0.0F) ? way : 0.0F;
 }
 
-static inline BLEND FN(mixed)(BLEND blend, float share, float bias)
+static inline void FN(mix)(BLEND *blend, float share, float bias)
 {
     float product;
 
     product = share * bias;
-    blend.total = blend.total + product;
-    blend.share = blend.share + share;
-    return blend;
+    blend->total = blend->total + product;
+    blend->share = blend->share + share;
 }
 
-static inline float FN(unmixed)(BLEND blend, float otherwise)
+static inline float FN(unmixed)(const BLEND *blend, float otherwise)
 {
     float bias = otherwise;
 
-    if (blend.share > 0.0F) {
-        bias = blend.total / blend.share;
+    if (blend->share > 0.0F) {
+        bias = blend->total / blend->share;
     }
     return bias;
 }

@@ -141,6 +141,15 @@ typedef struct {
     uint_least32_t high;
 } FN(sum_t);
 
+static inline FN(sum_t) FN(no_sum)(void)
+{
+    FN(sum_t) sum;
+
+    sum.low = 0U;
+    sum.high = 0U;
+    return sum;
+}
+
 GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
     const uint_least32_t w0 = FN(bits)(w) & 0xFFFFU;
@@ -164,6 +173,11 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 }
 #else
 typedef int_least64_t FN(sum_t);
+
+static inline FN(sum_t) FN(no_sum)(void)
+{
+    return 0;
+}
 
 GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
 {
@@ -282,7 +296,7 @@ static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *ne
     const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
     /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
     const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
-    FN(sum_t) sum = {0};
+    FN(sum_t) sum = FN(no_sum)();
     gtc_word_t bias;
 
     sum = FN(accumulate)(sum, network[2].integer, (int_least32_t)(in->x_temp << 13));
@@ -368,16 +382,15 @@ static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, in
     return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
 }
 
-static inline BLEND FN(mixed)(BLEND blend, int_least32_t share, int_least32_t bias)
+static inline void FN(mix)(BLEND *blend, int_least32_t share, int_least32_t bias)
 {
-    blend.total += (int_least64_t)share * bias;
-    blend.share += (uint_least32_t)share;
-    return blend;
+    blend->total += (int_least64_t)share * bias;
+    blend->share += (uint_least32_t)share;
 }
 
-static inline int_least32_t FN(unmixed)(BLEND blend, int_least32_t otherwise)
+static inline int_least32_t FN(unmixed)(const BLEND *blend, int_least32_t otherwise)
 {
-    return (blend.share != 0U) ? (int_least32_t)FN(divided)(blend.total, blend.share) : otherwise;
+    return (blend->share != 0U) ? (int_least32_t)FN(divided)(blend->total, blend->share) : otherwise;
 }
 #endif
 

@@ -1,7 +1,10 @@
 /* gtc_private.h - what the parts of the runtime share and no user sees.
  *
- * The functions are external only because they live in files of their own; they are not part of
- * the interface and may change at any time.
+ * Nothing here is part of the interface; it may change at any time.
+ *
+ * No C library is needed, not even the functions that a compiler calls of its own accord: structs are neither
+ * copied nor cleared as a whole, and loops that a compiler would make into memset(), memcpy() or memmove() go
+ * through pointers to volatile, which forbid it.
  *
  * MISRA 15.5 throughout: wrong arguments, and cases that end early, leave a function at once; what
  * follows need not be indented for them.
@@ -19,7 +22,7 @@
 #error "these sources read table layout 1: include/ and libc/ are of different versions"
 #endif
 
-/* For what stands in the loop over the centers. Where a product is one instruction, a call costs more
+/* For what stands in the loop over the centers, and the map itself. Where a product is one instruction, a call costs more
  * than it, in time and in code; but a compiler for size makes calls of whatever has two callers. */
 #if defined(__GNUC__) && defined(__OPTIMIZE__) && !GTC_HALF_MULTIPLY
 #define GTC_IN_LOOP static inline __attribute__((always_inline))
@@ -84,17 +87,5 @@ extern const struct gtc_q31_term_code gtc_q31_term_play;
 extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
 extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
 extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
-
-/* For hooks that a kind of term does not need. */
-void gtc_f32_nothing(gtc_f32_state_t *state, uint_least32_t i, float x);
-void gtc_q31_nothing(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
-
-/* 1 if the table is of this layout and its counts say where its arrays end, else 0. */
-int gtc_f32_is_readable(const gtc_f32_table_t *table);
-int gtc_q31_is_readable(const gtc_q31_table_t *table);
-
-/* 1 if this build of the runtime can use the table: no function meets a run-time error with it; else 0. */
-int gtc_f32_is_usable(const gtc_f32_table_t *table);
-int gtc_q31_is_usable(const gtc_q31_table_t *table);
 
 #endif /* GTC_PRIVATE_H_INCLUDED */

@@ -7,7 +7,7 @@
  */
 
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545331UL
+#define SAVE_MAGIC 0x47545332UL
 
 /* What another build may have otherwise. */
 #define SAVE_OPTIONS \
@@ -16,10 +16,10 @@
 #define SAVE_HEAD 3U
 #define CRC_AT (GTC_SAVE_WORDS - 1)
 
-/* Where the next word goes to, or, if that is NULL, comes from. */
+/* Where the next word goes to, or, if that is NULL, comes from. Volatile: no memcpy(). */
 typedef struct {
-    gtc_word_t *to;
-    const gtc_word_t *from;
+    volatile gtc_word_t *to;
+    const volatile gtc_word_t *from;
 } FN(cursor_t);
 
 static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
@@ -39,7 +39,9 @@ static void FN(carry)(FN(cursor_t) *at, NUM *x)
 
     ELEMENT(word) = *x;
     FN(carry_bits)(at, &word.bits);
-    *x = ELEMENT(word);
+    if (at->to == NULL) {
+        *x = ELEMENT(word);
+    }
 }
 
 static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
@@ -49,7 +51,9 @@ static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
     FN(to_words)(*x, words);
     FN(carry_bits)(at, &words[0].bits);
     FN(carry_bits)(at, &words[1].bits);
-    *x = FN(from_words)(words);
+    if (at->to == NULL) {
+        *x = FN(from_words)(words);
+    }
 }
 
 /* The front end: everything that the running block and the next correction depend on. */
@@ -60,7 +64,9 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
 
     status.integer = state->status;
     FN(carry_bits)(at, &status.bits);
-    state->status = status.integer;
+    if (at->to == NULL) {
+        state->status = status.integer;
+    }
     FN(carry_bits)(at, &state->samples_per_block);
     FN(carry_bits)(at, &state->position);
     FN(carry_bits)(at, &state->valid);
@@ -97,20 +103,15 @@ static void FN(carry_terms)(FN(cursor_t) *at, STATE *state)
     }
 }
 
-/* All of a state but what init() makes of table and samples_per_block. */
+/* All of a state but what init() makes of table and samples_per_block; with `to`, nothing of it is written. */
 static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
 {
     FN(cursor_t) at;
-    gtc_word_t angle[2];
 
     at.to = to;
     at.from = from;
     FN(carry_front)(&at, state);
     FN(carry_terms)(&at, state);
-    FN(angle_to_words)(state, angle);
-    FN(carry_bits)(&at, &angle[0].bits);
-    FN(carry_bits)(&at, &angle[1].bits);
-    FN(angle_from_words)(state, angle);
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
@@ -118,18 +119,16 @@ static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
     return gtc_crc_words(GTC_CRC_START, words, CRC_AT) ^ GTC_CRC_FINAL;
 }
 
-int FN(save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
+static int FN(run_save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
 {
-    STATE copy;
-
     if ((state == NULL) || (words == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
     }
-    copy = *state;
     words[0].bits = SAVE_MAGIC;
     words[1].bits = SAVE_OPTIONS;
     words[2].bits = state->table->crc;
-    FN(carry_state)(&copy, &words[SAVE_HEAD], words);
+    /* MISRA 11.8: one text carries both ways; this way the state is only read. */
+    FN(carry_state)((STATE *)state, &words[SAVE_HEAD], words);
     words[CRC_AT].bits = FN(save_crc)(words);
     return GTC_OK;
 }
@@ -152,43 +151,38 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
     return status;
 }
 
-/* A state that has just been started takes over the terms that outlast a time without power. If
- * the saved one had not begun either, it had itself been without power before. */
-static void FN(outlast)(STATE *state, const STATE *saved, uint_least32_t off_blocks)
+/* Of a state that was read, what outlasts a time without power: terms. If it had not begun when it was saved,
+ * it had itself been without power before. */
+static void FN(outlast)(STATE *state, uint_least32_t samples_per_block, uint_least32_t off_blocks)
 {
-    const uint_least32_t before = (saved->gap == 0U) ? saved->off_blocks : 0U;
+    const uint_least32_t before = (state->gap == 0U) ? state->off_blocks : 0U;
     const uint_least32_t room = 0xFFFFFFFFUL - before;
     uint_least32_t i;
 
+    FN(clear)(state, samples_per_block);
     state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
-    for (i = 0U; i < state->table->n_terms; i++) {
-        if (state->table->term_code[i]->survives != 0U) {
-            state->term[i][0] = saved->term[i][0];
-            state->term[i][1] = saved->term[i][1];
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        state->channel[i] = NUM_ZERO;
+        state->channel_valid[i] = 0U;
+        if ((i >= state->table->n_terms) || (state->table->term_code[i]->survives == 0U)) {
+            FN(forget)(state, i);
         }
     }
 }
 
-int FN(restore)(STATE *state, const TABLE *table, uint_least32_t samples_per_block,
-                const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
+static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t samples_per_block,
+                           const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
 {
-    STATE saved;
-    int status;
+    int status = (words == NULL) ? GTC_E_ARG : FN(can_start)(state, table, samples_per_block);
 
-    if ((state == NULL) || (words == NULL)) {
-        return GTC_E_ARG;
-    }
-    status = FN(init)(&saved, table, samples_per_block);
     if (status == GTC_OK) {
         status = FN(inspect)(table, words);
     }
     if (status == GTC_OK) {
-        FN(carry_state)(&saved, NULL, &words[SAVE_HEAD]);
-        if ((off_blocks == 0U) && (saved.samples_per_block == samples_per_block)) {
-            *state = saved;
-        } else {
-            status = FN(init)(state, table, samples_per_block);
-            FN(outlast)(state, &saved, off_blocks);
+        FN(start)(state, table, samples_per_block);
+        FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
+        if ((off_blocks != 0U) || (state->samples_per_block != samples_per_block)) {
+            FN(outlast)(state, samples_per_block, off_blocks);
         }
     }
     return status;

@@ -1,17 +1,19 @@
 /* gtc_selftest_f32.h - directed vectors for the float32 operations that the runtime uses.
  *
  * Each vector fails on something that was met in the field: contraction to fused multiply-add,
- * excess precision kept in registers, a software float library that rounds ties the wrong way,
- * truncating arithmetic. The operands are read as volatile, so that the target computes, not the
- * compiler.
- * Subnormal numbers are not tested: no emitted table makes one.
+ * excess precision kept in registers, sums taken in another order, subnormal numbers flushed to 0, a
+ * software float library that rounds ties the wrong way, truncating arithmetic. The operands are read as
+ * volatile, so that the target computes, not the compiler. A compiler fuses a product only where nothing
+ * else uses it; hence each sum of products has products of its own, read anew.
  *
  * SPDX-License-Identifier: MIT
  */
 #ifndef GTC_SELFTEST_F32_H_INCLUDED
 #define GTC_SELFTEST_F32_H_INCLUDED
 
-#define N_ARITHMETIC 10U
+#define N_ARITHMETIC 12U
+#define N_JOINED 3U /* rows of operands ... */
+#define N_SHAPES 8U /* ... for so many sums of products, as the runtime has them */
 
 /* a, b, c and then a + b, a - b, a * b, a / b, a * b + c, c - a * b */
 static const uint_least32_t FN(vectors)[N_ARITHMETIC][9] = {
@@ -45,6 +47,26 @@ static const uint_least32_t FN(vectors)[N_ARITHMETIC][9] = {
     /* numbers of very different size */
     {0x43480000UL, 0xB727C5ACUL, 0x41000000UL, 0x4347FFFFUL, 0x43480001UL,
      0xBB03126EUL, 0xCB989680UL, 0x40FFEF9EUL, 0x41000831UL},
+    /* subnormal results of normal numbers */
+    {0x00800000UL, 0x3F000000UL, 0x80800001UL, 0x3F000000UL, 0xBF000000UL,
+     0x00400000UL, 0x01000000UL, 0x80400001UL, 0x80C00001UL},
+    /* subnormal numbers as operands */
+    {0x00000003UL, 0x4B800000UL, 0x00000005UL, 0x4B800000UL, 0xCB800000UL,
+     0x01C00000UL, 0x00000000UL, 0x01C00001UL, 0x81BFFFFFUL},
+};
+
+/* a, b, c, d and then what join() makes of them. In two of the rows at least, each is another number where any
+ * product is not rounded before it is added, or sums are taken in another order. */
+static const uint_least32_t FN(joined)[N_JOINED][4U + N_SHAPES] = {
+    {0x3FA389A8UL, 0xBFE3689FUL, 0xBFCA780BUL, 0xBFEACCBAUL,
+     0xC07681EAUL, 0xBF30277EUL, 0x3F30277EUL, 0x3F21B700UL,
+     0x40993DA6UL, 0xBDBDFCADUL, 0xC01145E4UL, 0x3E8E26A0UL},
+    {0xBFD3E5C8UL, 0xBFBF10C6UL, 0x3FD4A0A6UL, 0x3F910F0EUL,
+     0x40843B52UL, 0x3F4F57FCUL, 0xBF4F57FCUL, 0x408B50E8UL,
+     0x409EFF50UL, 0x409FA008UL, 0x401E2650UL, 0x3EB068E0UL},
+    {0x40A2F24DUL, 0xBF1E1214UL, 0x4029A57CUL, 0x3F86B1E7UL,
+     0xBEFCA4F8UL, 0xC0B96FCCUL, 0x40B96FCCUL, 0xBEB5A8A0UL,
+     0x41D27BF1UL, 0x41F09943UL, 0xC0493A1CUL, 0x3DBC9340UL},
 };
 
 /* The number with these bits, read where the compiler cannot foresee it. */
@@ -84,6 +106,51 @@ static inline int FN(row_works)(uint_least32_t row)
            & FN(is_expected)(added, row, 7U) & FN(is_expected)(taken, row, 8U);
 }
 
+/* The results that the runtime's sums of products have, in the shapes in which it has them. */
+static inline void FN(join)(const volatile uint_least32_t *row, float results[N_SHAPES])
+{
+    float a;
+    float b;
+
+    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b + c */
+    results[0] = a + FN(load)(&row[2]);
+    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b - c */
+    results[1] = a - FN(load)(&row[2]);
+    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* c - a b */
+    results[2] = FN(load)(&row[2]) - a;
+    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b + c d */
+    b = FN(load)(&row[2]) * FN(load)(&row[3]);
+    results[3] = a + b;
+    a = FN(load)(&row[0]); /* a^2 + b^2 */
+    b = FN(load)(&row[1]);
+    a = a * a;
+    b = b * b;
+    results[4] = a + b;
+    a = FN(load)(&row[0]); /* (a^2 + c) d */
+    a = a * a;
+    a = a + FN(load)(&row[2]);
+    results[5] = FN(load)(&row[3]) * a;
+    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* (a b + 8) - 8 */
+    a = a + 8.0F;
+    results[6] = a - 8.0F;
+    a = FN(load)(&row[0]) + F32_ROUND; /* a - ((a + 1.5 2^23) - 1.5 2^23) */
+    a = a - F32_ROUND;
+    results[7] = FN(load)(&row[0]) - a;
+}
+
+static inline int FN(joined_works)(uint_least32_t row)
+{
+    float results[N_SHAPES];
+    uint_least32_t i;
+    int works = 1;
+
+    FN(join)(FN(joined)[row], results);
+    for (i = 0U; i < N_SHAPES; i++) {
+        works &= (FN(bits)(results[i]) == FN(joined)[row][4U + i]) ? 1 : 0;
+    }
+    return works;
+}
+
 /* Conversions: to float rounds to nearest even, to integer cuts off. */
 static inline int FN(conversions_work)(void)
 {
@@ -113,6 +180,9 @@ static int FN(primitives_work)(void)
 
     for (row = 0U; row < N_ARITHMETIC; row++) {
         works &= FN(row_works)(row);
+    }
+    for (row = 0U; row < N_JOINED; row++) {
+        works &= FN(joined_works)(row);
     }
     return works;
 }

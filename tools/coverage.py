@@ -69,7 +69,7 @@ def build_and_run(folder: Path, numeric: str, options: list[str], *, broken: boo
 def branches(folder: Path, numeric: str) -> dict[Branch, int]:
     """How often each branch of one arithmetic was taken, from the counters in a folder."""
     counts: dict[Branch, int] = defaultdict(int)
-    data = [str(p) for p in folder.glob("gtc_*.gcda") if p.name.startswith(("gtc_crc", f"gtc_{numeric}_"))]
+    data = [str(p) for p in folder.glob("gtc_*.gcda") if p.name.startswith(("gtc_crc", f"gtc_{numeric}"))]
     subprocess.run(["gcov", "--json-format", "--branch-probabilities", *data], check=True, cwd=folder,
                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
     for report in folder.glob("*.gcov.json.gz"):

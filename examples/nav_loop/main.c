@@ -109,7 +109,9 @@ int main(void)
         status = nav_temperature(word);
         for (tick = 0U; (tick < NAV_TICKS) && (status >= 0); tick++) {
             const int_least32_t now = increment(counts, tick);
-            status = nav_increment(now, &angle);
+            if (nav_increment(now, &angle) < 0) {
+                return 1;
+            }
             measured += now;
         }
         if (status < 0) {

@@ -10,10 +10,11 @@
 /* At boot: proves arithmetic and table, starts the state. 0, or a negative status: do not navigate. */
 int nav_start(void);
 
-/* One reading of the thermometer, 2^-7 C, one a second. Returns the status of the correction (gtc.h). */
+/* One reading of the thermometer, 2^-7 C, one a second; a task. Returns the status of the correction (gtc.h). */
 int nav_temperature(int_least32_t word);
 
-/* One increment of the gyro, 2^-16 arcsec over 1/NAV_TICKS s: adds it, compensated, to an angle. */
+/* One increment of the gyro, 2^-16 arcsec over 1/NAV_TICKS s: adds it, compensated, to an angle.
+ * An interrupt of its own may call it at any time. Returns 0, or a negative status. */
 int nav_increment(int_least32_t counts, int_least64_t *angle);
 
 /* Fraction bits of that angle, in arcsec. */

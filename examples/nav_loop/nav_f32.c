@@ -6,7 +6,9 @@
 #define SAMPLES_PER_BLOCK 10U /* a block of 10 s, a reading each second */
 #define TICK_S 0.015625F      /* 1/64 s, exact */
 
-static gtc_f32_state_t state;
+static gtc_f32_state_t state;     /* of the task that reads the thermometer */
+static volatile float bias_dph;   /* from the task to the interrupt: one number, stored at once */
+static gtc_f32_angle_t increments; /* of the interrupt that reads the gyro */
 
 int nav_start(void)
 {
@@ -17,14 +19,18 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const float temperature = (float)word * 0.0078125F;
-    return (word == NAV_NO_READING) ? gtc_f32_missed(&state, 1U) : gtc_f32_sample(&state, &temperature);
+    const int taken = (word == NAV_NO_READING) ? gtc_f32_missed(&state, 1U) : gtc_f32_sample(&state, &temperature);
+    float bias = 0.0F;
+    const int status = gtc_f32_bias(&state, &bias);
+    bias_dph = bias;
+    return (taken < 0) ? taken : status;
 }
 
 int nav_increment(int_least32_t counts, int_least64_t *angle)
 {
-    float bias = 0.0F;
-    const int status = gtc_f32_angle(&state, TICK_S, &bias); /* a multiple of 2^-16 arcsec */
-    *angle += counts - (int_least32_t)(bias * 65536.0F);
+    float drift = 0.0F;
+    const int status = gtc_f32_angle(&increments, bias_dph, TICK_S, &drift); /* a multiple of 2^-16 arcsec */
+    *angle += counts - (int_least32_t)(drift * 65536.0F);
     return status;
 }
 

@@ -6,7 +6,9 @@
 #define SAMPLES_PER_BLOCK 10U /* a block of 10 s, a reading each second */
 #define TICK_US 15625L        /* 1/64 s */
 
-static gtc_q31_state_t state;
+static gtc_q31_state_t state;        /* of the task that reads the thermometer */
+static volatile int_least32_t bias;  /* from the task to the interrupt: one number, stored at once */
+static gtc_q31_angle_t increments;   /* of the interrupt that reads the gyro */
 
 int nav_start(void)
 {
@@ -17,14 +19,18 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const int_least32_t temperature = word * 512L; /* 2^-16 C */
-    return (word == NAV_NO_READING) ? gtc_q31_missed(&state, 1U) : gtc_q31_sample(&state, &temperature);
+    const int taken = (word == NAV_NO_READING) ? gtc_q31_missed(&state, 1U) : gtc_q31_sample(&state, &temperature);
+    int_least32_t now = 0;
+    const int status = gtc_q31_bias(&state, &now);
+    bias = now;
+    return (taken < 0) ? taken : status;
 }
 
 int nav_increment(int_least32_t counts, int_least64_t *angle)
 {
-    int_least32_t bias = 0;
-    const int status = gtc_q31_angle(&state, TICK_US, &bias);
-    *angle += ((int_least64_t)counts * ((int_least64_t)1 << (nav_angle_bits() - 16U))) - bias;
+    int_least32_t drift = 0;
+    const int status = gtc_q31_angle(&increments, bias, TICK_US, &drift);
+    *angle += ((int_least64_t)counts * ((int_least64_t)1 << (nav_angle_bits() - 16U))) - drift;
     return status;
 }
 

@@ -25,14 +25,6 @@ static void walk(state_t *state, int from, int to)
     }
 }
 
-static num_t angle_of(state_t *state)
-{
-    num_t angle = 0;
-
-    CHECK(FN(angle)(state, (num_t)C(0.0625), &angle) >= 0);
-    return angle;
-}
-
 static void saved(const state_t *state, gtc_word_t words[WORDS])
 {
     memset(words, 0x5A, WORDS * sizeof words[0]);
@@ -65,13 +57,11 @@ TEST(a_restored_state_goes_on_as_if_nothing_had_happened)
         state_t other;
 
         walk(&state, 0, cut);
-        (void)angle_of(&state);
         saved(&state, words);
         CHECK_INT(GTC_OK, restored(&other, words, 0U));
         for (i = cut; i < (cut + 60); i++) {
             CHECK_INT(status_of(&state), status_of(&other));
             CHECK(same(bias_of(&state), bias_of(&other)));
-            CHECK(same(angle_of(&state), angle_of(&other)));
             walk(&state, i, i + 1);
             walk(&other, i, i + 1);
         }
@@ -86,7 +76,6 @@ TEST(a_saved_state_is_the_same_words_again)
     state_t other;
 
     walk(&state, 0, 47);
-    (void)angle_of(&state);
     saved(&state, words);
     CHECK_INT(GTC_OK, restored(&other, words, 0U));
     saved(&other, again);
@@ -107,7 +96,6 @@ TEST(after_a_time_without_power_the_window_starts_again)
     for (i = 47; i < 100; i++) {
         CHECK_INT(status_of(&fresh), status_of(&other));
         CHECK(same(bias_of(&fresh), bias_of(&other)));
-        CHECK(same(angle_of(&fresh), angle_of(&other)));
         walk(&fresh, i, i + 1);
         walk(&other, i, i + 1);
     }

@@ -83,6 +83,7 @@ static void walk(stream_t *in, const table_t *table)
     gtc_word_t saved[GTC_SAVE_WORDS];
     state_t state;
     num_t result = 0;
+    FN(angle_t) sum;
     uint_least32_t k;
 
     CLAIM(FN(init)(&state, table, n) == GTC_OK);
@@ -98,8 +99,9 @@ static void walk(stream_t *in, const table_t *table)
         CLAIM((status >= 0) && ((status & ~REMARKS) == 0));
         CLAIM((FN(bias)(&state, &result) >= 0) && is_number(result));
     }
+    memset(&sum, 0, sizeof sum);
     result = some_number(in);
-    if (FN(angle)(&state, result, &result) >= 0) {
+    if (FN(angle)(&sum, result, some_number(in), &result) >= 0) {
         CLAIM(is_number(result));
     }
     CLAIM(FN(save)(&state, saved) == GTC_OK);

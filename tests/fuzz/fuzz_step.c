@@ -21,8 +21,9 @@ static void save_and_restore(state_t *state)
     CLAIM(memcmp(words, again, sizeof words) == 0);
 }
 
-static void step(stream_t *in, state_t *state)
+static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
 {
+    num_t bias = 0;
     num_t channels[3] = {0, 0, 0};
     num_t result = C(77);
     int status;
@@ -32,7 +33,8 @@ static void step(stream_t *in, state_t *state)
         check_status(FN(missed)(state, next_word(in)));
         break;
     case 1:
-        status = FN(angle)(state, next_number(in), &result);
+        CLAIM(FN(bias)(state, &bias) >= 0);
+        status = FN(angle)(sum, bias, next_number(in), &result);
         CLAIM((status == GTC_E_ARG) ? same(result, C(77)) : is_number(result));
         break;
     case 2:
@@ -59,7 +61,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const table_t *const table = next_table(&in);
     const uint_least32_t n = next_byte(&in);
     state_t state;
+    FN(angle_t) sum;
 
+    memset(&sum, 0, sizeof sum);
     memset(&state, 0xA5, sizeof state);
     if (n == 0U) {
         const uint_least32_t any = next_word(&in);
@@ -69,7 +73,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     CLAIM(FN(init)(&state, table, n) == GTC_OK);
     while (in.left > 0U) {
-        step(&in, &state);
+        step(&in, &state, &sum);
     }
     return 0;
 }

@@ -21,6 +21,11 @@ TERMS = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 ALL = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")
 
 
+def linked(name: str) -> str:
+    """What the linker calls a function or a kind of terms, with the default options."""
+    return f"{name}_20blocks_4terms"
+
+
 def _table_struct() -> type[ctypes.Structure]:
     """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
@@ -108,12 +113,17 @@ class Runtime:
             if width:
                 setattr(struct, f"n_{name}", words.size // width)
         for i, kind in enumerate(table.terms[:: ARRAYS["terms"]].tolist()):
-            code = ctypes.c_char.in_dll(self.library, f"gtc_{table.numeric}_term_{TERMS[kind]}")
+            name = linked(f"gtc_{table.numeric}_term_{TERMS[kind]}")
+            code = ctypes.c_char.in_dll(self.library, name)
             struct.term_code[i] = ctypes.addressof(code)
         return struct, keep
 
+    def function(self, numeric: str, name: str) -> Any:
+        """A public function of the runtime."""
+        return getattr(self.library, linked(f"gtc_{numeric}_{name}"))
+
     def _function(self, table: Table, name: str) -> Any:
-        return getattr(self.library, f"gtc_{table.numeric}_{name}")
+        return self.function(table.numeric, name)
 
     def _shim(self, table: Table, name: str, result: Any = None) -> Any:
         function = getattr(self.library, f"shim_{table.numeric}_{name}")

@@ -44,7 +44,7 @@ class Device:
         self.struct, self._keep = self.runtime.struct(self.table)
 
     def function(self, name: str) -> Any:
-        return getattr(self.runtime.library, f"gtc_{self.table.numeric}_{name}")
+        return self.runtime.function(self.table.numeric, name)
 
     @cached_property
     def state_size(self) -> int:
@@ -92,7 +92,7 @@ class Device:
         return int(status)
 
     def steps(self, state: Any, channels: Words, missed: np.ndarray) -> tuple[np.ndarray, Words]:
-        """Goes on with the state; as Runtime.steps(), and an angle with every row."""
+        """Goes on with the state; as Runtime.steps()."""
         rows = len(channels)
         status, bits = np.zeros((rows, 3), np.int32), np.zeros(rows, np.uint32)
         channels, missed = np.ascontiguousarray(channels), np.ascontiguousarray(missed, dtype=np.uint32)
@@ -106,12 +106,6 @@ class Device:
             _pointer(bits),
         )
         return status, bits
-
-    def angle(self, state: Any) -> tuple[int, int]:
-        """Status and bits of the angle over 7 ms."""
-        dt = ctypes.c_float(0.007) if self.table.numeric == "f32" else ctypes.c_int32(7000)
-        bits = ctypes.c_uint32(0)
-        return int(self.function("angle")(state, dt, ctypes.byref(bits))), bits.value
 
 
 def _pointer(words: np.ndarray) -> ctypes.c_void_p:

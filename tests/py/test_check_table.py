@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from emitted import GOLDEN, emitted, flip
-from gyrotc.emit.files import Emission, emit, emit_texts, quantise_all, vectors, write_texts
+from gyrotc.emit import vectors
+from gyrotc.emit.files import Emission, emit, emit_texts, quantise_all, write_texts
 from gyrotc.model import Model, load_model
 from gyrotc.reference.table import Table
 from models import bank_of, random_model, random_terms

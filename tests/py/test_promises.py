@@ -133,7 +133,7 @@ def test_an_expression_that_could_be_fused_is_seen(tree: Path, monkeypatch: pyte
         r"f = center\[4\]\.value \* f;\n    f = acc \+ f;",
         "f = acc + (center[4].value * f);",
     )
-    assert "gtc_f32_map.c: gtc_f32_gaussian has a product and a sum in one expression" in list(
+    assert "gtc_f32.c: gtc_f32_gaussian has a product and a sum in one expression" in list(
         objects.fused(tree)
     )
     monkeypatch.setattr(objects, "DOCUMENTED", ("-std=gnu99", "-ffp-contract=fast"))

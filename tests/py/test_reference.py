@@ -117,7 +117,7 @@ def test_self_test_finds_a_changed_weight_by_its_checksum_and_a_changed_probe_by
     table = quantise(random_model(3), "f32")
     c = runtime()
     struct, keep = c.struct(table)
-    check = c.library.gtc_f32_check
+    check = c.function("f32", "check")
     keep[1][4] ^= 1
     assert check(ctypes.byref(struct)) == -4
     keep[1][4] ^= 1

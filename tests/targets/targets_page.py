@@ -19,6 +19,10 @@ _COSTS = """Cost with the golden model ({centers} centers): instructions of a ma
 `sample`, the largest (it closes a block); bytes of code that a program with both links, of stack below the caller.
 Counted in emulators; AVR: cycles. float32 is not offered where the compiler does not keep to its arithmetic.
 """
+_FUNCTIONS = """Public functions on {target} ({arithmetic}): bytes of own code; of stack, by its graph of calls, the
+deepest one counted whatever terms a table has, without that of the compiler's own functions that are named. A program
+with the self-test, a state and its samples links {read_only} bytes of constants, the table's among them.
+"""
 _CONTROLS = """Negative controls: builds that are wrong on purpose. Each ran to its end; that many results differed.
 """
 _NAV = """`examples/nav_loop`, firmware in the emulated board against the host: lines that differ, and the angle over
@@ -43,6 +47,7 @@ def section(result: dict[str, Any]) -> str:
              "stack of sample "],
             [_target_row(t) for t in golden["targets"]],
         ),
+        *_function_tables(golden),
         _CONTROLS,
         table(
             ["control", "target", "arithmetic", "results ", "mismatches "],
@@ -59,6 +64,22 @@ def section(result: dict[str, Any]) -> str:
         ),
     ]  # fmt: skip
     return "\n".join(parts)
+
+
+def _function_tables(golden: dict[str, Any]) -> list[str]:
+    parts: list[str] = []
+    for t in golden["targets"]:
+        if t["name"] in ("cortex-m0", "cortex-m4f") and "functions" in t:
+            head = {"target": t["name"], "arithmetic": t["numeric"], "read_only": t["read_only_bytes"]}
+            rows = [
+                [f"`{name}`", cost["code_bytes"], cost["stack_bytes"], ", ".join(cost["helpers"]) or "-"]
+                for name, cost in t["functions"].items()
+            ]
+            parts += [
+                _FUNCTIONS.format(**head),
+                table(["function", "code ", "stack ", "calls, not counted"], rows),
+            ]
+    return parts
 
 
 def _model_row(m: dict[str, Any]) -> list[object]:

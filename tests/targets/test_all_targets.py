@@ -17,7 +17,7 @@ from results import Results
 _KEPT = (
     "name", "numeric", "status", "compiler", "flags", "vectors", "mismatches", "instructions", "cycles",
     "step_instructions", "step_cycles", "stack_bytes", "step_stack_bytes", "code_bytes", "table_bytes",
-    "ram_bytes", "replayed",
+    "ram_bytes", "replayed", "functions", "read_only_bytes",
 )  # fmt: skip
 
 

@@ -43,8 +43,8 @@ M7 = (
 HOST = ("gcc", "-O2", "-fno-pic")
 AVR = ("avr-gcc", "-mmcu=atmega1284p", "-O2")
 COMPILERS = {"gcc": HOST, "clang": ("clang", "-O2"), "Cortex-M0": M0, "Cortex-M4F": M4F, "AVR": AVR}
-#: Functions that a compiler may call of its own accord, in a free-standing program, too.
-HELPERS = re.compile(r"__aeabi_\w+|__gnu_thumb1_case_\w+|mem(?:cpy|move|set)")
+#: Functions of the compiler's own library; none that clears or copies memory, which is the C library's.
+HELPERS = re.compile(r"__aeabi_(?!mem)\w+|__gnu_thumb1_case_\w+|__(?:u?div|mul)[sd]i3")
 FUSING = {
     "x86-64 with FMA": ("gcc", "-O3", "-march=haswell"),
     "x86-64 with FMA, clang": ("clang", "-O3", "-march=haswell"),

@@ -1,7 +1,7 @@
 """The runtime as one header and one source, made from `include/` and `libc/`.
 
 Includes of the runtime's own files are expanded; the algorithm's text is expanded once for each
-arithmetic, and the names that an arithmetic defines for it are undefined behind it.
+arithmetic asked for, and the names that an arithmetic defines for it are undefined behind it.
 """
 
 from __future__ import annotations
@@ -11,35 +11,36 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["amalgamate"]
+__all__ = ["ARITHMETICS", "amalgamate"]
 
 _HEADERS = ("gtc_config.h", "gtc_table.h", "gtc.h")
-_ARITHMETICS = ("f32", "q31")
+ARITHMETICS = ("f32", "q31")
 _INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
 _DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
 _LICENCE = " * SPDX-License-Identifier: MIT"
 
 
 @functools.cache
-def amalgamate(include_dir: Path, libc_dir: Path, *, bank: bool = False) -> tuple[str, str]:
+def amalgamate(
+    include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS, bank: bool = False
+) -> tuple[str, str]:
     """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
 
     Args:
         include_dir, libc_dir: As `reference.runtime.runtime_folders` gives them.
+        numerics: The arithmetics that `gtc.c` holds; `gtc.h` declares all.
         bank: Banks of networks are compiled in by default (GTC_WITH_BANK 1).
     """
     header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
     if bank:
         header = header.replace("#define GTC_WITH_BANK 0", "#define GTC_WITH_BANK 1")
-    common = sorted(p for p in libc_dir.glob("gtc_*.c") if not _arithmetic(p.name))
-    parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
     seen: set[str] = set()
-    parts += ["".join(_expanded(p, libc_dir, seen)) for p in common]
-    for arithmetic in _ARITHMETICS:
-        sources = sorted(p for p in libc_dir.glob("gtc_*.c") if _arithmetic(p.name) == arithmetic)
-        group = set(seen)
-        text = "".join("".join(_expanded(p, libc_dir, group)) for p in sources)
-        parts.append(text + _undefined(text))
+    parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
+    parts.append("".join(_expanded(libc_dir / "gtc_crc.c", libc_dir, seen)))
+    for arithmetic in ARITHMETICS:
+        if arithmetic in numerics:
+            text = "".join(_expanded(libc_dir / f"gtc_{arithmetic}.c", libc_dir, set(seen)))
+            parts.append(text + _undefined(text))
     return _one_licence(header), _one_licence("\n".join(p for p in parts if p))
 
 
@@ -54,10 +55,6 @@ def _banner() -> str:
         f"{_LICENCE}\n"
         " */\n"
     )
-
-
-def _arithmetic(name: str) -> str | None:
-    return next((a for a in _ARITHMETICS if name.startswith(f"gtc_{a}_")), None)
 
 
 def _without_includes(path: Path) -> str:

@@ -21,10 +21,11 @@ from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
+from ..quantise.terms import channel_names
 from ..reference import answers
 from ..reference.runtime import runtime_folders
 from ..reference.table import LAYOUT
-from ..texts import c_environment
+from ..texts import CText, c_code, c_environment, c_literal
 from .amalgamate import amalgamate
 from .record import RECORD, Options, read_options, record_text
 from .table_text import table_text
@@ -150,6 +151,7 @@ def emit_texts(
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(emission)),
+        "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
         **_example_values(model),
     }
@@ -162,7 +164,9 @@ def emit_texts(
     texts = {
         name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
     }
-    header, source = amalgamate(*runtime_folders(), bank=len(model.networks) > 1)
+    header, source = amalgamate(
+        *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
+    )
     texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
@@ -219,7 +223,8 @@ def _valid(model: Model) -> str:
 def _sizes(emission: Emission) -> Iterator[str]:
     for numeric, table in emission.tables.items():
         yield (
-            f"{numeric + ':':<12} {table.table_bytes} bytes of table; "
+            f"{numeric + ':':<12} {table.read_only_bytes} bytes of read-only data, "
+            f"{table.table_bytes} of them parameters; "
             f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
         )
 
@@ -229,6 +234,30 @@ def _upwards(bound: float) -> str:
     with localcontext() as context:
         context.rounding = ROUND_CEILING
         return f"{float(f'{Decimal(bound):.2e}'):.2e}"
+
+
+def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
+    """What a program needs of a table before it runs: name behind GTC_<ID>_, text, comment."""
+
+    def number(name: str, text: str, comment: str) -> dict[str, str]:
+        return {"name": name, "text": c_code(text), "comment": comment}
+
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    yield number("BLOCK_US", f"{round(model.block_s * 1e6)}UL", "block length, microseconds")
+    edges = (("T_MIN_C", t0), ("T_MAX_C", t1), ("SLOPE_MIN_C_PER_MIN", r0), ("SLOPE_MAX_C_PER_MIN", r1))
+    for name, value in edges:
+        text = CText(f"({c_code(f'{value:#.7g}F')})")
+        yield {"name": name, "text": text, "comment": "envelope: beyond it GTC_CLAMPED"}
+    names = channel_names(model)
+    yield number("N_CHANNELS", f"{1 + len(names)}", "numbers of a sample")
+    channels = [("temperature_c", "C, of the gyro's own sensor"), *((n, "unit as recorded") for n in names)]
+    for k, (name, unit) in enumerate(channels):
+        yield {"name": f"CHANNEL_{k}", "text": CText(f'"{c_literal(name)}"'), "comment": unit}
+    for numeric, table in emission.tables.items():
+        if numeric == "q31":
+            yield number("Q31_BIAS_FRAC_BITS", f"{table.bias_frac_bits}", "bias in 2^-this deg/h")
+        size = f"{table.read_only_bytes}UL"
+        yield number(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
 
 
 def _example_values(model: Model) -> dict[str, Any]:

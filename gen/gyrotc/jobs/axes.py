@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from ..emit import emitted_tables
+from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..inputs.stored import read_result
 from ..model import Model, load_model
 from ..outputs import write_atomically
 from ..pages.report import page_environment
+from ..reference.runtime import runtime_folders
 from ..texts import c_environment
 from ..verify import file_entries
 from ..verify.signature import check_signature, load_public_key
@@ -66,10 +68,13 @@ def joint_texts(
         sources: Files of each axis's own `c/` by name.
         numeric: The arithmetic that `main.c` uses.
     """
-    runtime = next(
-        (a for a, m in models.items() if len(m.networks) > 1), next(iter(models))
-    )  # with banks for all
-    texts = {name: sources[runtime][name] for name in ("gtc.h", "gtc.c") if name in sources[runtime]}
+    headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
+    runtime = amalgamate(  # with the arithmetics of all axes, and with banks if one has them
+        *runtime_folders(),
+        numerics=tuple(n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers),
+        bank=any(len(m.networks) > 1 for m in models.values()),
+    )
+    texts = {n: t.encode("ascii") for n, t in zip(("gtc.h", "gtc.c"), runtime, strict=True)}
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}

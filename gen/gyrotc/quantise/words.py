@@ -1,7 +1,7 @@
 """Whether the runtime takes a table: every word in its range, and what relates several words.
 
 The ranges are read from the runtime's own text, libc/gtc_limits.inl, so that the generator cannot emit what
-`gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_usable*;
+`gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_table.inl;
 tests/py/test_words.py holds both sides against each other.
 """
 

@@ -6,7 +6,8 @@ map, `replay` a whole history through the front end, `answers` the known answers
 
 from __future__ import annotations
 
+from .f32 import FUSIBLE
 from .history import Replay, answers, replay
 from .maps import evaluate_map
 
-__all__ = ["Replay", "answers", "evaluate_map", "replay"]
+__all__ = ["FUSIBLE", "Replay", "answers", "evaluate_map", "replay"]

@@ -15,12 +15,15 @@ __all__ = ["CLAMPED", "E_ARG", "UNCOVERED", "evaluate_map"]
 CLAMPED, UNCOVERED, E_ARG = 2, 4, -1  # as in gtc.h
 
 
-def evaluate_map(table: Table, inputs: Words) -> tuple[NDArray[np.int32], Words]:
+def evaluate_map(
+    table: Table, inputs: Words, fused: f32.Fused = frozenset()
+) -> tuple[NDArray[np.int32], Words]:
     """`gtc_<n>_map` for many inputs.
 
     Args:
         table: The table.
         inputs: Bits of (temperature, slope per block), shape (n, 2).
+        fused: Sums of the float32 map (of `FUSIBLE`) that a wrong build fuses; none in a right answer.
 
     Returns:
         Statuses, shape (n,), and the bits of the biases (0 where the status is negative).
@@ -31,10 +34,13 @@ def evaluate_map(table: Table, inputs: Words) -> tuple[NDArray[np.int32], Words]
     low, high = table.numbers(table.envelope).reshape(2, 2).T
     status = np.where(np.any((x < low) | (x > high), axis=1), CLAMPED, 0)
     x = np.minimum(np.maximum(x, low), high)
-    kernel = f32 if table.numeric == "f32" else q31
-    points = kernel.normalise(table, x)
-    status = status | np.where(_is_covered(table, kernel.cells(table, points)), 0, UNCOVERED)
-    bias = kernel.biases(table, points)
+    if table.numeric == "f32":
+        points = f32.normalise(table, x, fused)
+        cells, bias = f32.cells(table, points), f32.biases(table, points, fused)
+    else:
+        positions = q31.normalise(table, x)
+        cells, bias = q31.cells(table, positions), q31.biases(table, positions)
+    status = status | np.where(_is_covered(table, cells), 0, UNCOVERED)
     status = np.where(usable, status, E_ARG).astype(np.int32)
     return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
 

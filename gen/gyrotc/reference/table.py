@@ -124,6 +124,13 @@ class Table:
         terms = self.terms.size // ARRAYS["terms"]
         return 4 * (3 * networks + 3 + self.centers.size + 6 * terms)
 
+    @property
+    def read_only_bytes(self) -> int:
+        """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
+        pointers = len(ARRAYS) + 4 + 1  # arrays, code of terms, serial
+        arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
+        return 4 * (len(self.header) - 1 + pointers + 1 + arrays) + len(self.serial) + 1
+
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""
         x = np.asarray(values, dtype=np.float64)

@@ -6,7 +6,7 @@
   averaging;
 - `search`: over which values diagnosis looks for it, and at what price;
 - `table`: how it stands in a table, if one can hold it (the recursions are in `recursion`, the C in
-  libc/gtc_term_<kind>.inl);
+  libc/gtc_terms.inl);
 - `words`: what reports say of it.
 """
 

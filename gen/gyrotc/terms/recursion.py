@@ -1,7 +1,7 @@
 """What a term does on the target: the one text of each recursion, for every arithmetic.
 
 `diagnose` runs it in float64 on training and exam runs, `reference` in float32 and in fixed point against the
-compiled code. libc/gtc_term_*.inl is the same in C; docs/numerics.md, section 8, says it in words.
+compiled code. libc/gtc_terms.inl is the same in C; docs/numerics.md, section 8, says it in words.
 
 A term sees the corrections of a history (`Course`) and changes what the map gets or adds to it (`Outcome`).
 Only what depends on the order is done one correction after the other.

@@ -15,12 +15,14 @@ from ..errors import CheckFailed
 from ..model import Model
 from ..reference.table import Table
 from .boardlog import BoardOutput, compare, read_output
+from .functions import function_costs
 from .source import board_files, checked_sources
 from .toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
 
 __all__ = ["Job", "board_entries", "check_identity"]
 
 _CODE = "tT"
+_CONSTANT = "rR"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +50,13 @@ def board_entries(job: Job, target: Target) -> list[dict[str, Any]]:
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[dict[str, Any]]:
     """Compiles runtime and table once, and a test program for each arithmetic."""
     shared: list[Path] | CheckFailed
+    functions: dict[str, dict[str, dict[str, Any]]] = {}
     files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
     try:
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
         sources = [c / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
         shared = compile_objects(target, sources, work, include=c)
+        functions = function_costs(target, c, work)
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
@@ -68,6 +72,8 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             if isinstance(shared, CheckFailed):
                 raise shared
             entry |= _one(job, target, numeric, shared, work, c)
+            if numeric in functions:
+                entry["functions"] = functions[numeric]
         except CheckFailed as error:
             entry["error"] = str(error)
         yield entry
@@ -136,10 +142,11 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
 
 
 def _sizes(target: Target, program: Path, objects: list[Path]) -> dict[str, int]:
-    """Code of the runtime that the program links, and writable static data of runtime and table."""
-    code = {symbol.name for symbol in symbols(target, *objects) if symbol.kind in _CODE}
-    linked = [symbol for symbol in symbols(target, program) if symbol.name in code]
+    """Code and constants of runtime and table that the program links, and their writable static data."""
+    own = {symbol.name for symbol in symbols(target, *objects)}
+    linked = {symbol.name: symbol for symbol in symbols(target, program) if symbol.name in own}.values()
     return {
-        "code_bytes": sum(symbol.size for symbol in linked),
+        "code_bytes": sum(symbol.size for symbol in linked if symbol.kind in _CODE),
+        "read_only_bytes": sum(symbol.size for symbol in linked if symbol.kind in _CONSTANT),
         "ram_bytes": writable_bytes(target, *objects),
     }

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..emit import board_test_text
-from ..emit.amalgamate import amalgamate
+from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..errors import CheckFailed
 from ..model import SERIAL, Model
 from ..reference.runtime import runtime_folders
@@ -53,6 +53,9 @@ _TABLE_H = (
     r'extern "C" \{{',
     r"\}}",
     "#define GTC_{SYMBOL}_ID <hex><note>",
+    r'#define GTC_{SYMBOL}_[A-Z0-9_]{{1,32}} (?:<cells>|\((?:<cells>)\)|"<name>")<note>',
+    r"#define GTC_{SYMBOL}_SAMPLES_PER_BLOCK\(period_us\) "
+    r"\(\(GTC_{SYMBOL}_BLOCK_US \+ \(\(period_us\) / 2UL\)\) / \(period_us\)\)<note>",
     r"extern const gtc_<n>_table_t gtc_{symbol}_\1;",
 )
 _VECTORS_H = (
@@ -120,8 +123,11 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
 
 
 def _runtime(data: bytes, part: int) -> str | None:
-    ours = (amalgamate(*runtime_folders(), bank=bank)[part].encode("ascii") for bank in (False, True))
-    return None if data in ours else "is not the runtime of this gyrotc"
+    held = (ARITHMETICS, *((n,) for n in ARITHMETICS))
+    ours = (
+        amalgamate(*runtime_folders(), numerics=n, bank=bank)[part] for n in held for bank in (False, True)
+    )
+    return None if data in (text.encode("ascii") for text in ours) else "is not the runtime of this gyrotc"
 
 
 def _grammar(lines: Sequence[str], model: Model) -> Check:
@@ -129,7 +135,7 @@ def _grammar(lines: Sequence[str], model: Model) -> Check:
     names = {"id": model.id, "symbol": model.symbol, "SYMBOL": model.symbol.upper()}
     parts = {
         "<n>": _N, "<note>": _NOTE, "<text>": _TEXT, "<cells>": _CELLS, "<hex>": _HEX, "<integer>": _INTEGER,
-        "<serial>": SERIAL.strip("^$"),
+        "<serial>": SERIAL.strip("^$"), "<name>": '[^\\x00-\\x1f"?%\\\\\\x7f-\\xff]{1,67}',
     }  # fmt: skip
     filled = (form.format(**names) for form in lines)
     marks = re.compile("|".join(parts))

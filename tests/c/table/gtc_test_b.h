@@ -4,9 +4,10 @@
  * Axis:        the only one
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
- * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target
- * f32:         168 bytes of table; |error| <= 1.72e-05 deg/h against the model (terms excluded)
- * q31:         168 bytes of table; |error| <= 1.33e-03 deg/h against the model (terms excluded)
+ * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target:
+ *              GTC_TEST_B_SAMPLES_PER_BLOCK(10000UL) with a sample each 10 ms
+ * f32:         519 bytes of read-only data, 168 of them parameters; |error| <= 1.72e-05 deg/h against the model (terms excluded)
+ * q31:         519 bytes of read-only data, 168 of them parameters; |error| <= 1.33e-03 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 0374aec108631ddcb9a02445533048310f123884a4bd4516573b7ad2a976a4e3
@@ -23,6 +24,17 @@ extern "C" {
 #endif
 
 #define GTC_TEST_B_ID 0xc44e9858UL /* for gtc_<n>_open() */
+#define GTC_TEST_B_BLOCK_US 10000000UL /* block length, microseconds */
+#define GTC_TEST_B_T_MIN_C (-20.00000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_B_T_MAX_C (60.00000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_B_SLOPE_MIN_C_PER_MIN (-3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_B_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_B_N_CHANNELS 1 /* numbers of a sample */
+#define GTC_TEST_B_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
+#define GTC_TEST_B_F32_TABLE_BYTES 519UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_B_Q31_BIAS_FRAC_BITS 27 /* bias in 2^-this deg/h */
+#define GTC_TEST_B_Q31_TABLE_BYTES 519UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_B_SAMPLES_PER_BLOCK(period_us) ((GTC_TEST_B_BLOCK_US + ((period_us) / 2UL)) / (period_us)) /* of gtc_<n>_init(), for a sample period in microseconds */
 
 extern const gtc_f32_table_t gtc_test_b_f32;
 extern const gtc_q31_table_t gtc_test_b_q31;

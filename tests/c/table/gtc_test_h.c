@@ -37,12 +37,12 @@ static const gtc_word_t f32_terms[16] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
-    V(40.390213F), V(0.0698402897F), V(-0.262384832F), B(0x0UL),
-    V(20.780426F), V(-0.360319406F), V(-0.933764219F), B(0x0UL),
-    V(1.17063987F), V(0.209520876F), V(-0.890570879F), B(0x0UL),
-    V(-18.439146F), V(-0.220638841F), V(-0.341297567F), B(0x0UL),
-    V(41.9510651F), V(0.349201441F), V(-0.316718817F), B(0x0UL),
-    V(22.34128F), V(-0.0809582546F), V(-1.04341567F), B(0x0UL),
+    V(-10.8331242F), V(0.29987666F), V(-0.440116227F), B(0x0UL),
+    V(47.31493F), V(0.38882038F), V(-0.0702364147F), B(0x0UL),
+    V(49.3588448F), V(-0.00657336134F), V(0.215360343F), B(0x0UL),
+    V(-2.83061481F), V(-0.427027196F), V(-0.452584088F), B(0x0UL),
+    V(46.633625F), V(0.187284946F), V(-0.000537395477F), B(0x0UL),
+    V(41.0715179F), V(0.271375716F), V(-0.32556963F), B(0x0UL),
     V(-40.0F), V(-0.75F), V(-0.202720672F), B(0x2UL),
     V(80.0F), V(0.75F), V(0.297279328F), B(0x2UL),
 };
@@ -78,7 +78,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x20f64908UL,
+    .crc = 0x90ea6734UL,
     .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
     .serial = "TEST-H",
 };

@@ -4,9 +4,10 @@
  * Axis:        the only one
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
- * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target
- * f32:         112 bytes of table; |error| <= 3.86e-05 deg/h against the model (terms excluded)
- * q31:         112 bytes of table; |error| <= 6.70e-04 deg/h against the model (terms excluded)
+ * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target:
+ *              GTC_TEST_H_SAMPLES_PER_BLOCK(10000UL) with a sample each 10 ms
+ * f32:         427 bytes of read-only data, 112 of them parameters; |error| <= 3.86e-05 deg/h against the model (terms excluded)
+ * q31:         427 bytes of read-only data, 112 of them parameters; |error| <= 6.70e-04 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 adf08e9dfa037bbd373289000f492c464a10333a630974ff949247a647933cf2
@@ -23,6 +24,17 @@ extern "C" {
 #endif
 
 #define GTC_TEST_H_ID 0x249b7146UL /* for gtc_<n>_open() */
+#define GTC_TEST_H_BLOCK_US 10000000UL /* block length, microseconds */
+#define GTC_TEST_H_T_MIN_C (-20.00000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_H_T_MAX_C (60.00000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_H_SLOPE_MIN_C_PER_MIN (-3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_H_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_H_N_CHANNELS 1 /* numbers of a sample */
+#define GTC_TEST_H_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
+#define GTC_TEST_H_F32_TABLE_BYTES 427UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_H_Q31_BIAS_FRAC_BITS 24 /* bias in 2^-this deg/h */
+#define GTC_TEST_H_Q31_TABLE_BYTES 427UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_H_SAMPLES_PER_BLOCK(period_us) ((GTC_TEST_H_BLOCK_US + ((period_us) / 2UL)) / (period_us)) /* of gtc_<n>_init(), for a sample period in microseconds */
 
 extern const gtc_f32_table_t gtc_test_h_f32;
 extern const gtc_q31_table_t gtc_test_h_q31;

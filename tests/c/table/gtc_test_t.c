@@ -40,12 +40,12 @@ static const gtc_word_t f32_terms[32] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
-    V(40.390213F), V(0.0698402897F), V(-0.12677367F), B(0x0UL),
-    V(20.780426F), V(-0.360319406F), V(-0.642388165F), B(0x0UL),
-    V(1.17063987F), V(0.209520876F), V(-0.4025971F), B(0x0UL),
-    V(-18.439146F), V(-0.220638841F), V(0.361409217F), B(0x0UL),
-    V(41.9510651F), V(0.349201441F), V(-0.300033271F), B(0x0UL),
-    V(22.34128F), V(-0.0809582546F), V(-0.784616113F), B(0x0UL),
+    V(0.774153054F), V(0.456940234F), V(-0.723808289F), B(0x0UL),
+    V(47.31493F), V(0.38882038F), V(-0.0590648577F), B(0x0UL),
+    V(-19.3186951F), V(-0.298464566F), V(0.302154005F), B(0x0UL),
+    V(-13.0752821F), V(-0.181019917F), V(0.462099791F), B(0x0UL),
+    V(48.6775398F), V(-0.208108783F), V(0.595777869F), B(0x0UL),
+    V(49.3588448F), V(-0.00657336134F), V(0.408011675F), B(0x0UL),
     V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
     V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
 };
@@ -85,7 +85,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xdb963e01UL,
+    .crc = 0xbdb281f8UL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
     .serial = "TEST-T",
 };

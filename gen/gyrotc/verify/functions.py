@@ -1,0 +1,114 @@
+"""What each public function of the runtime costs: bytes of its code, and stack at the deepest of its calls.
+
+gcc writes the graph of calls with the stack of each function (`-fcallgraph-info=su`). A call through a pointer goes to
+a hook of a term; the deepest of them all counts, whichever terms a table has. Functions of the compiler's own library
+(64-bit division and the like) stand in no graph: they are named, not counted.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import CheckFailed
+from .toolchain import Target, compile_objects, symbols
+
+__all__ = ["PUBLIC", "Graph", "function_costs", "parse_graph"]
+
+PUBLIC = ("check", "open", "map", "init", "sample", "missed", "bias", "angle", "save", "restore")
+_NODE = re.compile(
+    r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
+)
+_EDGE = re.compile(
+    r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
+)
+_INDIRECT = "__indirect_call"
+_HOOK = re.compile(
+    r"gtc_(?:f32|q31)_(?:nothing|(?:memory|play|warm_up|harmonic|auxiliary)_(?:begin|take|step|apply))$"
+)
+
+
+@dataclass(slots=True)
+class Graph:
+    """Bytes of stack of each function by name, and whom it calls."""
+
+    stack: dict[str, int] = field(default_factory=dict)
+    calls: dict[str, set[str]] = field(default_factory=dict)
+
+    def callees(self, name: str) -> set[str]:
+        """Whom a function calls, pointers to hooks of its arithmetic resolved."""
+        found = self.calls.get(name, set())
+        if _INDIRECT not in found:
+            return found
+        hooks = {n for n in self.stack if _HOOK.match(n) and n[:8] == name[:8]}
+        return (found - {_INDIRECT}) | hooks
+
+    def deepest(self, name: str, above: tuple[str, ...] = ()) -> int:
+        """Bytes of stack of a function and the deepest chain of calls from it.
+
+        Raises:
+            CheckFailed: A function calls itself, so that no bound exists.
+        """
+        if name in above:
+            raise CheckFailed(f"{name} calls itself by way of {' and '.join(above)}: its stack has no bound")
+        below = [self.deepest(callee, (*above, name)) for callee in self.callees(name)]
+        return self.stack.get(name, 0) + max(below, default=0)
+
+    def helpers(self, name: str) -> set[str]:
+        """Functions from outside that are called on the way: their stack is not in `deepest`."""
+        if name not in self.stack:
+            return {name}
+        return set().union(*(self.helpers(callee) for callee in self.callees(name)))
+
+
+def parse_graph(text: str) -> Graph:
+    """The graph in a file that gcc wrote.
+
+    Raises:
+        CheckFailed: The stack of a function depends on its arguments.
+    """
+    graph = Graph()
+    for line in text.splitlines():
+        if node := _NODE.match(line):
+            if node["how"] != "static":
+                raise CheckFailed(f"the stack of {node['name']} is {node['how']}")
+            graph.stack[node["name"]] = int(node["bytes"])
+        elif edge := _EDGE.match(line):
+            graph.calls.setdefault(edge["caller"], set()).add(edge["callee"])
+    return graph
+
+
+def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, dict[str, Any]]]:
+    """Costs by arithmetic and public function: `code_bytes`, `stack_bytes`, `helpers`; empty without a gcc that tells.
+
+    Raises:
+        CheckFailed: The compiler refused, or a stack has no bound.
+    """
+    if not target.compiler.endswith("-gcc") or target.counts != "instructions":
+        return {}
+    own = work / "functions"
+    own.mkdir()
+    told = target.model_copy(update={"flags": (*target.flags, "-fstack-usage", "-fcallgraph-info=su")})
+    objects = compile_objects(told, [c_folder / "gtc.c"], own, include=c_folder)
+    graph = parse_graph((own / "gtc.ci").read_text(encoding="utf-8", errors="replace"))
+    sizes = {s.name: s.size for s in symbols(target, *objects)}
+    return {
+        n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)
+    }
+
+
+def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, dict[str, Any]]:
+    costs: dict[str, dict[str, Any]] = {}
+    for function in PUBLIC:
+        linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
+        name = next((n for n in sizes if linked.match(n)), None)
+        if name is not None:
+            costs[function] = {
+                "code_bytes": sizes[name],
+                "stack_bytes": graph.deepest(name),
+                "helpers": sorted(graph.helpers(name)),
+            }
+    return costs

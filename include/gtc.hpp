@@ -1,0 +1,187 @@
+/* gtc.hpp - C++ face of the gyrotc runtime: the functions of gtc.h with a type for each unit.
+ *
+ * A header alone, C++11, no exceptions, no heap. gtc.h is the manual; a Correction is a state of it, so one task
+ * owns it, and an Increments one sum of angle increments, which an interrupt may own.
+ *
+ *   gtc::f32::Correction correction;
+ *   if (!gtc::f32::check(gtc_sim_0001_f32).is_ok()) { halt(); }
+ *   if (!correction.init(gtc_sim_0001_f32, GTC_SIM_0001_SAMPLES_PER_BLOCK(10000UL)).is_ok()) { halt(); }
+ *   correction.sample(gtc::f32::Celsius(t));
+ *   gtc::f32::DegPerHour bias(0.0F);
+ *   gtc::Status status = correction.bias(bias);
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_HPP_INCLUDED
+#define GTC_HPP_INCLUDED
+
+#include "gtc.h"
+
+namespace gtc {
+
+/* What a call did: the codes of gtc.h. */
+class Status {
+public:
+    explicit constexpr Status(int code) noexcept : code_(code) {}
+    constexpr int code() const noexcept { return code_; }
+    constexpr bool is_ok() const noexcept { return code_ == GTC_OK; }
+    constexpr bool failed() const noexcept { return code_ < 0; }
+    /* One of GTC_WARMING ... GTC_FALLBACK; false for a call that failed. */
+    constexpr bool has(int remark) const noexcept { return (code_ > 0) && ((code_ & remark) != 0); }
+
+private:
+    int code_;
+};
+
+/* A number of one unit; another unit, or a bare number, does not convert to it. */
+template <class Unit, class Number> class Quantity {
+public:
+    explicit constexpr Quantity(Number value) noexcept : value_(value) {}
+    constexpr Number value() const noexcept { return value_; }
+
+private:
+    Number value_;
+};
+
+namespace unit {
+struct Celsius;
+struct CelsiusPerBlock;
+struct DegPerHour;
+struct Time;
+struct Angle;
+} // namespace unit
+
+/* float32: C, C per block, deg/h, s, arcsec. */
+struct F32 {
+    typedef float Number;
+    typedef gtc_f32_table_t Table;
+    typedef gtc_f32_state_t State;
+    typedef gtc_f32_angle_t Sum;
+    static int check(const Table *table) noexcept { return gtc_f32_check(table); }
+    static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
+    {
+        return gtc_f32_open(table, words, n, id);
+    }
+    static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_f32_map(table, t, s, b); }
+    static int init(State *state, const Table *table, uint_least32_t n) noexcept { return gtc_f32_init(state, table, n); }
+    static int sample(State *state, const Number *x) noexcept { return gtc_f32_sample(state, x); }
+    static int missed(State *state, uint_least32_t n) noexcept { return gtc_f32_missed(state, n); }
+    static int bias(const State *state, Number *b) noexcept { return gtc_f32_bias(state, b); }
+    static int save(const State *state, gtc_word_t *words) noexcept { return gtc_f32_save(state, words); }
+    static int restore(State *state, const Table *table, uint_least32_t n, const gtc_word_t *words,
+                       uint_least32_t off) noexcept
+    {
+        return gtc_f32_restore(state, table, n, words, off);
+    }
+    static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_f32_angle(sum, bias, dt, a); }
+};
+
+/* Fixed point: 2^-16 C, 2^-16 C per block, 2^-bias_frac_bits deg/h, microseconds, 2^-bias_frac_bits arcsec. */
+struct Q31 {
+    typedef int_least32_t Number;
+    typedef gtc_q31_table_t Table;
+    typedef gtc_q31_state_t State;
+    typedef gtc_q31_angle_t Sum;
+    static int check(const Table *table) noexcept { return gtc_q31_check(table); }
+    static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
+    {
+        return gtc_q31_open(table, words, n, id);
+    }
+    static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_q31_map(table, t, s, b); }
+    static int init(State *state, const Table *table, uint_least32_t n) noexcept { return gtc_q31_init(state, table, n); }
+    static int sample(State *state, const Number *x) noexcept { return gtc_q31_sample(state, x); }
+    static int missed(State *state, uint_least32_t n) noexcept { return gtc_q31_missed(state, n); }
+    static int bias(const State *state, Number *b) noexcept { return gtc_q31_bias(state, b); }
+    static int save(const State *state, gtc_word_t *words) noexcept { return gtc_q31_save(state, words); }
+    static int restore(State *state, const Table *table, uint_least32_t n, const gtc_word_t *words,
+                       uint_least32_t off) noexcept
+    {
+        return gtc_q31_restore(state, table, n, words, off);
+    }
+    static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_q31_angle(sum, bias, dt, a); }
+};
+
+/* The types and functions of one arithmetic. */
+template <class A> struct Runtime {
+    typedef typename A::Number Number;
+    typedef typename A::Table Table;
+    typedef Quantity<unit::Celsius, Number> Celsius;
+    typedef Quantity<unit::CelsiusPerBlock, Number> CelsiusPerBlock;
+    typedef Quantity<unit::DegPerHour, Number> DegPerHour;
+    typedef Quantity<unit::Time, Number> Time;
+    typedef Quantity<unit::Angle, Number> Angle;
+
+    static Status check(const Table &table) noexcept { return Status(A::check(&table)); }
+
+    static Status open(Table &table, const gtc_word_t *words, uint_least32_t n_words, uint_least32_t expected_id) noexcept
+    {
+        return Status(A::open(&table, words, n_words, expected_id));
+    }
+
+    static Status map(const Table &table, Celsius temp, CelsiusPerBlock slope, DegPerHour &bias) noexcept
+    {
+        Number result = bias.value();
+        const Status status(A::map(&table, temp.value(), slope.value(), &result));
+        bias = DegPerHour(result);
+        return status;
+    }
+
+    /* One state; owned by one task. */
+    class Correction {
+    public:
+        Correction() noexcept : state_() {}
+        Status init(const Table &table, uint_least32_t samples_per_block) noexcept
+        {
+            return Status(A::init(&state_, &table, samples_per_block));
+        }
+        /* Of a table with one channel. */
+        Status sample(Celsius temp) noexcept
+        {
+            const Number channel = temp.value();
+            const bool alone = (state_.table != nullptr) && (state_.table->n_channels == 1U);
+            return Status(alone ? A::sample(&state_, &channel) : GTC_E_ARG);
+        }
+        /* Of any table: n_channels numbers, the temperature first. */
+        Status sample(const Number *channels) noexcept { return Status(A::sample(&state_, channels)); }
+        Status missed(uint_least32_t count) noexcept { return Status(A::missed(&state_, count)); }
+        Status bias(DegPerHour &bias) const noexcept
+        {
+            Number result = bias.value();
+            const Status status(A::bias(&state_, &result));
+            bias = DegPerHour(result);
+            return status;
+        }
+        Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, words)); }
+        Status restore(const Table &table, uint_least32_t samples_per_block, const gtc_word_t (&words)[GTC_SAVE_WORDS],
+                       uint_least32_t off_blocks) noexcept
+        {
+            return Status(A::restore(&state_, &table, samples_per_block, words, off_blocks));
+        }
+
+    private:
+        typename A::State state_;
+    };
+
+    /* Angle increments; owned by one task or interrupt. */
+    class Increments {
+    public:
+        Increments() noexcept : sum_() {}
+        Status angle(DegPerHour bias, Time dt, Angle &increment) noexcept
+        {
+            Number result = increment.value();
+            const Status status(A::angle(&sum_, bias.value(), dt.value(), &result));
+            increment = Angle(result);
+            return status;
+        }
+
+    private:
+        typename A::Sum sum_;
+    };
+};
+
+typedef Runtime<F32> f32;
+typedef Runtime<Q31> q31;
+
+} // namespace gtc
+
+#endif /* GTC_HPP_INCLUDED */

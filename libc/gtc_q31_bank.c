@@ -1,9 +1,0 @@
-/* gtc_q31_bank.c - several networks in one table, where GTC_WITH_BANK.
- *
- * SPDX-License-Identifier: MIT
- */
-#include "gtc_num_q31.h"
-
-#if GTC_WITH_BANK
-#include "gtc_bank.inl"
-#endif

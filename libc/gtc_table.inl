@@ -1,0 +1,464 @@
+/* gtc_table.inl - whether a table can be used, its self-test, and a table from a binary image, in the numbers
+ * included before.
+ *
+ * docs/FORMAT.md, section 3, gives the order of the words.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+/* ---- an image ------------------------------------------------------------------------------------ */
+
+/* Words between the magic and the arrays. */
+#define HEADER_WORDS (2U + 7U + 3U + 3U + 4U + 4U + 5U)
+
+static uint_least32_t FN(coverage_words)(const TABLE *table)
+{
+    return ((table->coverage_cells[0] * table->coverage_cells[1]) + 31U) / 32U;
+}
+
+/* Words of all arrays. */
+static uint_least32_t FN(array_words)(const TABLE *table)
+{
+    return (table->n_networks * GTC_NETWORK_WORDS) + (table->n_centers * GTC_CENTER_WORDS)
+           + (table->n_terms * GTC_TERM_WORDS) + FN(coverage_words)(table)
+           + (table->sigma_cells[0] * table->sigma_cells[1])
+           + (table->n_probes * GTC_PROBE_WORDS);
+}
+
+/* ---- whether this build can use a table ---------------------------------------------------------------------------------- */
+
+/* Everything that could make another function read outside the table, divide by zero, leave the range of a
+ * number or make one that is none is refused here: words outside of gtc_limits.inl, and what relates
+ * several words. The tests call these "the conditions"; docs/FORMAT.md, section 3, lists them. */
+
+/* Whether n words are numbers in their ranges (false for a NaN, too). */
+static int FN(numbers_fit)(const gtc_word_t *words, const FN(range_t) *ranges, uint_least32_t n)
+{
+    int fit = 1;
+    uint_least32_t i;
+
+    for (i = 0U; i < n; i++) {
+        const NUM x = ELEMENT(words[i]);
+
+        fit &= ((x >= ranges[i].least) && (x <= ranges[i].most)) ? 1 : 0;
+    }
+    return fit;
+}
+
+/* An array is there if and only if it has a length. */
+static int FN(is_array)(const gtc_word_t *words, uint_least32_t n)
+{
+    return ((words == NULL) == (n == 0U)) ? 1 : 0;
+}
+
+/* Cells of a grid over the envelope: both counts 0, or none. */
+static int FN(is_grid)(const gtc_word_t *words, const uint_least32_t cells[2])
+{
+    return (((cells[0] == 0U) == (cells[1] == 0U)) && FN(is_array)(words, cells[0])) ? 1 : 0;
+}
+
+static int FN(arrays_fit)(const TABLE *table)
+{
+    return (FN(is_array)(table->networks, table->n_networks) && FN(is_array)(table->centers, table->n_centers)
+            && FN(is_array)(table->terms, table->n_terms) && FN(is_array)(table->probes, table->n_probes)
+            && FN(is_grid)(table->coverage, table->coverage_cells)
+            && FN(is_grid)(table->sigma, table->sigma_cells)) ? 1 : 0;
+}
+
+/* The whole numbers of the header, in the order of an image. */
+static void FN(wholes)(const TABLE *table, uint_least32_t found[N_WHOLE])
+{
+    found[0] = table->quantity;
+    found[1] = table->unit;
+    found[2] = table->id;
+    found[3] = table->slope_blocks;
+    found[4] = table->hold_blocks;
+    found[5] = table->stuck_samples;
+    found[6] = table->bias_frac_bits;
+    found[7] = table->n_networks;
+    found[8] = table->n_centers;
+    found[9] = table->n_channels;
+    found[10] = table->n_terms;
+    found[11] = table->coverage_cells[0];
+    found[12] = table->coverage_cells[1];
+    found[13] = table->sigma_cells[0];
+    found[14] = table->sigma_cells[1];
+    found[15] = table->n_probes;
+}
+
+/* The other numbers of the header. */
+static void FN(numbers)(const TABLE *table, gtc_word_t found[N_NUMBERS])
+{
+    uint_least32_t i;
+
+    ELEMENT(found[0]) = MEMBER(table->max_step);
+    ELEMENT(found[1]) = MEMBER(table->max_slope);
+    ELEMENT(found[2]) = MEMBER(table->fallback);
+    for (i = 0U; i < 3U; i++) {
+        ELEMENT(found[3U + i]) = MEMBER(table->scale[i]);
+    }
+    for (i = 0U; i < 4U; i++) {
+        ELEMENT(found[6U + i]) = MEMBER(table->envelope[i]);
+    }
+}
+
+/* Whole numbers in their ranges, from number `first` of their list on. */
+static int FN(wholes_fit)(const TABLE *table, uint_least32_t first)
+{
+    uint_least32_t found[N_WHOLE];
+    int fit = 1;
+    uint_least32_t i;
+
+    FN(wholes)(table, found);
+    for (i = first; i < N_WHOLE; i++) {
+        fit &= ((found[i] >= FN(whole_limits)[i][0]) && (found[i] <= FN(whole_limits)[i][1])) ? 1 : 0;
+    }
+    return fit;
+}
+
+/* One network, or several where the code of the hand-over is there; they share out the centers. */
+static int FN(centers_fit)(const TABLE *table)
+{
+    uint_least32_t n = 0U;
+    uint_least32_t i;
+
+#if !GTC_WITH_BANK
+    if (table->n_networks != 1U) {
+        return 0;
+    }
+#endif
+    for (i = 0U; i < table->n_networks; i++) {
+        const uint_least32_t own = table->networks[i * GTC_NETWORK_WORDS].bits;
+
+        if (own > table->n_centers) {
+            return 0;
+        }
+        n += own;
+    }
+    return (n == table->n_centers) ? 1 : 0;
+}
+
+/* Every term comes with its code; an auxiliary one reads a further channel, others the temperature. */
+static int FN(terms_fit)(const TABLE *table)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+
+        if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != term[0].bits)
+            || (term[1].bits >= table->n_channels)
+            || ((term[1].bits != 0U) != (term[0].bits == GTC_TERM_AUXILIARY))) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* 1 if the table is of this layout and its counts say where its arrays end, else 0. */
+static int FN(is_readable)(const TABLE *table)
+{
+    return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
+            && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
+}
+
+static int FN(members_fit)(const TABLE *table)
+{
+    gtc_word_t found[N_NUMBERS];
+
+    FN(numbers)(table, found);
+    return FN(numbers_fit)(found, FN(number_limits), N_NUMBERS) & FN(envelope_fits)(table);
+}
+
+/* The region of one of several networks has a width by which shares can be divided. */
+static int FN(region_fits)(const gtc_word_t region[2], uint_least32_t n_networks)
+{
+    const NUM low = ELEMENT(region[0]);
+    const NUM high = ELEMENT(region[1]);
+
+    return (FN(is_width)(low, high) || ((n_networks == 1U) && (low <= high))) ? 1 : 0;
+}
+
+/* One network with its centers. */
+static int FN(network_fits)(const TABLE *table, const gtc_word_t *network, const gtc_word_t *centers)
+{
+    uint_least32_t i;
+    int fit = FN(numbers_fit)(&network[1], FN(network_limits), GTC_NETWORK_WORDS - 1U)
+              & FN(region_fits)(&network[4], table->n_networks) & FN(region_fits)(&network[6], table->n_networks);
+
+    for (i = 0U; i < network[0].bits; i++) {
+        fit &= FN(numbers_fit)(&centers[i * GTC_CENTER_WORDS], FN(center_limits), GTC_CENTER_WORDS);
+    }
+    return fit & FN(sums_fit)(network, centers);
+}
+
+static int FN(networks_fit)(const TABLE *table)
+{
+    const gtc_word_t *center = table->centers;
+    int fit = 1;
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_networks; i++) {
+        const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
+
+        fit &= FN(network_fits)(table, network, center);
+        center = &center[network[0].bits * GTC_CENTER_WORDS];
+    }
+    return fit;
+}
+
+/* Parameters of the terms, and the uncertainties, which nothing reads yet. */
+static int FN(rest_fits)(const TABLE *table)
+{
+    const uint_least32_t n = table->sigma_cells[0] * table->sigma_cells[1];
+    int fit = 1;
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+
+        fit &= FN(numbers_fit)(&term[2], FN(term_limits)[term[0].bits - 1U], GTC_TERM_WORDS - 2U);
+    }
+    for (i = 0U; i < n; i++) {
+        fit &= FN(numbers_fit)(&table->sigma[i], FN(sigma_limits), 1U);
+    }
+    return fit;
+}
+
+/* 1 if this build of the runtime can use the table: no function meets a run-time error with it; else 0. */
+static int FN(is_usable)(const TABLE *table)
+{
+    return (FN(is_readable)(table) && FN(wholes_fit)(table, 0U) && FN(members_fit)(table)
+            && FN(networks_fit)(table) && FN(rest_fits)(table)) ? 1 : 0;
+}
+
+/* ---- the self-test ------------------------------------------------------------------------------- */
+
+/* CRC-32, not final, over the words of the table's image between its magic and its arrays. */
+static uint_least32_t FN(header_crc)(const TABLE *table)
+{
+    uint_least32_t whole[N_WHOLE];
+    gtc_word_t number[N_NUMBERS];
+    uint_least32_t crc = GTC_CRC_START;
+    uint_least32_t i;
+
+    FN(wholes)(table, whole);
+    FN(numbers)(table, number);
+    crc = gtc_crc_word(crc, table->layout + (ARITHMETIC * 65536UL));
+    crc = gtc_crc_word(crc, 1U + HEADER_WORDS + FN(array_words)(table) + 1U);
+    for (i = 0U; i < FIRST_COUNT; i++) {
+        crc = gtc_crc_word(crc, whole[i]);
+    }
+    crc = gtc_crc_words(crc, number, N_NUMBERS);
+    for (i = FIRST_COUNT; i < N_WHOLE; i++) {
+        crc = gtc_crc_word(crc, whole[i]);
+    }
+    return crc;
+}
+
+/* CRC-32 over what an image holds between its magic and its own CRC. */
+static uint_least32_t FN(crc)(const TABLE *table)
+{
+    uint_least32_t crc = FN(header_crc)(table);
+
+    crc = gtc_crc_words(crc, table->networks, table->n_networks * GTC_NETWORK_WORDS);
+    crc = gtc_crc_words(crc, table->centers, table->n_centers * GTC_CENTER_WORDS);
+    crc = gtc_crc_words(crc, table->terms, table->n_terms * GTC_TERM_WORDS);
+    crc = gtc_crc_words(crc, table->coverage, FN(coverage_words)(table));
+    crc = gtc_crc_words(crc, table->sigma, table->sigma_cells[0] * table->sigma_cells[1]);
+    crc = gtc_crc_words(crc, table->probes, table->n_probes * GTC_PROBE_WORDS);
+    return crc ^ GTC_CRC_FINAL;
+}
+
+/* 1 if the map gives the known answers of the table. */
+static int FN(probes_agree)(const TABLE *table)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_probes; i++) {
+        const gtc_word_t *const probe = &table->probes[i * GTC_PROBE_WORDS];
+        NUM bias = NUM_ZERO;
+        const int status = FN(map)(table, ELEMENT(probe[0]), ELEMENT(probe[1]), &bias);
+
+        if ((status < 0) || ((uint_least32_t)status != probe[3].bits)
+            || (FN(bits)(bias) != probe[2].bits)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int FN(run_check)(const TABLE *table)
+{
+    int status = GTC_OK;
+
+    if (table == NULL) {
+        status = GTC_E_ARG;
+    } else if (!FN(is_readable)(table)) {
+        status = GTC_E_LAYOUT;
+    } else if (!FN(primitives_work)()) {
+        status = GTC_E_SELF_TEST;
+    } else if (FN(crc)(table) != table->crc) {
+        status = GTC_E_IMAGE;
+    } else if (!FN(is_usable)(table)) {
+        status = GTC_E_LAYOUT;
+    } else if (!FN(probes_agree)(table)) {
+        status = GTC_E_SELF_TEST;
+    } else {
+        /* all is well */
+    }
+    return status;
+}
+
+/* ---- a table from an image ----------------------------------------------------------------------- */
+
+/* Words before the arrays, with the magic; and the CRC behind them. */
+#define BEFORE_ARRAYS (1U + HEADER_WORDS)
+#define AFTER_ARRAYS 1U
+
+/* The members of a table as the image has them; arrays and code of terms are NULL. */
+static void FN(read_header)(volatile TABLE *table, const gtc_word_t *words)
+{
+    const gtc_word_t *const numbers = &words[10];
+    const gtc_word_t *const counts = &words[BEFORE_ARRAYS - 9U];
+    uint_least32_t i;
+
+    table->layout = words[1].bits & 0xFFFFU;
+    table->quantity = words[3].bits;
+    table->unit = words[4].bits;
+    table->id = words[5].bits;
+    table->slope_blocks = words[6].bits;
+    table->hold_blocks = words[7].bits;
+    table->stuck_samples = words[8].bits;
+    table->bias_frac_bits = words[9].bits;
+    MEMBER(table->max_step) = ELEMENT(numbers[0]);
+    MEMBER(table->max_slope) = ELEMENT(numbers[1]);
+    MEMBER(table->fallback) = ELEMENT(numbers[2]);
+    for (i = 0U; i < 3U; i++) {
+        MEMBER(table->scale[i]) = ELEMENT(numbers[3U + i]);
+    }
+    for (i = 0U; i < 4U; i++) {
+        MEMBER(table->envelope[i]) = ELEMENT(numbers[6U + i]);
+    }
+    table->n_networks = counts[0].bits;
+    table->n_centers = counts[1].bits;
+    table->n_channels = counts[2].bits;
+    table->n_terms = counts[3].bits;
+    for (i = 0U; i < 2U; i++) {
+        table->coverage_cells[i] = counts[4U + i].bits;
+        table->sigma_cells[i] = counts[6U + i].bits;
+    }
+    table->n_probes = counts[8].bits;
+}
+
+/* Counts so small that no sum of words overflows. */
+static int FN(counts_are_sane)(const TABLE *table)
+{
+    return ((table->n_networks <= 0xFFFFU) && (table->n_centers <= 0xFFFFU)
+            && (table->n_terms <= 0xFFFFU) && (table->n_probes <= 0xFFFFU)
+            && ((table->coverage_cells[0] | table->coverage_cells[1]) <= 0xFFFU)
+            && ((table->sigma_cells[0] | table->sigma_cells[1]) <= 0xFFFU)) ? 1 : 0;
+}
+
+/* The next n words of the image, or NULL. */
+static const gtc_word_t *FN(next)(const gtc_word_t **words, uint_least32_t n)
+{
+    const gtc_word_t *const array = *words;
+
+    *words = &array[n];
+    return (n == 0U) ? NULL : array;
+}
+
+static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
+{
+    const gtc_word_t *next = &words[BEFORE_ARRAYS];
+
+    table->networks = FN(next)(&next, table->n_networks * GTC_NETWORK_WORDS);
+    table->centers = FN(next)(&next, table->n_centers * GTC_CENTER_WORDS);
+    table->terms = FN(next)(&next, table->n_terms * GTC_TERM_WORDS);
+    table->coverage = FN(next)(&next, FN(coverage_words)(table));
+    table->sigma = FN(next)(&next, table->sigma_cells[0] * table->sigma_cells[1]);
+    table->probes = FN(next)(&next, table->n_probes * GTC_PROBE_WORDS);
+    table->crc = next[0].bits;
+    table->serial = NULL;
+}
+
+/* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. */
+static void FN(find_code)(volatile TABLE *table)
+{
+#if GTC_OPEN_TERMS
+    /* MISRA 9.3: all five are there; their names are macros, which the checker does not count. */
+    static const struct FN(term_code) *const all[5] = {
+        &FN(term_memory), &FN(term_play), &FN(term_warm_up), &FN(term_harmonic), &FN(term_auxiliary),
+    };
+#endif
+    uint_least32_t i;
+
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        table->term_code[i] = NULL;
+#if GTC_OPEN_TERMS
+        if (i < table->n_terms) {
+            const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
+
+            if ((kind >= 1U) && (kind <= N_KINDS)) {
+                table->term_code[i] = all[kind - 1U];
+            }
+        }
+#endif
+    }
+}
+
+/* All of a table from an image whose counts are sane. */
+static void FN(read_image)(TABLE *table, const gtc_word_t *words)
+{
+    FN(read_header)(table, words);
+    FN(find_arrays)(table, words);
+    FN(find_code)(table);
+}
+
+/* Magic, length and CRC, which every layout has in the same places. */
+static int FN(is_image)(const gtc_word_t *words, uint_least32_t n_words)
+{
+    uint_least32_t length;
+    uint_least32_t crc;
+
+    if ((n_words < (BEFORE_ARRAYS + AFTER_ARRAYS)) || (words[0].bits != GTC_IMAGE_MAGIC)) {
+        return 0;
+    }
+    length = words[2].bits;
+    if ((length < (BEFORE_ARRAYS + AFTER_ARRAYS)) || (length > n_words)) {
+        return 0;
+    }
+    crc = gtc_crc_words(GTC_CRC_START, &words[1], length - 2U) ^ GTC_CRC_FINAL;
+    return (crc == words[length - 1U].bits) ? 1 : 0;
+}
+
+static int FN(run_open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_words,
+                        uint_least32_t expected_id)
+{
+    TABLE read;
+
+    if ((table == NULL) || (words == NULL)) {
+        return GTC_E_ARG;
+    }
+    if (!FN(is_image)(words, n_words)) {
+        return GTC_E_IMAGE;
+    }
+    if (words[1].bits != (GTC_TABLE_LAYOUT + (ARITHMETIC * 65536UL))) {
+        return GTC_E_LAYOUT;
+    }
+    FN(read_header)(&read, words);
+    if (read.id != expected_id) {
+        return GTC_E_ID;
+    }
+    if ((!FN(counts_are_sane)(&read))
+        || ((BEFORE_ARRAYS + FN(array_words)(&read) + AFTER_ARRAYS) != words[2].bits)) {
+        return GTC_E_IMAGE;
+    }
+    FN(read_image)(&read, words);
+    if (!FN(is_usable)(&read)) {
+        return GTC_E_LAYOUT;
+    }
+    FN(read_image)(table, words);
+    return GTC_OK;
+}
