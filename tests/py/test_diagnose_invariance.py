@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.detect import _root
-from gyrotc.diagnose.noise import Declared
+from gyrotc.diagnose.detect.scores import _root
+from gyrotc.diagnose.noise_colour.colours import Declared
 from gyrotc.diagnose.pipeline import Analysis, analyse
-from gyrotc.diagnose.recordings import declared_noise, records_of
-from gyrotc.diagnose.records import Record, Records
+from gyrotc.diagnose.screen.blocks import Record, Records
+from gyrotc.diagnose.screen.gather import declared_noise, records_of
 from gyrotc.diagnose.verdict import verdict_of
 
 ROOT = Path(__file__).resolve().parents[2]

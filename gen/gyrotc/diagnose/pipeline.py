@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..terms import CATALOGUE
-from .attribute import Attribution, attribute
-from .bank import Bank
-from .cache import bank_of
-from .catalogue import Candidate, columns_of, diagnosed, searched
-from .compare import Ensemble, compare
-from .levels import NoiseFinding, noise_findings
-from .likelihood import Gains
-from .limits import Limit, detection_limits, overlap
-from .noise import Declared
-from .records import Records
-from .refine import taken
-from .screen import Screened, cleaned, screen
-from .search import Search
+from .attribute.attribution import Attribution, attribute
+from .attribute.gains import Gains
+from .attribute.refine import taken
+from .detect.detection_limits import Limit, detection_limits, overlap
+from .detect.search import Search
+from .discrepancy.declared_noise import NoiseFinding, noise_findings
+from .discrepancy.ensemble import Ensemble, compare
+from .noise_colour.colours import Declared
+from .screen.blocks import Records
+from .screen.screens import Screened, cleaned, screen
+from .signatures.cache import bank_of
+from .signatures.candidates import Candidate, columns_of, diagnosed, searched
+from .signatures.signature_bank import Bank
 from .words import NOISE_WORDS
 
 __all__ = ["Analysis", "analyse", "search_of"]

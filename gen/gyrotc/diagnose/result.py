@@ -15,15 +15,15 @@ from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end, model_of, training_of
 from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
-from .catalogue import diagnosed
-from .cycle import Cycle, cycle_of, is_single_cycle
-from .extend import Extension, extend
-from .gain import Gain
-from .levels import NoiseFinding
-from .limits import Limit
+from .attribute.refine import Interval, Refined
+from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
+from .detect.detection_limits import Limit
+from .discrepancy.declared_noise import NoiseFinding
+from .extend.extension import Extension, extend
+from .extend.gain import Gain
 from .pipeline import Analysis, analyse
-from .recordings import declared_noise, records_of
-from .refine import Interval, Refined
+from .screen.gather import declared_noise, records_of
+from .signatures.candidates import diagnosed
 from .verdict import named, verdict_of
 from .words import NOISE_WORDS
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .attribute import Attribution
-from .levels import NoiseFinding
+from .attribute.attribution import Attribution
+from .discrepancy.declared_noise import NoiseFinding
 
 __all__ = ["named", "verdict_of"]
 

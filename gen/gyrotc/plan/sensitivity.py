@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.bank import Bank
-from ..diagnose.cache import bank_of
-from ..diagnose.catalogue import Candidate, planned
-from ..diagnose.limits import Limit, amplitude_energy, limit_of
-from ..diagnose.noise import COLOURS, Colour, Whitener
-from ..diagnose.search import Search
+from ..diagnose.detect.detection_limits import Limit, amplitude_energy, limit_of
+from ..diagnose.detect.search import Search
+from ..diagnose.noise_colour.colours import COLOURS, Colour, Whitener
+from ..diagnose.signatures.cache import bank_of
+from ..diagnose.signatures.candidates import Candidate, planned
+from ..diagnose.signatures.signature_bank import Bank
 from .programme import Programme
 
 __all__ = ["Sensitivity"]

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.catalogue import Candidate, columns_of, planned, searched, shape_parameter
-from ..diagnose.likelihood import Gains
+from ..diagnose.attribute.gains import Gains
+from ..diagnose.signatures.candidates import Candidate, columns_of, planned, searched, shape_parameter
 from ..errors import InputError
 from ..simulate.campaign import Noise
 from .programme import library, programme_of

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from .detect import draw_null, score
-from .noise import COLOURS, Declared
-from .search import Search, View
+from ..detect.scores import draw_null, score
+from ..detect.search import Search, View
+from ..noise_colour.colours import COLOURS, Declared
 
 __all__ = ["NoiseFinding", "noise_findings"]
 

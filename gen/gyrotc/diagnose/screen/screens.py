@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.ndimage import median_filter
 
-from .records import Records, centred_slope
+from .blocks import Records, centred_slope
 
 __all__ = ["Screened", "screen"]
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE
-from .bank import Other, proportional_map
-from .catalogue import searched
-from .detect import ratio_of
-from .likelihood import Gains
+from ...terms import CATALOGUE
+from ..detect.scores import ratio_of
+from ..signatures.candidates import searched
+from ..signatures.signature_bank import Other, proportional_map
+from .gains import Gains
 from .refine import Refined
 
 __all__ = ["Contest", "contest"]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE
-from .catalogue import Candidate, searched, shape_parameter
-from .likelihood import Gains
-from .refine import Refined
+from ...terms import CATALOGUE
+from ..attribute.gains import Gains
+from ..attribute.refine import Refined
+from ..signatures.candidates import Candidate, searched, shape_parameter
 from .search import Search
 
 __all__ = ["Limit", "amplitude_energy", "detection_limits", "limit_of", "overlap"]

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE
-from ..terms.operators import first_order, play
-from .baseline import LEVELS, MapBasis, fine_columns, make_basis
-from .catalogue import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
-from .noise import COLOURS, Whitener
-from .others import shapes_of
-from .records import Records, centred_slope
+from ...terms import CATALOGUE
+from ...terms.operators import first_order, play
+from ..noise_colour.colours import COLOURS, Whitener
+from ..screen.blocks import Records, centred_slope
+from .alternatives import shapes_of
+from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
+from .static_map import LEVELS, MapBasis, fine_columns, make_basis
 
 __all__ = ["Bank", "Group", "Other", "build", "direction_of", "proportional_map", "replaced_map"]
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import terms
-from .bank import replaced_map
-from .baseline import fine_columns
-from .catalogue import Candidate, columns_of, reach_of, searched, shape_parameter
-from .likelihood import Gains
-from .records import singled_out
-from .search import Search
+from ... import terms
+from ..detect.search import Search
+from ..screen.blocks import singled_out
+from ..signatures.candidates import Candidate, columns_of, reach_of, searched, shape_parameter
+from ..signatures.signature_bank import replaced_map
+from ..signatures.static_map import fine_columns
+from .gains import Gains
 
 __all__ = ["Interval", "Refined", "refine", "taken"]
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Dataset, Rows, Run
-from ..errors import InputError
-from ..terms.base import History
-from .noise import Declared
-from .records import Record, Records
+from ...dataset import Dataset, Rows, Run
+from ...errors import InputError
+from ...terms.base import History
+from ..noise_colour.colours import Declared
+from .blocks import Record, Records
 
 __all__ = ["block_length", "declared_noise", "records_of"]
 

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from .bank import Bank
-from .catalogue import Candidate
-from .detect import Columns, Projection, draw_null, score
-from .noise import COLOURS, Colour, Whitener
-from .records import Records
+from ..noise_colour.colours import COLOURS, Colour, Whitener
+from ..screen.blocks import Records
+from ..signatures.candidates import Candidate
+from ..signatures.signature_bank import Bank
+from .scores import Columns, Projection, draw_null, score
 
 __all__ = ["Found", "Search", "View"]
 

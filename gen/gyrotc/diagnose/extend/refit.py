@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Dataset, Run
-from ..frontend import blocks_since_power_on
-from ..metrics import Averages, average
-from ..terms import CATALOGUE, Scene, Term
-from ..terms.recursion import Course, Outcome
-from ..train import Fit, TrainingData, fit, predict
-from ..train.fitting import FrontEnd, samples_of
-from .refine import Refined
+from ...dataset import Dataset, Run
+from ...frontend import blocks_since_power_on
+from ...metrics import Averages, average
+from ...terms import CATALOGUE, Scene, Term
+from ...terms.recursion import Course, Outcome
+from ...train import Fit, TrainingData, fit, predict
+from ...train.fitting import FrontEnd, samples_of
+from ..attribute.refine import Refined
 
 __all__ = ["Effect", "Played", "fit_extended", "joined", "play_runs", "samples", "score"]
 

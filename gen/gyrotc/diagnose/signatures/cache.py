@@ -21,18 +21,29 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
-from ..inputs import read_input
-from ..outputs import write_atomically
-from .bank import Bank, Group, Other, build
-from .baseline import MapBasis
-from .catalogue import Candidate, diagnosed
-from .records import Records
+from ...errors import InputError
+from ...inputs import read_input
+from ...outputs import write_atomically
+from ..screen.blocks import Records
+from .candidates import Candidate, diagnosed
+from .signature_bank import Bank, Group, Other, build
+from .static_map import MapBasis
 
 __all__ = ["bank_of", "folder"]
 
 _VERSION = 3  # raised with every change of what a bank holds
 _MOST_BYTES = 2 * 2**30
+_MAKERS = (
+    "diagnose/screen/blocks",
+    "diagnose/noise_colour/colours",
+    "diagnose/signatures/alternatives",
+    "diagnose/signatures/candidates",
+    "diagnose/signatures/signature_bank",
+    "diagnose/signatures/static_map",
+    "terms/memory",
+    "terms/operators",
+    "terms/search",
+)  # modules that what a bank holds depends on, beside those of the causes
 _MAGIC = b"gyrotc bank\n"
 _SUM_BYTES = hashlib.sha256().digest_size
 _OWN = {(kind.__module__, kind.__qualname__): kind for kind in (Bank, Group, Other, MapBasis, Candidate)}
@@ -125,10 +136,8 @@ class _Reader(pickle.Unpickler):
 
 def _code() -> str:
     """Hash of the modules that make a bank, those of the causes among them: a new version makes new banks."""
-    here = Path(__file__).parent
-    makers = ("bank", "baseline", "catalogue", "noise", "others", "records")
-    shared = ("memory", "operators", "search")
-    names = [here / f"{n}.py" for n in makers] + [here.parent / "terms" / f"{n}.py" for n in shared]
+    package = Path(__file__).parents[2]
+    names = [package / f"{name}.py" for name in _MAKERS]
     names += [Path(inspect.getfile(t.features)) for t in diagnosed().values() if t.features is not None]
     return hashlib.sha256(b"".join(_content(name) for name in names)).hexdigest()
 

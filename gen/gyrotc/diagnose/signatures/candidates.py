@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE, Term
-from ..terms.base import History, Parameter, Values
-from ..terms.search import Reach, Search
-from .records import Records
+from ...terms import CATALOGUE, Term
+from ...terms.base import History, Parameter, Values
+from ...terms.search import Reach, Search
+from ..screen.blocks import Records
 
 __all__ = [
     "Candidate",

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms.base import History
-from ..terms.operators import first_order
-from .records import Records, centred_slope
+from ...terms.base import History
+from ...terms.operators import first_order
+from ..screen.blocks import Records, centred_slope
 
 __all__ = ["Shape", "shapes_of"]
 

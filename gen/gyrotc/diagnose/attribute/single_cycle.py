@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from .. import terms
-from ..terms.search import Reach, SingleCycle
-from .attribute import Attribution, Rival
-from .catalogue import Candidate, columns_of, diagnosed, searched, shape_parameter
-from .records import Records
+from ... import terms
+from ...terms.search import Reach, SingleCycle
+from ..screen.blocks import Records
+from ..signatures.candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
+from .attribution import Attribution, Rival
 from .refine import Interval, Refined
 
 __all__ = ["Cycle", "cycle_of", "is_single_cycle"]

@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Dataset
-from ..metrics import Averages
-from ..train import Fit, TrainingData
-from ..train.fitting import FitOptions, front_end
-from ..train.spans import training_spans
-from .attribute import choose
-from .cycle import cycle_of
+from ...dataset import Dataset
+from ...metrics import Averages
+from ...train import Fit, TrainingData
+from ...train.fitting import FitOptions, front_end
+from ...train.spans import training_spans
+from ..attribute.attribution import choose
+from ..attribute.refine import Refined
+from ..attribute.single_cycle import cycle_of
+from ..pipeline import search_of
+from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
-from .pipeline import search_of
-from .records import Records
-from .refine import Refined
-from .replay import Effect, Played, fit_extended, joined, play_runs, samples, score
+from .refit import Effect, Played, fit_extended, joined, play_runs, samples, score
 
 __all__ = ["Extension", "extend"]
 

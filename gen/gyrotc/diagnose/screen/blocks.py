@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs import need_memory
-from ..terms.base import History
+from ...inputs import need_memory
+from ...terms.base import History
 
 __all__ = ["Record", "Records", "centred_slope", "singled_out"]
 

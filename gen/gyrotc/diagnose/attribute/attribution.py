@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE
-from .catalogue import Candidate, searched
+from ...terms import CATALOGUE
+from ..detect.search import Found, Search
+from ..signatures.candidates import Candidate, searched
 from .contest import Contest, contest
-from .likelihood import Gains, Point
+from .gains import Gains, Point
 from .misfit import misfit
 from .refine import Refined, refine, taken
-from .search import Found, Search
 
 __all__ = ["Attribution", "Rival", "attribute", "choose"]
 

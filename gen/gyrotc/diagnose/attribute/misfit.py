@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
-from ..terms import CATALOGUE
-from .bank import direction_of
-from .detect import Projection, ratio_of
-from .noise import Whitener
+from ...terms import CATALOGUE
+from ..detect.scores import Projection, ratio_of
+from ..detect.search import Search, View
+from ..noise_colour.colours import Whitener
+from ..signatures.signature_bank import direction_of
 from .refine import Refined
-from .search import Search, View
 
 __all__ = ["misfit"]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .noise import COLOURS, Declared, Whitener
-from .records import centred_slope
-from .search import Search
+from ..detect.search import Search
+from ..noise_colour.colours import COLOURS, Declared, Whitener
+from ..screen.blocks import centred_slope
 
 __all__ = ["Discrepancy", "Ensemble", "compare"]
 

@@ -14,11 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .catalogue import Candidate, searched
-from .detect import variance_ratio_of
-from .noise import Whitener
-from .records import singled_out
-from .search import Search
+from ..detect.scores import variance_ratio_of
+from ..detect.search import Search
+from ..noise_colour.colours import Whitener
+from ..screen.blocks import singled_out
+from ..signatures.candidates import Candidate, searched
 
 __all__ = ["Gains", "Model", "Point"]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import Records, centred_slope
+from ..screen.blocks import Records, centred_slope
 
 __all__ = ["LEVELS", "MapBasis", "fine_columns", "make_basis"]
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import Averages, time_statistics
+from ...metrics import Averages, time_statistics
 
 __all__ = ["Gain", "floor_of", "gain_of"]
 
