@@ -17,7 +17,7 @@ from ..diagnose import Diagnosis
 from ..diagnose.attribute.attribution import Attribution
 from ..diagnose.attribute.refine import Refined
 from ..diagnose.attribute.single_cycle import Cycle
-from ..diagnose.detect.search import Found
+from ..diagnose.detect.detection import Found
 from ..diagnose.discrepancy.ensemble import Discrepancy, Ensemble
 from ..diagnose.screen.blocks import Records, centred_slope
 from ..diagnose.signatures.candidates import diagnosed

@@ -1,4 +1,4 @@
-"""Do the chosen causes hold their own against shapes that no cause has (`others`)?"""
+"""Do the chosen causes hold their own against shapes that no cause has (`alternatives`)?"""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from ...terms import CATALOGUE
 from ..detect.scores import ratio_of
+from ..orthonormal import orthonormal
 from ..signatures.candidates import searched
-from ..signatures.signature_bank import Other, proportional_map
+from ..signatures.changed_input import proportional_map
+from ..signatures.signature_bank import Alternative
 from .gains import Gains
 from .refine import Refined
 
@@ -40,38 +42,38 @@ def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[s
     have their parameters at the optimum, the others on their grid. A cause may stand back for one of its
     `rivals` (ids, for each cause): what matters is whether any causes do as well as the other shape.
     """
-    ring = _Ring(gains, causes)
+    models = _NestedModels(gains, causes)
     every = range(len(causes))
-    own = max(ring.criterion(every), *(ring.instead(k, ids) for k, ids in enumerate(rivals)))
+    own = max(models.criterion(every), *(models.instead(k, ids) for k, ids in enumerate(rivals)))
     local = any(CATALOGUE[c.candidate.id].kind == "static" for c in causes)
-    shapes = gains.search.bank.other_groups
+    shapes = gains.search.bank.alternative_groups
     found = []
     for count in every:
         for kept in itertools.combinations(every, count):
-            best = ring.strongest(kept, [s for s in shapes if not (local and s.common)])
-            found.append(Contest(best.name, ring.criterion(kept) + best.lead - own))
+            best = models.strongest(kept, [s for s in shapes if not (local and s.common)])
+            found.append(Contest(best.name, models.criterion(kept) + best.lead - own))
     if local:  # a map that a switch changes imitates a finer map of part of the range, so it has to add to it
-        found.append(ring.strongest(every, [s for s in shapes if s.common]))
-    found += [ring.bent(k) for k in every if causes[k].candidate.role == "input"]
+        found.append(models.strongest(every, [s for s in shapes if s.common]))
+    found += [models.bent(k) for k in every if causes[k].candidate.role == "input"]
     return max(found, key=lambda c: c.lead)
 
 
-class _Ring:
-    """Models made of some of the causes, by number."""
+class _NestedModels:
+    """Models made of some of the causes (by number), and what other shapes add to them."""
 
     def __init__(self, gains: Gains, causes: Sequence[Refined]) -> None:
         self.gains, self.causes = gains, causes
         self.y = gains.target
         self.price = float(np.log(gains.size))
-        self.always = [gains.dropped, *(gains.whiten(c.edges) for c in causes if c.edges is not None)]
+        self.always = [gains.beside, *(gains.whiten(c.edges) for c in causes if c.edges is not None)]
         self.white = [gains.whiten(c.columns) for c in causes]
-        self.others = gains.whiten(gains.search.bank.others)
+        self.others = gains.whiten(gains.search.bank.alternatives)
 
     def held(self, kept: Sequence[int]) -> Array:
         """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
         swapped = any(self.causes[k].candidate.role == "input" for k in kept)
         static = [] if swapped else [self.gains.map]
-        return _orthonormal([*self.always, *static, *(self.white[k] for k in kept)])
+        return orthonormal(*self.always, *static, *(self.white[k] for k in kept))
 
     def criterion(self, kept: Sequence[int]) -> float:
         """Of a set of causes; one with a common variance of many weights is weighed as such."""
@@ -96,7 +98,7 @@ class _Ring:
         energy = np.where(own, (rest.T @ self.y) ** 2 / np.where(own, power, 1.0), 0.0)
         return self.criterion(kept) + float(energy.max()) - self.price * max(searched(i).price for i in ids)
 
-    def strongest(self, kept: Sequence[int], shapes: Sequence[Other]) -> Contest:
+    def strongest(self, kept: Sequence[int], shapes: Sequence[Alternative]) -> Contest:
         """The other shape that adds most to a model."""
         held = self.held(kept)
         before = np.einsum("ij,ij->j", self.others, self.others)
@@ -121,18 +123,12 @@ class _Ring:
         plain = self.gains.whiten(proportional_map(records, basis, None))
         full = _energy(self.held(range(len(self.causes))), self.y)
         static = _energy(self.held(self._without(k)), self.y)
-        bend = full - _energy(_orthonormal([*self.always, moved, *beside]), self.y)
-        usual = static - _energy(_orthonormal([*self.always, plain, *beside]), self.y)
+        bend = full - _energy(orthonormal(*self.always, moved, *beside), self.y)
+        usual = static - _energy(orthonormal(*self.always, plain, *beside), self.y)
         return Contest(_BENT, bend - usual - max(_BEND, _BEND_SHARE * (full - static)))
 
     def _without(self, k: int) -> list[int]:
         return [i for i in range(len(self.causes)) if i != k]
-
-
-def _orthonormal(blocks: Sequence[Array]) -> Array:
-    q, r = np.linalg.qr(np.column_stack(blocks))
-    size = np.abs(np.diag(r))
-    return np.asarray(q[:, size > 1e-9 * size.max()])
 
 
 def _energy(held: Array, y: Array) -> float:
@@ -149,7 +145,7 @@ def _common(held: Array, columns: Array, y: Array) -> float:
     return float(ratio_of((left[:, keep].T @ y) ** 2, size[keep] ** 2)[0])
 
 
-def _gain(other: Other, columns: Array, a: Array, before: Array) -> float:
+def _gain(other: Alternative, columns: Array, a: Array, before: Array) -> float:
     """Twice the log-likelihood that one shape adds."""
     size, vectors = np.linalg.eigh(columns.T @ columns)
     keep = size > _OWN * float(before.max())

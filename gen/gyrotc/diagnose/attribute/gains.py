@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ..detect.scores import variance_ratio_of
 from ..detect.search import Search
-from ..noise_colour.colours import Whitener
+from ..noise_colour.whitener import Whitener
+from ..orthonormal import orthonormal
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, searched
 
@@ -60,7 +61,7 @@ class Gains:
 
     Attributes:
         target: Whitened data over the noise scale, shape (N,).
-        map, dropped: Whitened map functions and nuisance columns.
+        map, beside: Whitened map functions, and columns that are in every model beside them.
         whole: Whitened bank and channel columns, nothing projected out.
         size: Number of blocks.
     """
@@ -70,19 +71,19 @@ class Gains:
         view = search.likeliest
         self.scale = view.scale
         self.whiten = Whitener(view.colour, search.records.kept, search.records.block_s, search.sigma)
-        bank = search.bank
-        own = len(search.extra_candidates) - len(bank.inputs)
-        columns = np.column_stack([bank.signatures, search.extra[:, :own]])
-        taken = np.column_stack([bank.on_map, search.extra_on_map[:, :own]])
+        bank, joined = search.bank, search.joined
+        own = joined.channels.shape[1]
+        columns = np.column_stack([bank.signatures, joined.channels])
+        on_map = np.column_stack([bank.on_map, joined.on_map[:, :own]])
         self._columns = self.whiten(columns)
-        self.whole = self._columns + self.whiten(bank.map) @ taken
+        self.whole = self._columns + self.whiten(bank.map) @ on_map
         self.target = self.whiten(search.y) / self.scale
-        self.dropped = self.whiten(search.extra[:, len(search.extra_candidates) :])
+        self.beside = self.whiten(joined.beside)
         self.map = self.whiten(bank.map)
         self.size = search.y.size
         names: list[tuple[Candidate, slice]] = [(g.candidate, g.columns) for g in bank.groups]
         k = bank.signatures.shape[1]
-        names += [(search.extra_candidates[i], slice(k + i, k + i + 1)) for i in range(own)]
+        names += [(joined.added[i], slice(k + i, k + i + 1)) for i in range(own)]
         self.plain = [(c, s) for c, s in names if c.role == "columns"]
         self.random = [(c, s) for c, s in names if c.role == "variance"]
         self.base = self._project(None, self.map, None)
@@ -91,7 +92,7 @@ class Gains:
     @cached_property
     def map_q(self) -> Array:
         """Orthonormal columns of the whitened map."""
-        return np.asarray(np.linalg.qr(self.map)[0])
+        return orthonormal(self.map)
 
     def plain_columns(self, at: slice) -> Array:
         """Whitened bank columns with the map projected out."""
@@ -103,10 +104,7 @@ class Gains:
         i = self.search.bank.inputs.index(candidate)
         known = self.search.bank.known[i]
         design = self.whiten(self.search.bank.replaced[i])
-        if not known.all():
-            design = np.column_stack([design, self.whiten(singled_out(~known))])
-        q, r = np.linalg.qr(design)
-        q = q[:, np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max()]
+        q = orthonormal(design, *([] if known.all() else [self.whiten(singled_out(~known))]))
         return float(white @ white - ((q.T @ white) ** 2).sum())
 
     def bases(self) -> list[_Base]:
@@ -119,19 +117,17 @@ class Gains:
         return self._bases
 
     def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
-        blocks = [self.dropped]
+        blocks = [self.beside]
         if known is not None and not known.all():
             blocks.append(self.whiten(singled_out(~known)))
-        q, r = np.linalg.qr(np.column_stack([*blocks, design]))
-        size = np.abs(np.diag(r))
-        q = q[:, size > 1e-9 * size.max()]
+        q = orthonormal(*blocks, design)
         columns = self._columns if candidate is None else self.whole
         cross, c = q.T @ columns, q.T @ self.target
         energy = float(c @ c)
         gain = 0.0
         if candidate is not None:
-            p, _ = np.linalg.qr(np.column_stack([*blocks, self.map]))
-            gain = energy - float(((p.T @ self.target) ** 2).sum())
+            plain = orthonormal(*blocks, self.map)
+            gain = energy - float(((plain.T @ self.target) ** 2).sum())
         gram = (self._gram if candidate is None else self._whole_gram) - cross.T @ cross
         return _Base(candidate, gain, gram, columns.T @ self.target - cross.T @ c)
 

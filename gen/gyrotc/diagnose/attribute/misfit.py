@@ -15,28 +15,32 @@ from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
 from ...terms import CATALOGUE
+from ..detect.joined import Held
+from ..detect.project import project
 from ..detect.scores import Projection, ratio_of
-from ..detect.search import Search, View
-from ..noise_colour.colours import Whitener
+from ..detect.search import Search
+from ..detect.views import View
+from ..noise_colour.whitener import Whitener
+from ..orthonormal import main_directions, orthonormal
 from ..signatures.signature_bank import direction_of
 from .refine import Refined
 
 __all__ = ["misfit"]
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _DIRECTION_C = 3.0
+_MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
 _OWN = 1e-3  # share of a column that must be left after the model is projected out
 
 
-def misfit(current: Search, out: Index, causes: Sequence[Refined], gain: float) -> tuple[float, float]:
+def misfit(current: Search, held: Held, causes: Sequence[Refined], gain: float) -> tuple[float, float]:
     """p-value of what is left, and the share of the structure that the causes explain.
 
     Args:
         current: The search with the causes taken.
-        out: Columns of the model.
-        causes: They.
+        held: What the model holds: not the map where a cause replaces its input.
+        causes: The causes that were taken.
         gain: What they explain, twice the log-likelihood.
     """
     views = [current.likeliest]
@@ -46,7 +50,7 @@ def misfit(current: Search, out: Index, causes: Sequence[Refined], gain: float) 
     changed = _changed(current, causes)
     p_value, left = 1.0, 0.0
     for view in views:
-        found = [*_dictionary(current.project(view, out)), _changes(current, view, out, changed)]
+        found = [*_dictionary(project(current, view, held)), _changes(current, view, held, changed)]
         p_value = min([p_value, *(p for p, _ in found)])
         left = max([left, *(e for _, e in found)])
     return min(1.0, 3.0 * len(views) * p_value), gain / max(gain + left, 1e-300)
@@ -89,22 +93,20 @@ def _changed(current: Search, causes: Sequence[Refined]) -> Array:
     return np.column_stack(columns) if columns else np.zeros((records.size, 0))
 
 
-def _changes(current: Search, view: View, out: Index, changed: Array) -> tuple[float, float]:
+def _changes(current: Search, view: View, held: Held, changed: Array) -> tuple[float, float]:
     """p-value and energy of what changing amplitudes would explain."""
     if changed.shape[1] == 0:
         return 1.0, 0.0
     whiten = Whitener(view.colour, current.records.kept, current.records.block_s, current.sigma)
-    model = current.extra[:, len(current.extra_candidates) :]
-    if out[0] == 0:
+    model = current.joined.beside
+    if held != "beside":
         model = np.column_stack([current.bank.map, model])
-    q, r = np.linalg.qr(whiten(model))
-    q = q[:, np.abs(np.diag(r)) > 1e-8 * np.abs(np.diag(r)).max()]
+    q = orthonormal(whiten(model))
     white = whiten(np.column_stack([changed, current.y]))
     norm = np.linalg.norm(white[:, :-1], axis=0)
     rest = white - q @ (q.T @ white)
     use = np.linalg.norm(rest[:, :-1], axis=0) > _OWN * norm
-    left, size, _ = np.linalg.svd(rest[:, :-1][:, use] / norm[use], full_matrices=False)
-    left = left[:, size > 0.03 * size[:1]]
+    left = main_directions(rest[:, :-1][:, use] / norm[use], _MAIN)
     if left.shape[1] == 0:
         return 1.0, 0.0
     energy = float(((left.T @ rest[:, -1]) ** 2).sum()) / view.scale**2

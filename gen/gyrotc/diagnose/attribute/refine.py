@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,30 +10,22 @@ from numpy.typing import NDArray
 
 from ... import terms
 from ..detect.search import Search
+from ..orthonormal import orthonormal
+from ..quantiles import CHI2_95_ONE, NORMAL_95
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, columns_of, reach_of, searched, shape_parameter
-from ..signatures.signature_bank import replaced_map
+from ..signatures.changed_input import replaced_map
 from ..signatures.static_map import fine_columns
 from .gains import Gains
+from .intervals import Interval, parabola_top, profile_interval, random_size
 
-__all__ = ["Interval", "Refined", "refine", "taken"]
+__all__ = ["Refined", "model_columns", "refine"]
 
 Array = NDArray[np.float64]
 
 _ROUNDS = 2
-_HALF_95 = 3.84
 _STEP = 0.02  # relative step of the derivative to a parameter
-_NORMAL_95 = 1.96
 _FINEST_C = 1.25  # spacing of the map's local functions once it is named too coarse
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """A value with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -59,7 +51,7 @@ class Refined:
     profile: Array | None
 
 
-def taken(causes: Sequence[Refined]) -> Array:
+def model_columns(causes: Sequence[Refined]) -> Array:
     """All columns that stand in the model when the causes are named: theirs, their tangents, masked edges."""
     return np.column_stack([b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None])
 
@@ -93,7 +85,7 @@ class _Fit:
         held = [gains.whiten(edges)] + (
             [] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)]
         )
-        self.q = np.linalg.qr(np.column_stack(held))[0]
+        self.q = orthonormal(*held)
         y = gains.whiten(search.y) / gains.scale
         self.y = y - self.q @ (self.q.T @ y)
         self._cache: dict[tuple[str, tuple[tuple[str, float], ...], str | None], Array] = {}
@@ -108,9 +100,8 @@ class _Fit:
 
     def energy(self, members: list[Candidate]) -> float:
         """Energy of the data that the members explain beyond the map."""
-        q, r = np.linalg.qr(np.column_stack([self.white(m) for m in members]))
-        size = np.abs(np.diag(r))
-        return float(((q[:, size > 1e-9 * size.max()].T @ self.y) ** 2).sum())
+        q = orthonormal(*(self.white(m) for m in members))
+        return float(((q.T @ self.y) ** 2).sum())
 
 
 def _unseen_s(candidate: Candidate) -> float:
@@ -156,50 +147,20 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]
     width = _local_width(fit, members[k], here)
     low = -np.inf if parameter.signed else 0.05 * here
     for shrink in (1.0, 0.35):
-        here, curve = _parabola(energy, here, shrink * width, low)
-    half = float(np.sqrt(_HALF_95 / curve)) if curve > 0 else width
+        here, curve = parabola_top(energy, here, shrink * width, low)
+    half = float(np.sqrt(CHI2_95_ONE / curve)) if curve > 0 else width
     for sign in (-1.0, 1.0):
         for reach in (0.6, 1.0, 1.4, 2.2, 3.5, 6.0):
             value = here + sign * reach * half
-            if value <= low or energy(value) < energy(here) - 1.5 * _HALF_95:
+            if value <= low or energy(value) < energy(here) - 1.5 * CHI2_95_ONE:
                 break
     best = max(points, key=lambda v: points[v])
     return np.array(sorted(points.items())).T, best
 
 
-def _parabola(energy: Callable[[float], float], here: float, width: float, low: float) -> tuple[float, float]:
-    """One step to the top of a parabola through three points, and its curvature."""
-    left, right = max(here - width, 0.5 * (here + low) if np.isfinite(low) else here - width), here + width
-    x = np.array([left, here, right]) - here
-    c2, c1, _ = np.polyfit(x, [energy(left), energy(here), energy(right)], 2)
-    if c2 >= 0.0:
-        values = {v: energy(v) for v in (left, here, right)}
-        return max(values, key=lambda v: values[v]), 0.0
-    move = float(np.clip(-c1 / (2.0 * c2), x[0], x[2]))
-    energy(here + move)
-    return here + move, float(-c2)
-
-
 def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
     """About one point of the search's grid."""
     return searched(member.id).width(here, reach_of(fit.search.records).span_c)
-
-
-def _interval(profile: Array) -> tuple[float, float]:
-    """Where the profile has fallen by 3.84, linear between points; its ends where it has not."""
-    x, e = profile
-    top = int(e.argmax())
-    drop = e[top] - _HALF_95
-    low, high = float(x[0]), float(x[-1])
-    for i in range(top, 0, -1):
-        if e[i - 1] < drop:
-            low = float(np.interp(drop, [e[i - 1], e[i]], [x[i - 1], x[i]]))
-            break
-    for i in range(top, x.size - 1):
-        if e[i + 1] < drop:
-            high = float(np.interp(drop, [e[i + 1], e[i]], [x[i + 1], x[i]]))
-            break
-    return low, high
 
 
 def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile: Array | None) -> Refined:
@@ -222,7 +183,7 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
     parameters: dict[str, Interval] = {}
     parameter = shape_parameter(members[k].id)
     if parameter is not None and profile is not None:
-        low, high = _interval(profile)
+        low, high = profile_interval(profile)
         parameters[parameter.name] = Interval(members[k].values[parameter.name], low, high)
     tangents = [_tangent(search, m, None) if m is not members[k] else tangent for m in members]
     spread = _spread(fit, design, [t for t in tangents if t is not None], start, own.shape[1])
@@ -266,7 +227,7 @@ def _amplitudes(
     if candidate.role == "input" or term.kind == "static" or rule is None:
         return {}
     if term.kind == "random":
-        return {name: _random(weights, spread) for name in rule(weights)}
+        return {name: random_size(weights, spread) for name in rule(weights)}
     centre = rule(weights)
     out = {}
     for name, value in centre.items():
@@ -276,23 +237,8 @@ def _amplitudes(
             moved = weights.copy()
             moved[i] += step
             gradient[i] = (rule(moved)[name] - value) / step
-        half = _NORMAL_95 * float(np.sqrt(max(float(gradient @ spread @ gradient), 0.0)))
+        half = NORMAL_95 * float(np.sqrt(max(float(gradient @ spread @ gradient), 0.0)))
         out[name] = Interval(value, value - half, value + half)
     if candidate.channel is not None:
         out["reference"] = Interval(float(np.mean(columns)), float(np.mean(columns)), float(np.mean(columns)))
     return out
-
-
-def _random(weights: Array, spread: Array) -> Interval:
-    """Standard deviation of normal offsets from their estimates: chi-square limits, noise taken off."""
-    from scipy.stats import chi2
-
-    n = weights.size
-    centred = weights - weights.mean()
-    middle = np.eye(n) - 1.0 / n
-    noise = float(np.trace(np.asarray(middle @ spread @ middle))) / max(n - 1, 1)
-    raw = float(centred @ centred)
-    value = float(np.sqrt(max(raw / max(n - 1, 1) - noise, 0.0)))
-    low = float(np.sqrt(max(raw / chi2.ppf(0.975, max(n - 1, 1)) - noise, 0.0)))
-    high = float(np.sqrt(max(raw / chi2.ppf(0.025, max(n - 1, 1)) - noise, 0.0)))
-    return Interval(value, low, high)

@@ -11,30 +11,27 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ... import terms
-from ...terms.search import Reach, SingleCycle
+from ..quantiles import CHI2_95_ONE, NORMAL_95
 from ..screen.blocks import Records
-from ..signatures.candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
-from .attribution import Attribution, Rival
-from .refine import Interval, Refined
+from ..signatures.candidates import Candidate, columns_of
+from .attribution import Attribution
+from .cycle_fits import CycleFits, memories
+from .intervals import Interval
+from .refine import Refined
+from .rivals import EQUIVALENT, Rival
 
 __all__ = ["Cycle", "cycle_of", "is_single_cycle"]
 
 Array = NDArray[np.float64]
 
 _FEW_PASSES = 3  # of any temperature, in all runs together
-_GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
-_HALF_95 = 3.84
-_EQUIVALENT = 8.0
 _PRICE = 2  # parameters of a state: time constant (or width) and amplitude
-_APART = 0.7  # of the logarithms of the parameters of two states of one kind
-_MOST_ALIKE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -99,80 +96,6 @@ class Cycle:
         )
 
 
-class _Fits:
-    """Least squares of map and states; everything less what the map explains."""
-
-    def __init__(self, records: Records) -> None:
-        self.records = records
-        t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
-        nodes = np.linspace(t.min(), t.max(), _GAUSSIANS)
-        width = _WIDTH * (nodes[1] - nodes[0])
-        static = records.columns(
-            lambda h: np.column_stack(
-                [
-                    np.ones_like(h.temperature_c),
-                    h.temperature_c - t.mean(),
-                    np.exp(-(((h.temperature_c[:, None] - nodes) / width) ** 2)),
-                ]
-            )
-        )
-        self.static = np.linalg.qr(static / np.linalg.norm(static, axis=0))[0]
-        self.y = records.target()
-        self.rest = self._less_map(self.y)
-        longest_s = max(float(np.ptp(r.history.time_s[r.usable])) for r in records.runs)
-        self.reach = Reach(float(np.ptp(t)), longest_s)
-
-    def _less_map(self, x: Array) -> Array:
-        return np.asarray(x - self.static @ (self.static.T @ x))
-
-    @cached_property
-    def grid(self) -> dict[str, list[Candidate]]:
-        """States by kind, by ascending parameter."""
-        found = {}
-        for id, cycle in _memories().items():
-            parameter = shape_parameter(id)
-            assert parameter is not None
-            top = min(parameter.high, self.reach.most(parameter.unit))
-            values = np.geomspace(parameter.low, top, cycle.points)
-            found[id] = [Candidate(id, {parameter.name: float(v)}, "columns") for v in values]
-        return found
-
-    @cached_property
-    def columns(self) -> dict[str, Array]:
-        """Their columns less the map's part, unit norm, by kind, shape (N, count)."""
-        out = {}
-        for id, states in self.grid.items():
-            raw = np.column_stack([columns_of(self.records, id, c.values)[:, 0] for c in states])
-            rest = self._less_map(raw)
-            out[id] = rest / np.linalg.norm(rest, axis=0)
-        return out
-
-    def energies(self, kinds: tuple[str, ...]) -> Array:
-        """What every combination of one or two states explains, (deg/h)², shape (count, ...)."""
-        a = self.columns[kinds[0]].T @ self.rest
-        if len(kinds) == 1:
-            return np.asarray(a**2)
-        b = self.columns[kinds[1]].T @ self.rest
-        c = self.columns[kinds[0]].T @ self.columns[kinds[1]]
-        ok = np.abs(c) < _MOST_ALIKE
-        if kinds[0] == kinds[1]:
-            ok &= self._apart(kinds[0])
-        raw = a[:, None] ** 2 + b[None, :] ** 2 - 2.0 * c * a[:, None] * b[None, :]
-        out = np.where(ok, raw / np.where(ok, 1.0 - c**2, 1.0), 0.0)
-        return np.asarray(np.triu(out, 1) if kinds[0] == kinds[1] else out)
-
-    def _apart(self, kind: str) -> NDArray[np.bool_]:
-        """Which two states of a kind are far enough apart to be two, as in `attribute`."""
-        logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
-        return np.asarray(np.abs(logs[:, None] - logs[None, :]) > _APART)
-
-    def left(self, members: tuple[Candidate, ...]) -> Array:
-        """Residual of map and states."""
-        x = np.column_stack([self.columns[m.id][:, self.grid[m.id].index(m)] for m in members])
-        q = np.linalg.qr(x)[0]
-        return np.asarray(self.rest - q @ (q.T @ self.rest))
-
-
 def is_single_cycle(records: Records) -> bool:
     """Whether no temperature is passed more than three times: memory and dT/dt are then one in a map of both."""
     temperatures = [r.history.temperature_c[r.usable] for r in records.runs]
@@ -183,9 +106,9 @@ def is_single_cycle(records: Records) -> bool:
 
 def cycle_of(records: Records) -> Cycle:
     """Looks for one or two states in a single cycle."""
-    fits = _Fits(records)
-    memories = _memories()
-    kinds = [(k,) for k in memories] + list(itertools.combinations_with_replacement(memories, 2))
+    fits = CycleFits(records)
+    states = memories()
+    kinds = [(k,) for k in states] + list(itertools.combinations_with_replacement(states, 2))
     best = {k: _members(fits, k) for k in kinds}
     least = min((fits.left(m) for m in best.values()), key=lambda e: float(e @ e))
     effective = _effective_size(records, least)
@@ -193,7 +116,7 @@ def cycle_of(records: Records) -> Cycle:
     rms = float(np.sqrt(np.mean(fits.rest**2)))
     if tried[0].criterion >= 0.0:
         return Cycle(tried, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
-    near = [t for t in tried if t.criterion - tried[0].criterion <= _EQUIVALENT]
+    near = [t for t in tried if t.criterion - tried[0].criterion <= EQUIVALENT]
     chosen = next((t for t in near if not _rare(t)), tried[0])
     others = [t for t in near if t is not chosen and _rare(t) and not _rare(chosen)]
     rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
@@ -204,19 +127,13 @@ def cycle_of(records: Records) -> Cycle:
     return Cycle(tried, chosen, causes, rivals, rms, p_value, fits.rest, explained)
 
 
-def _memories() -> dict[str, SingleCycle]:
-    """Causes that are looked for in a single cycle."""
-    found = {id: searched(id).cycle for id in diagnosed()}
-    return {id: cycle for id, cycle in found.items() if cycle is not None}
-
-
 def _rare(tried: Tried) -> list[str]:
     """Kinds of a set that not every package has."""
-    memories = _memories()
-    return [kind for kind in tried.kinds if not memories[kind].usual]
+    states = memories()
+    return [kind for kind in tried.kinds if not states[kind].usual]
 
 
-def _members(fits: _Fits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:
+def _members(fits: CycleFits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:
     energy = fits.energies(kinds)
     at = np.unravel_index(int(energy.argmax()), energy.shape)
     return tuple(fits.grid[k][int(i)] for k, i in zip(kinds, at, strict=True))
@@ -230,7 +147,7 @@ def _effective_size(records: Records, residual: Array) -> float:
     return residual.size * (1.0 - rho) / (1.0 + rho)
 
 
-def _tried(fits: _Fits, members: tuple[Candidate, ...], effective: float) -> Tried:
+def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) -> Tried:
     kinds = tuple(m.id for m in members)
     total = float(fits.rest @ fits.rest)
     energy = fits.energies(kinds)
@@ -241,7 +158,7 @@ def _tried(fits: _Fits, members: tuple[Candidate, ...], effective: float) -> Tri
     intervals, resolved = [], True
     for axis, member in enumerate(members):
         profile = deviance.min(axis=tuple(k for k in range(deviance.ndim) if k != axis))
-        inside = np.flatnonzero(profile <= _HALF_95)
+        inside = np.flatnonzero(profile <= CHI2_95_ONE)
         resolved = resolved and bool(inside[0] > 0 and inside[-1] < profile.size - 1)
         name = next(iter(member.values))
         values = [c.values[name] for c in fits.grid[member.id]]
@@ -251,7 +168,7 @@ def _tried(fits: _Fits, members: tuple[Candidate, ...], effective: float) -> Tri
     return Tried(members, float(np.sqrt(left.min() / fits.rest.size)), criterion, tuple(intervals), resolved)
 
 
-def _refined(fits: _Fits, chosen: Tried, effective: float) -> Iterator[Refined]:
+def _refined(fits: CycleFits, chosen: Tried, effective: float) -> Iterator[Refined]:
     """The states with amplitudes, whose intervals hold at the states' best parameters."""
     raw = [columns_of(fits.records, m.id, m.values) for m in chosen.members]
     design = np.column_stack([fits.static, *raw])
@@ -263,7 +180,7 @@ def _refined(fits: _Fits, chosen: Tried, effective: float) -> Iterator[Refined]:
     for k, (member, interval) in enumerate(zip(chosen.members, chosen.intervals, strict=True)):
         rule = terms.CATALOGUE[member.id].amplitudes
         assert rule is not None
-        weight, half = float(weights[first + k]), 1.96 * float(spread[first + k])
+        weight, half = float(weights[first + k]), NORMAL_95 * float(spread[first + k])
         parameters = {next(iter(member.values)): interval}
         for name, value in rule(np.array([weight])).items():
             parameters[name] = Interval(value, value - half, value + half)

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from ..detect.project import project
 from ..detect.scores import draw_null, score
-from ..detect.search import Search, View
+from ..detect.search import Search
+from ..detect.views import View
 from ..noise_colour.colours import COLOURS, Declared
 
 __all__ = ["NoiseFinding", "noise_findings"]
@@ -75,9 +77,10 @@ def _described(search: Search) -> dict[str, float]:
 
 def _hidden(search: Search, view: View) -> list[NoiseFinding]:
     """Structure that stands out of the declared noise but not of the noise that the data may have."""
-    projection = search.project(replace(view, scale=1.0), search.base)
-    own = float(score(projection, search.columns, projection.a).joined().max())
-    null = np.sort(draw_null(projection, search.columns, _SEED))
+    projection = project(search, replace(view, scale=1.0), "map and beside")
+    columns = search.joined.columns
+    own = float(score(projection, columns, projection.a).joined().max())
+    null = np.sort(draw_null(projection, columns, _SEED))
     p = (null.size - np.searchsorted(null, own) + 1.0) / (null.size + 1.0)
     if p > _HIDDEN_P:
         return []

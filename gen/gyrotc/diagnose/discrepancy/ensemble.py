@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..detect.search import Search
-from ..noise_colour.colours import COLOURS, Declared, Whitener
+from ..noise_colour.colours import COLOURS, Declared
+from ..noise_colour.whitener import Whitener
+from ..orthonormal import orthonormal
 from ..screen.blocks import centred_slope
 
 __all__ = ["Discrepancy", "Ensemble", "compare"]
@@ -81,8 +83,7 @@ def compare(
     normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)
     both = np.column_stack([search.y, noise])
-    dropped = search.extra[:, len(search.extra_candidates) :]
-    model = _orthonormal(search.bank.map, dropped if beside is None else np.column_stack([dropped, beside]))
+    model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))
     both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
     found = []
@@ -92,16 +93,6 @@ def compare(
             found.append(_discrepancy(name, float(values[0]), values[1:]))
     found.sort(key=lambda d: d.p_value)
     return Ensemble(measured, simulated[:, :100], tuple(found))
-
-
-def _orthonormal(static: Array, beside: Array) -> Array:
-    """Orthonormal columns of the map and of what stands beside it."""
-    if beside.shape[1] == 0:
-        return static
-    rest = beside - static @ (static.T @ beside)
-    length = np.linalg.norm(beside, axis=0)
-    left, size, _ = np.linalg.svd(rest / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    return np.column_stack([static, left[:, size > 1e-6 * max(float(size[0]), 1e-300)]])
 
 
 def _discrepancy(name: str, measured: float, simulated: Array) -> Discrepancy:

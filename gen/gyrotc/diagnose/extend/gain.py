@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics import Averages, time_statistics
+from ..quantiles import MAD_TO_SIGMA
 
 __all__ = ["Gain", "floor_of", "gain_of"]
 
@@ -82,7 +83,7 @@ def floor_of(runs: Sequence[Averages]) -> float:
     """Noise floor from first differences of the averaged residuals without the far ones, deg/h."""
     steps = np.concatenate([np.diff(r.after_dph) for r in runs if r.after_dph.size > 1] or [np.zeros(1)])
     steps = steps - np.median(steps)
-    near = np.abs(steps) <= _FAR * 1.4826 * np.median(np.abs(steps))
+    near = np.abs(steps) <= _FAR * MAD_TO_SIGMA * np.median(np.abs(steps))
     return float(np.sqrt(np.mean(steps[near] ** 2) / 2.0))
 
 

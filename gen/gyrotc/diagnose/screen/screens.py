@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.ndimage import median_filter
 
+from ..orthonormal import orthonormal
+from ..quantiles import MAD_TO_SIGMA
 from .blocks import Records, centred_slope
 
 __all__ = ["Screened", "screen"]
@@ -81,7 +83,7 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
         if rate.size > 4 * _MEDIAN_ROWS:
             rest = np.abs(_detrended(rate))
             window = min(_SCALE_ROWS, rate.size // 2 * 2 - 1)
-            scale = 1.4826 * median_filter(rest, window, mode="reflect")
+            scale = MAD_TO_SIGMA * median_filter(rest, window, mode="reflect")
             far = rest > _OUTLIER * np.maximum(scale, 0.5 * float(rest.mean()))
             keep[np.flatnonzero(usable)[far]] = False
             found += int(far.sum())
@@ -119,14 +121,14 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Arr
     logs, x = np.log(value[usable_rows]), design[at[usable_rows]]
     if logs.size < 4 * x.shape[1]:
         return None, 1.0, 1.0
-    q, r = np.linalg.qr(x)
-    good = np.abs(np.diag(r)) > 1e-8 * abs(r[0, 0])
-    q = q[:, good]
-    weights = q.T @ logs
-    left = float(((logs - q @ weights) ** 2).sum())
-    freedom = logs.size - q.shape[1]
-    f = float((weights[1:] ** 2).sum()) / max(q.shape[1] - 1, 1) / (left / freedom)
-    p = float(stats.f.sf(f, max(q.shape[1] - 1, 1), freedom))
+    q = orthonormal((x - x.mean(axis=0))[:, 1:])
+    rank = max(q.shape[1], 1)
+    centred = logs - logs.mean()
+    weights = q.T @ centred
+    left = float(((centred - q @ weights) ** 2).sum())
+    freedom = logs.size - 1 - q.shape[1]
+    f = float((weights**2).sum()) / rank / (left / freedom)
+    p = float(stats.f.sf(f, rank, freedom))
     beta, *_ = np.linalg.lstsq(x, logs, rcond=1e-8)
     sigma = np.exp(0.5 * (design @ beta - np.median(design @ beta)))
     low, high = np.quantile(sigma, [0.025, 0.975])

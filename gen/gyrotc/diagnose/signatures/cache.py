@@ -26,18 +26,20 @@ from ...inputs import read_input
 from ...outputs import write_atomically
 from ..screen.blocks import Records
 from .candidates import Candidate, diagnosed
-from .signature_bank import Bank, Group, Other, build
+from .signature_bank import Alternative, Signature, SignatureBank, build
 from .static_map import MapBasis
 
 __all__ = ["bank_of", "folder"]
 
-_VERSION = 3  # raised with every change of what a bank holds
+_VERSION = 4  # raised with every change of what a bank holds
 _MOST_BYTES = 2 * 2**30
 _MAKERS = (
     "diagnose/screen/blocks",
     "diagnose/noise_colour/colours",
+    "diagnose/noise_colour/whitener",
     "diagnose/signatures/alternatives",
     "diagnose/signatures/candidates",
+    "diagnose/signatures/changed_input",
     "diagnose/signatures/signature_bank",
     "diagnose/signatures/static_map",
     "terms/memory",
@@ -46,7 +48,8 @@ _MAKERS = (
 )  # modules that what a bank holds depends on, beside those of the causes
 _MAGIC = b"gyrotc bank\n"
 _SUM_BYTES = hashlib.sha256().digest_size
-_OWN = {(kind.__module__, kind.__qualname__): kind for kind in (Bank, Group, Other, MapBasis, Candidate)}
+_CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
+_OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}
 _NUMPY = {
     ("numpy", "ndarray"),
     ("numpy", "dtype"),
@@ -62,7 +65,7 @@ def folder() -> Path:
     return (Path(root) if root else Path.home() / ".cache") / "gyrotc" / "banks"
 
 
-def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _: None) -> Bank:
+def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _: None) -> SignatureBank:
     """The bank of these temperature records, from disk or made and kept."""
     digest = hashlib.sha256(f"{_VERSION} {level} {_code()} {records.key()}".encode()).hexdigest()
     path = folder() / f"{digest}.bank"
@@ -87,7 +90,7 @@ def _own_folder() -> bool:
     return facts.st_uid == os.geteuid() and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _kept(path: Path) -> Bank | None:
+def _kept(path: Path) -> SignatureBank | None:
     """The bank in a file; None where there is none, or where the file is not as it was written (it is removed)."""
     if not path.is_file():
         return None
@@ -100,7 +103,7 @@ def _kept(path: Path) -> Bank | None:
         )
         if head == _MAGIC and hashlib.sha256(content).digest() == total:
             bank = _Reader(io.BytesIO(content)).load()
-            if isinstance(bank, Bank):
+            if isinstance(bank, SignatureBank):
                 path.touch()
                 return bank
     except (InputError, OSError):
@@ -112,7 +115,7 @@ def _kept(path: Path) -> Bank | None:
     return None
 
 
-def _keep(path: Path, bank: Bank) -> None:
+def _keep(path: Path, bank: SignatureBank) -> None:
     content = pickle.dumps(bank, protocol=5)
     try:
         write_atomically(path, _MAGIC + hashlib.sha256(content).digest() + content)

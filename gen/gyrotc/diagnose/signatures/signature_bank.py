@@ -10,15 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...terms import CATALOGUE
 from ...terms.operators import first_order, play
-from ..noise_colour.colours import COLOURS, Whitener
-from ..screen.blocks import Records, centred_slope
+from ..noise_colour.colours import COLOURS
+from ..noise_colour.whitener import Whitener
+from ..screen.blocks import Records
 from .alternatives import shapes_of
 from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
+from .changed_input import changed_inputs
 from .static_map import LEVELS, MapBasis, fine_columns, make_basis
 
-__all__ = ["Bank", "Group", "Other", "build", "direction_of", "proportional_map", "replaced_map"]
+__all__ = ["Alternative", "Signature", "SignatureBank", "build", "direction_of"]
 
 Array = NDArray[np.float64]
 
@@ -29,16 +30,16 @@ _SMALL = 1e-5  # a signature of which less than this share survives the map is n
 
 
 @dataclass(frozen=True)
-class Group:
-    """A candidate and where its columns lie in `Bank.signatures`."""
+class Signature:
+    """A candidate and where its columns lie in `SignatureBank.signatures`."""
 
     candidate: Candidate
     columns: slice
 
 
 @dataclass(frozen=True)
-class Other:
-    """A shape that no cause has (`others.Shape`) and where its columns lie in `Bank.others`."""
+class Alternative:
+    """A shape that no cause has (`alternatives.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
 
     name: str
     parameters: int
@@ -47,7 +48,7 @@ class Other:
 
 
 @dataclass(frozen=True)
-class Bank:
+class SignatureBank:
     """Everything of the search that does not depend on the rates.
 
     Attributes:
@@ -64,7 +65,8 @@ class Bank:
         log_dets: log det of each colour's covariance.
         untestable: Why a cause cannot be tested, by id.
         finer: Functions of the next finer map that this one lacks, shape (N, q).
-        others, other_groups: Shapes that no cause has, shape (N, Q), columns of norm 1 or groups of equal scale.
+        alternatives, alternative_groups: Shapes that no cause has, shape (N, Q), columns of norm 1 or groups of
+            equal scale.
     """
 
     basis: MapBasis
@@ -72,7 +74,7 @@ class Bank:
     signatures: Array
     scale: Array
     on_map: Array
-    groups: tuple[Group, ...]
+    groups: tuple[Signature, ...]
     inputs: tuple[Candidate, ...]
     replaced: Array
     known: NDArray[np.bool_]
@@ -81,16 +83,16 @@ class Bank:
     log_dets: Array
     untestable: dict[str, str]
     finer: Array
-    others: Array
-    other_groups: tuple[Other, ...]
+    alternatives: Array
+    alternative_groups: tuple[Alternative, ...]
 
-    def weighted(self, records: Records, sigma: Array) -> Bank:
+    def weighted(self, records: Records, sigma: Array) -> SignatureBank:
         """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
         grams, log_dets = _grams(records, self.map, self.signatures, sigma)
         return replace(self, grams=grams, log_dets=log_dets)
 
 
-def build(records: Records, level: int) -> Bank:
+def build(records: Records, level: int) -> SignatureBank:
     """Computes the bank of the map of a level (`baseline.LEVELS`)."""
     basis, static = make_basis(records, level)
     groups, columns, untestable = _columns(records)
@@ -102,12 +104,12 @@ def build(records: Records, level: int) -> Bank:
         if group.candidate.role == "variance":
             scale[group.columns] = scale[group.columns].max()
     signatures = rest / scale
-    inputs, replaced, known = _inputs(records, basis)
+    inputs, replaced, known = changed_inputs(records, basis)
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
     keep = size > _COMMON * size[0]
     grams, log_dets = _grams(records, static, signatures, None)
-    others, other_groups = _others(records)
-    return Bank(
+    alternatives, alternative_groups = _alternatives(records)
+    return SignatureBank(
         basis=basis,
         map=static,
         signatures=signatures,
@@ -122,12 +124,12 @@ def build(records: Records, level: int) -> Bank:
         log_dets=log_dets,
         untestable=untestable,
         finer=_finer(records, static, level),
-        others=others,
-        other_groups=other_groups,
+        alternatives=alternatives,
+        alternative_groups=alternative_groups,
     )
 
 
-def _others(records: Records) -> tuple[Array, tuple[Other, ...]]:
+def _alternatives(records: Records) -> tuple[Array, tuple[Alternative, ...]]:
     """Shapes that no cause has, side by side."""
     columns, groups = [], []
     at = 0
@@ -137,7 +139,7 @@ def _others(records: Records) -> tuple[Array, tuple[Other, ...]]:
             continue
         columns.append(shape.columns / (size.max() if shape.common else np.maximum(size, 1e-300)))
         end = at + columns[-1].shape[1]
-        groups.append(Other(shape.name, shape.parameters, shape.common, slice(at, end)))
+        groups.append(Alternative(shape.name, shape.parameters, shape.common, slice(at, end)))
         at = end
     return np.column_stack(columns), tuple(groups)
 
@@ -163,17 +165,17 @@ def _finer(records: Records, static: Array, level: int) -> Array:
     return np.asarray(left[:, size > 0.1])
 
 
-def _columns(records: Records) -> tuple[list[Group], list[Array], dict[str, str]]:
+def _columns(records: Records) -> tuple[list[Signature], list[Array], dict[str, str]]:
     """Columns of every candidate that adds columns, and of the dictionary of the lack-of-fit test."""
     reach = reach_of(records)
-    groups: list[Group] = []
+    groups: list[Signature] = []
     columns: list[Array] = []
     untestable: dict[str, str] = {}
     at = 0
 
     def add(candidate: Candidate, block: Array) -> None:
         nonlocal at
-        groups.append(Group(candidate, slice(at, at + block.shape[1])))
+        groups.append(Signature(candidate, slice(at, at + block.shape[1])))
         columns.append(block)
         at += block.shape[1]
 
@@ -224,48 +226,3 @@ def _late(records: Records, tau_s: float) -> Array:
 def direction_of(records: Records, width_c: float) -> Array:
     """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
     return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])
-
-
-def _inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], Array, NDArray[np.bool_]]:
-    """Map of the changed inputs for every candidate of kind "input"."""
-    reach = reach_of(records)
-    candidates, maps, knowns = [], [], []
-    for cause in (i for i, term in diagnosed().items() if term.kind == "input"):
-        for values in searched(cause).grid(reach):
-            candidates.append(Candidate(cause, dict(values), "input"))
-            block, known = replaced_map(records, basis, candidates[-1])
-            maps.append(block)
-            knowns.append(known)
-    return candidates, np.array(maps), np.array(knowns)
-
-
-def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[Array, NDArray[np.bool_]]:
-    """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
-    seen = _moved_inputs(records, candidate)
-    maps = [records.average_run(k, basis(t, slope)) for k, (t, slope, _) in enumerate(seen)]
-    return np.concatenate(maps), np.concatenate([known for _, _, known in seen])
-
-
-def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | None) -> Array:
-    """Block means of `MapBasis.proportional` of changed inputs (None: of the plain ones), shape (N, k)."""
-    if candidate is None:
-        seen = [(run.history.temperature_c, centred_slope(run.history)) for run in records.runs]
-    else:
-        seen = [(t, slope) for t, slope, _ in _moved_inputs(records, candidate)]
-    return records.average([basis.proportional(t, slope) for t, slope in seen])
-
-
-def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
-    """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
-    features = CATALOGUE[candidate.id].features
-    assert features is not None
-    out = []
-    for k, run in enumerate(records.runs):
-        seen = features(run.history, candidate.values)
-        temperature, slope = seen.columns[:, 0], seen.columns[:, 1]
-        known = np.ones(records.kept[k].size, dtype=bool)
-        if CATALOGUE[candidate.id].unseen_s is not None:
-            slope = centred_slope(replace(run.history, temperature_c=temperature))
-            known = records.average_run(k, seen.known.astype(float)) > 0.999
-        out.append((temperature, slope, known))
-    return out
