@@ -17,10 +17,10 @@ from gyrotc.diagnose import diagnose
 from gyrotc.diagnose.detect.project import project
 from gyrotc.diagnose.detect.scores import _root
 from gyrotc.diagnose.detect.search import open_search
-from gyrotc.diagnose.noise_colour.colours import Declared
+from gyrotc.diagnose.noise_colour.colours import Declared, declared_noise
 from gyrotc.diagnose.pipeline import Analysis, analyse
 from gyrotc.diagnose.screen.blocks import Record, Records
-from gyrotc.diagnose.screen.gather import declared_noise, records_of
+from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.diagnose.verdict import verdict_of
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,9 +17,12 @@ from gyrotc.diagnose.signatures.candidates import (
     diagnosed,
     reach_of,
     searched,
+)
+from gyrotc.diagnose.signatures.candidates import (
     testable as reason_against,
 )
 from gyrotc.diagnose.signatures.changed_input import proportional_map, replaced_map
+from gyrotc.diagnose.signatures.signature_bank import direction_of
 from gyrotc.diagnose.signatures.static_map import LEVELS, fine_columns, make_basis
 from gyrotc.terms.base import History
 from gyrotc.terms.operators import first_order
@@ -71,6 +74,19 @@ def test_signatures_are_columns_less_what_the_map_explains(campaign: Campaign) -
         ]
         assert again == pytest.approx(raw, abs=1e-9 * np.abs(raw).max())
     assert np.abs(bank.map.T @ bank.signatures).max() < 1e-6
+
+
+def test_the_direction_is_that_of_the_last_change(campaign: Campaign) -> None:
+    """A play of 3 C stands 3 C behind: below T after warming, above it after cooling."""
+    direction = direction_of(campaign.records, 3.0)[:, 0]
+    slope = campaign.records.average([centred_slope(r.history) for r in campaign.records.runs])
+    start = campaign.records.spans()[0].start
+    for k in range(start + 12, start + 140):
+        steady = slope[k - 10 : k + 2]
+        if steady.min() > 0.5:
+            assert direction[k] == pytest.approx(-3.0, abs=1e-9)
+        elif steady.max() < -0.5:
+            assert direction[k] == pytest.approx(3.0, abs=1e-9)
 
 
 def test_the_banks_inner_products_are_those_of_whitened_columns(campaign: Campaign) -> None:

@@ -23,8 +23,9 @@ from .detect.detection_limits import Limit
 from .discrepancy.declared_noise import NoiseFinding
 from .extend.extension import Extension, extend
 from .extend.gain import Gain
+from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
-from .screen.gather import declared_noise, records_of
+from .screen.gather import records_of
 from .signatures.candidates import diagnosed
 from .verdict import holds, verdict_of
 from .words import NOISE_WORDS

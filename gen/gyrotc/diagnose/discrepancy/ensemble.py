@@ -23,9 +23,10 @@ __all__ = ["Discrepancy", "Ensemble", "compare"]
 
 Array = NDArray[np.float64]
 
-_MEMBERS = 499
+_MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
 _SLOW_S = 1800.0
+_ROUNDING = 1e-9  # share of the residuals' RMS below which a statistic is made of rounding errors
 
 
 @dataclass(frozen=True)
@@ -86,20 +87,24 @@ def compare(
     model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))
     both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
+    rounding = _ROUNDING * float(np.sqrt((both**2).mean()))
     found = []
     for name, statistic in _statistics(search).items():
         values = statistic(both)
         if np.all(np.isfinite(values)):
-            found.append(_discrepancy(name, float(values[0]), values[1:]))
+            found.append(_discrepancy(name, float(values[0]), values[1:], rounding))
     found.sort(key=lambda d: d.p_value)
     return Ensemble(measured, simulated[:, :100], tuple(found))
 
 
-def _discrepancy(name: str, measured: float, simulated: Array) -> Discrepancy:
+def _discrepancy(name: str, measured: float, simulated: Array, rounding: float) -> Discrepancy:
+    """The rank of the measured value; where the model takes a statistic away wholly, none is rare."""
     n = simulated.size
     above = float(np.count_nonzero(simulated >= measured))
     below = float(np.count_nonzero(simulated <= measured))
     p = min(1.0, 2.0 * (min(above, below) + 1.0) / (n + 1.0))
+    if max(abs(measured), float(np.abs(simulated).max())) <= rounding:
+        p = 1.0
     low, high = np.quantile(simulated, [0.025, 0.975])
     return Discrepancy(name, measured, float(simulated.mean()), float(low), float(high), p)
 

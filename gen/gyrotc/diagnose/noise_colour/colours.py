@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COLOURS", "Colour", "Declared", "flicker_row", "markov_row"]
+from ...dataset import Dataset
+
+__all__ = ["COLOURS", "Colour", "Declared", "declared_noise", "flicker_row", "markov_row"]
 
 Array = NDArray[np.float64]
 
@@ -109,3 +111,16 @@ class Declared:
             walk=self.rate_random_walk_dph_per_sqrt_h**2,
             quantum=(self.quantum_arcsec / block_s) ** 2 / 12.0,
         )
+
+
+def declared_noise(dataset: Dataset) -> Declared | None:
+    """Declared noise with a white part; without one there is nothing to compare with."""
+    noise = dataset.noise
+    if noise is None or not noise.arw_deg_per_sqrt_h:
+        return None
+    return Declared(
+        noise.arw_deg_per_sqrt_h,
+        noise.bias_instability_dph or 0.0,
+        noise.rate_random_walk_dph_per_sqrt_h or 0.0,
+        noise.quantum_arcsec or 0.0,
+    )

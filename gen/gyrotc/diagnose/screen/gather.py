@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ...dataset import Dataset, Rows, Run
 from ...errors import InputError
 from ...terms.base import History
-from ..noise_colour.colours import Declared
 from .blocks import Record, Records
 
-__all__ = ["block_length", "declared_noise", "records_of"]
+__all__ = ["block_length", "records_of"]
 
 Array = NDArray[np.float64]
 
@@ -102,16 +101,3 @@ def _bridged(time_s: Array, values: Array) -> Array:
     if not good.any():
         return np.zeros_like(values)
     return np.interp(time_s, time_s[good], values[good])
-
-
-def declared_noise(dataset: Dataset) -> Declared | None:
-    """Declared noise with a white part; without one there is nothing to compare with."""
-    noise = dataset.noise
-    if noise is None or not noise.arw_deg_per_sqrt_h:
-        return None
-    return Declared(
-        noise.arw_deg_per_sqrt_h,
-        noise.bias_instability_dph or 0.0,
-        noise.rate_random_walk_dph_per_sqrt_h or 0.0,
-        noise.quantum_arcsec or 0.0,
-    )
