@@ -28,10 +28,10 @@ __all__ = ["Attribution", "attribute", "choose"]
 
 Array = NDArray[np.float64]
 
-_LEVEL = 0.01
+_LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
 _WELL = 0.08  # p-value of what is left that a pair must reach,
 _NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
-_MISFIT = 0.01
+_MISFIT = 0.01  # p-value of what is left below which further causes are looked for: as for the first one
 
 
 @dataclass(frozen=True)

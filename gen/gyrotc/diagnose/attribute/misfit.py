@@ -29,7 +29,9 @@ __all__ = ["misfit"]
 
 Array = NDArray[np.float64]
 
-_DIRECTION_C = 3.0
+_DIRECTION_C = (
+    3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
+)
 _MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
 _OWN = 1e-3  # share of a column that must be left after the model is projected out
 

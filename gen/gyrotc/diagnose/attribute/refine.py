@@ -23,7 +23,7 @@ __all__ = ["Refined", "model_columns", "refine"]
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 2
+_ROUNDS = 2  # several parameters are moved one after the other, twice
 _STEP = 0.02  # relative step of the derivative to a parameter
 _FINEST_C = 1.25  # spacing of the map's local functions once it is named too coarse
 

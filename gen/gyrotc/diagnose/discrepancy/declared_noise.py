@@ -15,11 +15,11 @@ from ..noise_colour.colours import COLOURS, Declared
 
 __all__ = ["NoiseFinding", "noise_findings"]
 
-_LEVEL_P = 1e-3
+_LEVEL_P = 1e-3  # one in a thousand campaigns with noise as declared is told to have another level
 _LEVEL_RATIO = 0.06  # a level that differs by less is as declared
 _COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour and the declared one
-_HIDDEN_P = 0.003
-_SEED = 20140917
+_HIDDEN_P = 0.003  # a third of the 1 % of the search: level and colour are tested beside it
+_SEED = 20140917  # any: it fixes the draws, so that a diagnosis repeats to the last digit
 
 
 @dataclass(frozen=True)

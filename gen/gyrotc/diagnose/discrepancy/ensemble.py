@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
-_SLOW_S = 1800.0
+_SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
 _ROUNDING = 1e-9  # share of the residuals' RMS below which a statistic is made of rounding errors
 
 
@@ -71,7 +71,7 @@ def compare(
         declared: Noise of the plain simulation; None: white, of the estimated level.
         beside: Columns that the extended simulation has beside the map, shape (N, k).
         estimated: Whether the simulated noise is that which the search estimates (the declared one is refuted).
-        seed: Of the ensemble.
+        seed: Fixes the draws of the ensemble.
     """
     records = search.records
     if estimated:

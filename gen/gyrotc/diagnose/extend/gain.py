@@ -21,10 +21,10 @@ __all__ = ["Gain", "floor_of", "gain_of"]
 
 Array = NDArray[np.float64]
 
-_PIECE_S = 1800.0
-_FEWEST_PIECES = 12
-_HOUR_S = 3600.0
-_DRAWS = 1000
+_PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
+_FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
+_HOUR_S = 3600.0  # the angle after one hour is a figure of merit
+_DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
 _FAR = 4.0  # robust standard deviations, beyond which a difference says nothing about the floor
 
 

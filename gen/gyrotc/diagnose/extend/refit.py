@@ -23,7 +23,7 @@ __all__ = ["Effect", "Played", "fit_extended", "joined", "play_runs", "samples",
 
 Array = NDArray[np.float64]
 
-_RE_ZERO_S = 600.0
+_RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 _FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 
 

@@ -27,7 +27,7 @@ Chain = list[list[Averages]]
 """Residuals of the scored runs for every set of causes, from none to all."""
 
 FEW_RUNS = 3  # fewer cannot be left out whole: two thirds must remain to learn from
-_FOLDS = 3
+_FOLDS = 3  # two thirds remain to learn from, at the cost of three fits
 _ROUNDING_S = 1e-6  # of times that are compared
 
 

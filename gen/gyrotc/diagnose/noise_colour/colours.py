@@ -19,7 +19,7 @@ __all__ = ["COLOURS", "Colour", "Declared", "declared_noise", "flicker_row", "ma
 
 Array = NDArray[np.float64]
 
-_FLICKER_S = tuple(100.0 * 4.0**k for k in range(6))
+_FLICKER_S = tuple(100.0 * 4.0**k for k in range(6))  # s, from one block to a day
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,13 +22,15 @@ __all__ = ["Screened", "screen"]
 
 Array = NDArray[np.float64]
 
-_MEDIAN_ROWS = 15
-_SCALE_ROWS = 241
+_MEDIAN_ROWS = (
+    15  # odd; a median over 15 rows follows a ramp; up to seven outliers in a row do not carry it away
+)
+_SCALE_ROWS = 241  # odd; 40 minutes at 10 s: the scale of the noise is known to 8 % and follows a ramp
 _OUTLIER = 4.5  # robust standard deviations
-_P_OUTLIERS, _MANY = 1e-7, 8
-_P_VARIANCE = 1e-4
+_P_OUTLIERS, _MANY = 1e-7, 8  # eight or more, and hardly by chance: single ones are left out in silence
+_P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is told: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
-_KNOTS = 4
+_KNOTS = 4  # hats over the temperature: the variance is a slow function of it
 
 
 @dataclass(frozen=True)

@@ -22,15 +22,15 @@ __all__ = ["Shape", "shapes_of"]
 
 Array = NDArray[np.float64]
 
-_TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))
+_TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))  # a factor 1.6 apart: memories nearer than that are alike
 _EDGES = (0.6, 1.3)  # thresholds, in standard deviations of T − z
-_QUICK_S = tuple(np.geomspace(120.0, 1500.0, 7))
-_SLOWER = (3.0, 7.0)
-_PERIODS_C = (12.0, 18.0, 26.0, 36.0, 50.0)
-_MODULATING_S = (300.0, 700.0, 1500.0)
+_QUICK_S = tuple(np.geomspace(120.0, 1500.0, 7))  # time constant of the quicker direction
+_SLOWER = (3.0, 7.0)  # by which factor the other direction is slower
+_PERIODS_C = (12.0, 18.0, 26.0, 36.0, 50.0)  # a factor 1.4 apart
+_MODULATING_S = (300.0, 700.0, 1500.0)  # time constants of memories whose strength changes
 _SWITCH_C, _GAPS_C = 6.0, (10.0, 20.0)  # steps of the upper threshold; width between the thresholds
-_HAT_C = 3.5
-_GRAINS_S = (100.0, 300.0, 1000.0)
+_HAT_C = 3.5  # width of the local functions of a map that a switch changes
+_GRAINS_S = (100.0, 300.0, 1000.0)  # times after which creep becomes logarithmic
 _TURNING = 0.05  # C/min that count as moving
 
 

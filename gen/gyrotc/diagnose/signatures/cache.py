@@ -32,7 +32,7 @@ from .static_map import MapBasis
 __all__ = ["bank_of", "folder"]
 
 _VERSION = 4  # raised with every change of what a bank holds
-_MOST_BYTES = 2 * 2**30
+_MOST_BYTES = 2 * 2**30  # some dozens of banks
 _MAKERS = (
     "diagnose/screen/blocks",
     "diagnose/noise_colour/colours",

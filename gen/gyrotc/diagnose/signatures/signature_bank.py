@@ -23,7 +23,14 @@ __all__ = ["Alternative", "Signature", "SignatureBank", "build", "direction_of"]
 
 Array = NDArray[np.float64]
 
-_DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
+_DICTIONARY_LAGS_S = (
+    150.0,
+    400.0,
+    1000.0,
+    2500.0,
+    6000.0,
+)  # a factor 2.5 apart, over what a day of recordings shows
+# Of the texture; of the play that tells the direction; of its memory.
 _TEXTURE_C, _DIRECTION_C, _MODULATING_S = 8.0, 3.0, 700.0
 _COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
 _SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
