@@ -12,9 +12,10 @@ from typing import Any
 import gyrotc.pages.report as pages
 import numpy as np
 from gyrotc.dataset import load
-from gyrotc.diagnose import cache, diagnose
-from gyrotc.diagnose.bank import build
-from gyrotc.diagnose.recordings import records_of
+from gyrotc.diagnose import diagnose
+from gyrotc.diagnose.screen.gather import records_of
+from gyrotc.diagnose.signatures import cache
+from gyrotc.diagnose.signatures.signature_bank import build
 from gyrotc.emit.files import emit
 from gyrotc.emit.files.record import RECORD, read_options
 from gyrotc.errors import InputError

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.cycle import cycle_of, is_single_cycle
-from gyrotc.diagnose.recordings import records_of
-from gyrotc.diagnose.records import Records
+from gyrotc.diagnose.attribute.single_cycle import cycle_of, is_single_cycle
+from gyrotc.diagnose.screen.blocks import Records
+from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.terms.operators import first_order
 from gyrotc.train.fitting import FitOptions
 

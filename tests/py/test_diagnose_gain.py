@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.gain import floor_of, gain_of
+from gyrotc.diagnose.extend.gain import floor_of, gain_of
 from gyrotc.metrics import Averages
 
 HOURS, AVERAGE_S = 24, 100.0

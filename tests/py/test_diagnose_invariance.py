@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.detect import _root
-from gyrotc.diagnose.noise import Declared
+from gyrotc.diagnose.detect.project import project
+from gyrotc.diagnose.detect.scores import _root
+from gyrotc.diagnose.detect.search import open_search
+from gyrotc.diagnose.noise_colour.colours import Declared, declared_noise
 from gyrotc.diagnose.pipeline import Analysis, analyse
-from gyrotc.diagnose.recordings import declared_noise, records_of
-from gyrotc.diagnose.records import Record, Records
+from gyrotc.diagnose.screen.blocks import Record, Records
+from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.diagnose.verdict import verdict_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +45,7 @@ class Answer:
 def answer(records: Records, declared: Declared | None) -> Answer:
     found = analyse(records, declared)
     causes = [c.candidate.id for c in found.attribution.causes]
-    return Answer(verdict_of(found.attribution, found.noise, []), causes, found)
+    return Answer(verdict_of(found.attribution, found.noise), causes, found)
 
 
 @dataclass(frozen=True)
@@ -146,18 +148,18 @@ def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
 ) -> None:
     search = made("hysteresis").answer.analysis.search
     weights = np.random.default_rng(4).normal(size=search.bank.map.shape[1]) * 0.01
-    moved = type(search)(
+    moved = open_search(
         search.records,
         search.bank,
         search.y + search.bank.map @ weights,
-        search._given,
-        search._nuisance,
-        search.sigma,
-        search.declared,
+        channels=search.channels,
+        beside=search.beside,
+        sigma=search.sigma,
+        declared=search.declared,
     )
-    inside = slice(search.n_map, search.n_map + search.n_bank)
+    inside = search.joined.layout.signatures
     for was, now in zip(search.views.values(), moved.views.values(), strict=True):
-        a, b = (s.project(v, s.base).a[inside] * v.scale for s, v in ((search, was), (moved, now)))
+        a, b = (project(s, v, "map and beside").a[inside] * v.scale for s, v in ((search, was), (moved, now)))
         assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gyrotc.dataset import Rows, Run, load
 from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.replay import Effect, Played, play_runs, samples
+from gyrotc.diagnose.extend.refit import Effect, Played, play_runs, samples
 from gyrotc.frontend import missed_before
 from gyrotc.model import Model
 from gyrotc.quantise import quantise

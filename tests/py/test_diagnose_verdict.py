@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gyrotc.commands.diagnosis_lines import diagnosis_lines
 from gyrotc.diagnose.advice import VERDICTS, next_steps
-from gyrotc.diagnose.levels import NoiseFinding
+from gyrotc.diagnose.discrepancy.declared_noise import NoiseFinding
 from gyrotc.diagnose.verdict import verdict_of
 
 NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]

@@ -17,8 +17,8 @@ import pytest
 from conftest import Command
 from gyrotc import inputs
 from gyrotc.dataset import load
-from gyrotc.diagnose import cache
-from gyrotc.diagnose.recordings import records_of
+from gyrotc.diagnose.screen.gather import records_of
+from gyrotc.diagnose.signatures import cache
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
 from gyrotc.inputs.stored import checked_result, read_result

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..terms import CATALOGUE
-from .attribute import Attribution, attribute
-from .bank import Bank
-from .cache import bank_of
-from .catalogue import Candidate, columns_of, diagnosed, searched
-from .compare import Ensemble, compare
-from .levels import NoiseFinding, noise_findings
-from .likelihood import Gains
-from .limits import Limit, detection_limits, overlap
-from .noise import Declared
-from .records import Records
-from .refine import taken
-from .screen import Screened, cleaned, screen
-from .search import Search
+from .attribute.attribution import Attribution, attribute
+from .attribute.gains import Gains
+from .attribute.overlap import overlap
+from .attribute.refine import model_columns
+from .detect.detection_limits import Limit, detection_limits
+from .detect.joined import Channels
+from .detect.search import Search, open_search
+from .discrepancy.declared_noise import NoiseFinding, noise_findings
+from .discrepancy.ensemble import Ensemble, compare
+from .noise_colour.colours import Declared
+from .orthonormal import main_directions, orthonormal
+from .screen.blocks import Records
+from .screen.screens import Screened, cleaned, screen
+from .signatures.cache import bank_of
+from .signatures.candidates import Candidate, columns_of, diagnosed, searched
 from .words import NOISE_WORDS
 
 __all__ = ["Analysis", "analyse", "search_of"]
@@ -29,7 +31,11 @@ __all__ = ["Analysis", "analyse", "search_of"]
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-_FINER_P = 1e-3
+_FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
+_MAIN = (
+    0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
+)
+_STILL = 1e-9  # change of a channel, of its size, that is rounding
 _HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
 
 
@@ -68,7 +74,7 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
     say("screening")
     screened = screen(records)
     search = search_of(records, declared, screened, say)
-    search.cautious = bool(noise_findings(search, declared, causes=True))
+    search = replace(search, cautious=bool(noise_findings(search, declared, causes=True)))
     say("searching for causes")
     attribution = attribute(search)
     say("comparing with the simulation")
@@ -78,7 +84,7 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
     ] + noise_findings(after, declared, causes=bool(attribution.causes) or attribution.detected)
     gains = Gains(search) if attribution.causes else None
     separations = tuple(
-        overlap(gains, cause, _others(cause.candidate.id)) if gains is not None else {}
+        overlap(gains, cause, _imitators(cause.candidate.id)) if gains is not None else {}
         for cause in attribution.causes
     )
     return Analysis(
@@ -102,11 +108,11 @@ def _extended(
     refuted = any(n.id in ("noise_level", "noise_colour") for n in noise)
     if not attribution.causes and not refuted:
         return None
-    beside = taken(attribution.causes) if attribution.causes else None
+    beside = model_columns(attribution.causes) if attribution.causes else None
     return compare(after, declared, beside=beside, estimated=refuted)
 
 
-def _others(cause: str) -> list[str]:
+def _imitators(cause: str) -> list[str]:
     return [id for id in diagnosed() if searched(id).imitates and id != cause]
 
 
@@ -120,27 +126,29 @@ def search_of(
     """The search with the coarsest map that the data do not reject."""
     checked = screen(records) if screened is None else screened
     y, empty = cleaned(records, checked)
-    nuisance = np.eye(records.size)[:, empty] if empty.size else None
+    left_out = np.eye(records.size)[:, empty] if empty.size else None
+    channels = _channels(records)
     levels: Sequence[int] = range(_HIGHEST_LEVEL + 1) if level is None else [level]
     for at in levels:
         bank = bank_of(records, at, say)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
-        extras = _channels(records)
         colour = declared.colour(records.block_s) if declared else None
-        search = Search(records, bank, y, extras, nuisance, checked.sigma, colour)
+        search = open_search(
+            records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour
+        )
         if at == levels[-1] or not needs_finer(search):
             break
     return search
 
 
-def _channels(records: Records) -> tuple[Array, list[Candidate]] | None:
+def _channels(records: Records) -> Channels | None:
     """Columns of the auxiliary channels that vary."""
     names = sorted(set.intersection(*(set(r.channels) for r in records.runs)))
     columns, candidates = [], []
     for name in names:
         column = records.average([r.channels[name] for r in records.runs])
-        if np.ptp(column) > 1e-9 * (1.0 + np.abs(column).max()):
+        if np.ptp(column) > _STILL * (1.0 + np.abs(column).max()):
             for cause in (id for id, term in diagnosed().items() if term.needs.channel):
                 columns.append(column - column.mean())
                 candidates.append(Candidate(cause, {}, "columns", name))
@@ -152,8 +160,7 @@ def needs_finer(search: Search) -> bool:
     from scipy.stats import chi2
 
     gains = Gains(search)
-    bank: Bank = search.bank
-    finer = gains.whiten(bank.finer)
+    finer = gains.whiten(search.bank.finer)
     added = [p for p in gains.added() if p.members[0].role == "columns"]
     of_map = [p for p in added if _of_map(p.members[0])]
     waves = []
@@ -165,11 +172,10 @@ def needs_finer(search: Search) -> bool:
         + [gains.plain_columns(s) for c, s in gains.random if not _of_map(c)]
         + waves
     )
-    left, size, _ = np.linalg.svd(memory, full_matrices=False)
-    held = np.linalg.qr(np.column_stack([gains.map_q, left[:, size > 0.05 * size[0]]]))[0]
+    held = orthonormal(gains.map_q, main_directions(memory, _MAIN))
     rest = finer - held @ (held.T @ finer)
     q, r = np.linalg.qr(rest)
-    own = np.abs(np.diag(r)) > 0.05 * np.linalg.norm(finer, axis=0)
+    own = np.abs(np.diag(r)) > _MAIN * np.linalg.norm(finer, axis=0)
     if not own.any():
         return False
     y = gains.whiten(search.y) / gains.scale
@@ -184,4 +190,4 @@ def _of_map(candidate: Candidate) -> bool:
 
 def _after(search: Search, attribution: Attribution) -> Search:
     """The search with the causes found taken out."""
-    return search.extended(taken(attribution.causes)) if attribution.causes else search
+    return search.extended(model_columns(attribution.causes)) if attribution.causes else search

@@ -12,26 +12,28 @@ from .. import __version__
 from ..dataset import Dataset
 from ..model import Model
 from ..terms import CATALOGUE, separate_by
+from ..train.data import MIN_TEMPERATURE_SPAN_C
 from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
 from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
-from .catalogue import diagnosed
-from .cycle import Cycle, cycle_of, is_single_cycle
-from .extend import Extension, extend
-from .gain import Gain
-from .levels import NoiseFinding
-from .limits import Limit
+from .attribute.intervals import Interval
+from .attribute.refine import Refined
+from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
+from .detect.detection_limits import Limit
+from .discrepancy.declared_noise import NoiseFinding
+from .extend.extension import Extension, extend
+from .extend.gain import Gain
+from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
-from .recordings import declared_noise, records_of
-from .refine import Interval, Refined
-from .verdict import named, verdict_of
+from .screen.gather import records_of
+from .signatures.candidates import diagnosed
+from .verdict import holds, verdict_of
 from .words import NOISE_WORDS
 
 __all__ = ["Diagnosis", "diagnose"]
 
 Progress = Callable[[str], None]
 
-_LITTLE_C = 2.0  # a temperature span below which nothing can be learnt about temperature
 _MOST_EQUIVALENT = 2
 
 
@@ -79,7 +81,7 @@ def diagnose(
     say("reading")
     records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
-    if float(np.ptp(temperature)) < _LITTLE_C:
+    if float(np.ptp(temperature)) < MIN_TEMPERATURE_SPAN_C:
         return Diagnosis(_not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if is_single_cycle(records) else None
@@ -92,7 +94,7 @@ def diagnose(
         )
         causes = cycle.causes
     else:
-        causes = analysis.attribution.causes if named(analysis.attribution) else ()
+        causes = analysis.attribution.causes if holds(analysis.attribution) else ()
     extension = extend(dataset, records, causes, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
     result = _result(dataset, analysis, extension, causes, chosen, cycle)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .attribute import Attribution
-from .levels import NoiseFinding
+from .attribute.attribution import Attribution
+from .discrepancy.declared_noise import NoiseFinding
 
-__all__ = ["named", "verdict_of"]
+__all__ = ["holds", "verdict_of"]
 
 _MISFITS = ((0.05, 0.5), (0.01, 0.8), (1e-4, 0.9))
 """p-value of what is left, and share of the structure below which the causes then explain too little."""
 
-_REMAINDER = 1e-3
+_REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much
 _LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not hold their own
 
 
-def named(attribution: Attribution) -> bool:
+def holds(attribution: Attribution) -> bool:
     """Whether causes are given at all: not when most of the structure is none of them, or has another shape."""
     little = any(attribution.misfit_p < p and attribution.share < share for p, share in _MISFITS)
     return bool(attribution.causes) and not little and attribution.other.lead < _LEAD
@@ -29,9 +29,9 @@ def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> str:
         attribution: What the search found.
         noise: Findings of the family `noise`.
     """
-    if attribution.detected and not named(attribution):
+    if attribution.detected and not holds(attribution):
         return "unexplained"
-    if named(attribution):
+    if holds(attribution):
         if attribution.misfit_p < _REMAINDER:
             return "partial"
         return "ambiguous" if any(attribution.rivals) else "explained"

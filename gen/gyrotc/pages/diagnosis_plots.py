@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..diagnose import Diagnosis
-from ..diagnose.attribute import Attribution
-from ..diagnose.catalogue import diagnosed
-from ..diagnose.compare import Discrepancy, Ensemble
-from ..diagnose.cycle import Cycle
-from ..diagnose.records import Records, centred_slope
-from ..diagnose.refine import Refined
-from ..diagnose.search import Found
+from ..diagnose.attribute.attribution import Attribution
+from ..diagnose.attribute.refine import Refined
+from ..diagnose.attribute.single_cycle import Cycle
+from ..diagnose.detect.detection import Found
+from ..diagnose.discrepancy.ensemble import Discrepancy, Ensemble
+from ..diagnose.screen.blocks import Records, centred_slope
+from ..diagnose.signatures.candidates import diagnosed
 from ..metrics import Averages
 from ..terms import CATALOGUE
 from ..texts import picture_text

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..diagnose.catalogue import searched
-from ..diagnose.records import Record
+from ..diagnose.screen.blocks import Record
+from ..diagnose.signatures.candidates import searched
 from ..simulate.campaign import Noise
 from ..terms import CATALOGUE, separate_by
 from .programme import Programme, programme_of

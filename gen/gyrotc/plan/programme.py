@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.noise import Declared
-from ..diagnose.recordings import block_length
-from ..diagnose.records import Record, Records
+from ..diagnose.noise_colour.colours import Declared
+from ..diagnose.screen.blocks import Record, Records
+from ..diagnose.screen.gather import block_length
 from ..errors import InputError
 from ..simulate.campaign import Noise, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, read

@@ -12,12 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.bank import Bank
-from ..diagnose.cache import bank_of
-from ..diagnose.catalogue import Candidate, planned
-from ..diagnose.limits import Limit, amplitude_energy, limit_of
-from ..diagnose.noise import COLOURS, Colour, Whitener
-from ..diagnose.search import Search
+from ..diagnose.detect.detection_limits import Limit, amplitude_energy, limit_of
+from ..diagnose.detect.search import Search, open_search
+from ..diagnose.noise_colour.colours import COLOURS, Colour
+from ..diagnose.noise_colour.whitener import Whitener
+from ..diagnose.signatures.cache import bank_of
+from ..diagnose.signatures.candidates import Candidate, planned
+from ..diagnose.signatures.signature_bank import SignatureBank
 from .programme import Programme
 
 __all__ = ["Sensitivity"]
@@ -41,10 +42,9 @@ class Sensitivity:
         colour = programme.declared.colour(records.block_s)
         self.sigma = float(np.sqrt(colour.white))
         relative = _scaled(colour, 1.0 / colour.white)
-        self.bank: Bank = bank_of(records, 0)
-        self.search = Search(records, self.bank, records.target(), declared=relative, colours=(len(COLOURS),))
-        number = self.search.best
-        self.search.views[number] = replace(self.search.views[number], scale=self.sigma)
+        self.bank: SignatureBank = bank_of(records, 0)
+        search = open_search(records, self.bank, records.target(), declared=relative, colours=(len(COLOURS),))
+        self.search = replace(search, views={search.best: replace(search.likeliest, scale=self.sigma)})
         self.candidates, columns, self.at = _columns(self.search)
         whiten = Whitener(relative, records.kept, records.block_s)
         white = whiten(np.column_stack([self.bank.map, columns])) / self.sigma
@@ -107,7 +107,7 @@ def _columns(search: Search) -> tuple[list[Candidate], Array, list[slice]]:
         blocks.append(block)
         at.append(slice(start, start + block.shape[1]))
         start += block.shape[1]
-    weights = search.baseline_weights(search.y)
+    weights = search.map_weights()
     for candidate, replaced, known in zip(bank.inputs, bank.replaced, bank.known, strict=True):
         candidates.append(candidate)
         blocks.append(np.where(known, (replaced - bank.map) @ weights, 0.0)[:, None])

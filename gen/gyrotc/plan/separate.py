@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.catalogue import Candidate, columns_of, planned, searched, shape_parameter
-from ..diagnose.likelihood import Gains
+from ..diagnose.attribute.gains import Gains
+from ..diagnose.orthonormal import orthonormal
+from ..diagnose.screen.blocks import singled_out
+from ..diagnose.signatures.candidates import Candidate, columns_of, planned, searched, shape_parameter
 from ..errors import InputError
 from ..simulate.campaign import Noise
 from .programme import library, programme_of
@@ -25,7 +27,6 @@ __all__ = ["Row", "additions", "separability"]
 
 Array = NDArray[np.float64]
 
-_INDEPENDENT = 1e-6
 _D_LIMIT = 6.0
 _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
 
@@ -88,7 +89,7 @@ def _fitted(sensitivity: Sensitivity, candidate: Candidate, gains: Gains) -> Arr
     search = sensitivity.search
     if candidate.role == "input":
         replaced = search.bank.replaced[search.bank.inputs.index(candidate)]
-        return np.asarray(replaced @ search.baseline_weights(search.y))
+        return np.asarray(replaced @ search.map_weights())
     columns = columns_of(search.records, candidate.id, candidate.values)
     signature = columns @ np.random.default_rng(1).standard_normal(columns.shape[1])
     white = gains.whiten(signature)
@@ -99,15 +100,13 @@ def _fitted(sensitivity: Sensitivity, candidate: Candidate, gains: Gains) -> Arr
 def _static(sensitivity: Sensitivity) -> Array:
     """The simulated gyro's map as the search's own map holds it, shape (N,)."""
     search = sensitivity.search
-    return np.asarray(search.bank.map @ search.baseline_weights(search.y))
+    return np.asarray(search.bank.map @ search.map_weights())
 
 
 def _by_columns(gains: Gains, own: Array, energy: Array) -> Iterator[tuple[str, Array]]:
     """Share of each signature that every candidate with columns of its own holds."""
     for candidate, at in (*gains.plain, *gains.random):
-        q, r = np.linalg.qr(gains.plain_columns(at))
-        size = np.abs(np.diag(r))
-        q = q[:, size > _INDEPENDENT * size.max()]
+        q = orthonormal(gains.plain_columns(at))
         yield candidate.id, ((q.T @ own) ** 2).sum(axis=0) / energy
 
 
@@ -119,12 +118,8 @@ def _by_inputs(gains: Gains, total: Array, energy: Array) -> Iterator[tuple[str,
         seen[candidate.id] += 1
         if seen[candidate.id] % searched(candidate.id).rival_every:
             continue
-        design = gains.whiten(replaced)
-        if not known.all():
-            design = np.column_stack([design, gains.whiten(np.eye(known.size)[:, ~known])])
-        q, r = np.linalg.qr(design)
-        size = np.abs(np.diag(r))
-        q = q[:, size > _INDEPENDENT * size.max()]
+        unknown = [] if known.all() else [gains.whiten(singled_out(~known))]
+        q = orthonormal(gains.whiten(replaced), *unknown)
         rest = (total**2).sum(axis=0) - ((q.T @ total) ** 2).sum(axis=0)
         yield candidate.id, np.maximum(1.0 - rest / energy, 0.0)
 

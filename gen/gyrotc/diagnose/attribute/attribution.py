@@ -1,0 +1,189 @@
+"""Attribution: which causes, how sure, and is anything left?
+
+Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, further
+ones while the search finds something beside them. What the chosen causes leave is held against the whole
+dictionary (lack of fit).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..detect.detection import Found, detect
+from ..detect.joined import Held
+from ..detect.project import project
+from ..detect.search import Search
+from ..signatures.candidates import Candidate
+from .contest import Contest, contest
+from .gains import Gains, Point
+from .misfit import misfit
+from .pairs import best_of, clear_pair, makes_sense
+from .refine import Refined, model_columns, refine
+from .rivals import Rival, rivals_of
+
+__all__ = ["Attribution", "attribute", "choose"]
+
+Array = NDArray[np.float64]
+
+_LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
+_WELL = 0.08  # p-value of what is left that a pair must reach,
+_NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
+_MISFIT = 0.01  # p-value of what is left below which further causes are looked for: as for the first one
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What was found.
+
+    Attributes:
+        first: The search before any cause is taken, best first.
+        causes: The chosen causes, strongest first.
+        p_values: Of each, adjusted for the whole search.
+        rivals: For each, other causes in its place, nearest first.
+        gain: Twice the log-likelihood ratio of all causes together.
+        misfit_p: p-value of what is left against the dictionary.
+        share: Share of the detectable structure that the causes explain.
+        last: The search after the last cause.
+        other: The best shape that no cause has, and its lead over the causes.
+    """
+
+    first: list[Found]
+    causes: tuple[Refined, ...]
+    p_values: tuple[float, ...]
+    rivals: tuple[tuple[Rival, ...], ...]
+    gain: float
+    misfit_p: float
+    share: float
+    last: list[Found]
+    other: Contest
+
+    @property
+    def detected(self) -> bool:
+        return bool(self.first) and self.first[0].p_value <= _LEVEL
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A set of causes with everything that follows from it."""
+
+    chosen: tuple[Candidate, ...]
+    refined: tuple[Refined, ...]
+    found: list[Found]
+    gain: float
+    misfit_p: float
+    share: float
+
+    @property
+    def remains(self) -> bool:
+        return self.misfit_p < _MISFIT or self.found[0].p_value <= _LEVEL
+
+    @property
+    def well(self) -> bool:
+        """Whether the causes leave so little that a set of them is taken for the whole explanation."""
+        return self.misfit_p >= _WELL or (self.misfit_p >= _NEARLY and self.share >= _MOST)
+
+
+def attribute(search: Search) -> Attribution:
+    """Runs the search to its end."""
+    first = detect(search, "map and beside")
+    if first[0].p_value > _LEVEL:
+        return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first, Contest("", -np.inf))
+    gains = Gains(search)
+    singles = list(gains.single())
+    stage = _stage(search, gains, best_of(singles, gains.size).members)
+    pairs: list[Point] = []
+    if stage.remains:
+        pairs = [p for p in gains.pairs() if makes_sense(p)]
+        pair = clear_pair(singles, pairs, gains.size)
+        if pair is not None:
+            stage = _deeper(search, gains, stage, pair.members)
+    order = _by_strength(singles, stage.chosen)
+    refined = tuple(stage.refined[k] for k in order)
+    rivals = rivals_of(singles, pairs, tuple(stage.chosen[k] for k in order), gains.size)
+    return Attribution(
+        first=first,
+        causes=refined,
+        p_values=tuple(_p_value(first, r.candidate) for r in refined),
+        rivals=rivals,
+        gain=stage.gain,
+        misfit_p=stage.misfit_p,
+        share=stage.share,
+        last=stage.found,
+        other=contest(
+            gains,
+            refined,
+            [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(refined, rivals, strict=True)],
+        ),
+    )
+
+
+def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
+    refined = refine(search, gains, chosen)
+    current, held = _with(search, refined)
+    gain = _total(current, held)
+    misfit_p, share = misfit(current, held, refined, gain)
+    return _Stage(chosen, refined, detect(current, held), gain, misfit_p, share)
+
+
+def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
+    """The pair, or three causes, where these leave nothing; else the single cause with its remainder."""
+    two = _stage(search, gains, pair)
+    third = _third(two.found, pair) if two.remains else None
+    if third is not None:
+        three = _stage(search, gains, (*pair, third))
+        if three.misfit_p >= _WELL > two.misfit_p:
+            return three
+    return two if two.well else one
+
+
+def choose(search: Search, count: int) -> tuple[Refined, ...]:
+    """The best one or two causes without asking whether there is any: for runs left out of a choice made."""
+    gains = Gains(search)
+    points = list(gains.single())
+    best = best_of(points, gains.size)
+    if count > 1:
+        pairs = [p for p in gains.pairs() if makes_sense(p)]
+        pair = best_of(pairs, gains.size)
+        best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
+    chosen = sorted(
+        best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0)
+    )
+    return refine(search, gains, tuple(chosen)) if best.criterion(gains.size) > 0.0 else ()
+
+
+def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | None:
+    top = found[0]
+    present = {c.id for c in chosen}
+    if top.p_value > _LEVEL or top.candidate.role == "structure" or top.candidate.id in present:
+        return None
+    if top.candidate.role == "input":
+        return None
+    return top.candidate
+
+
+def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Held]:
+    """The search with the causes' columns and tangents as part of every model, and what a model then holds."""
+    current = search.extended(model_columns(causes))
+    swapped = any(c.candidate.role == "input" for c in causes)  # the replaced map stands beside the plain one
+    return current, "beside" if swapped else "map and beside"
+
+
+def _total(current: Search, held: Held) -> float:
+    """Energy that the causes explain beyond the map, at the likeliest colour, over the noise."""
+    view = current.likeliest
+    before = project(current, view, "map")
+    after = project(current, view, held)
+    return max((before.rest - after.rest) / view.scale**2, 0.0)
+
+
+def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:
+    alone = [max((p.gain for p in singles if p.members[0].id == c.id), default=0.0) for c in chosen]
+    return sorted(range(len(chosen)), key=lambda k: -alone[k])
+
+
+def _p_value(found: list[Found], cause: Candidate) -> float:
+    same = (f.p_value for f in found if (f.candidate.id, f.candidate.channel) == (cause.id, cause.channel))
+    return min(same, default=1.0)

@@ -1,0 +1,1 @@
+"""Stage 6: measured residuals and noise against what the simulation and the declaration say."""

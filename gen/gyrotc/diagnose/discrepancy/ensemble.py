@@ -1,0 +1,184 @@
+"""What the plain simulation gets wrong: statistics of the residuals against an ensemble of simulated campaigns.
+
+The plain simulation is the static map fitted to the runs plus the declared noise (white noise of the
+estimated level where nothing is declared), on the recorded temperatures. Measured and simulated rates go
+through the same fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..detect.search import Search
+from ..noise_colour.colours import COLOURS, Declared
+from ..noise_colour.whitener import Whitener
+from ..orthonormal import orthonormal
+from ..screen.blocks import centred_slope
+
+__all__ = ["Discrepancy", "Ensemble", "compare"]
+
+Array = NDArray[np.float64]
+
+_MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
+_MOVING = 0.1  # C/min, above which a block counts as heating or cooling
+_SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
+_ROUNDING = 1e-9  # share of the residuals' RMS below which a statistic is made of rounding errors
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """One statistic: measured, the middle 95 % of the simulated ones, and how rare the measured one is."""
+
+    statistic: str
+    measured: float
+    simulated_mean: float
+    simulated_low: float
+    simulated_high: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Residuals of the measured and of the simulated campaigns.
+
+    Attributes:
+        residual: Measured rate less the map, deg/h, shape (N,).
+        simulated: The same of every simulated campaign, shape (N, members).
+        discrepancies: All statistics, rarest first.
+    """
+
+    residual: Array
+    simulated: Array
+    discrepancies: tuple[Discrepancy, ...]
+
+
+def compare(
+    search: Search,
+    declared: Declared | None,
+    *,
+    beside: Array | None = None,
+    estimated: bool = False,
+    seed: int = 1,
+) -> Ensemble:
+    """Draws the ensemble and compares.
+
+    Args:
+        search: The data.
+        declared: Noise of the plain simulation; None: white, of the estimated level.
+        beside: Columns that the extended simulation has beside the map, shape (N, k).
+        estimated: Whether the simulated noise is that which the search estimates (the declared one is refuted).
+        seed: Fixes the draws of the ensemble.
+    """
+    records = search.records
+    if estimated:
+        colour, scale = search.likeliest.colour, search.likeliest.scale
+    elif declared is not None:
+        colour, scale = declared.colour(records.block_s), 1.0
+    else:
+        colour, scale = COLOURS[0], search.view_of(COLOURS[0]).scale
+    whiten = Whitener(colour, records.kept, records.block_s, search.sigma)
+    normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
+    noise = scale * whiten.colour(normal)
+    both = np.column_stack([search.y, noise])
+    model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))
+    both -= model @ (model.T @ both)
+    measured, simulated = both[:, 0], both[:, 1:]
+    rounding = _ROUNDING * float(np.sqrt((both**2).mean()))
+    found = []
+    for name, statistic in _statistics(search).items():
+        values = statistic(both)
+        if np.all(np.isfinite(values)):
+            found.append(_discrepancy(name, float(values[0]), values[1:], rounding))
+    found.sort(key=lambda d: d.p_value)
+    return Ensemble(measured, simulated[:, :100], tuple(found))
+
+
+def _discrepancy(name: str, measured: float, simulated: Array, rounding: float) -> Discrepancy:
+    """The rank of the measured value; where the model takes a statistic away wholly, none is rare."""
+    n = simulated.size
+    above = float(np.count_nonzero(simulated >= measured))
+    below = float(np.count_nonzero(simulated <= measured))
+    p = min(1.0, 2.0 * (min(above, below) + 1.0) / (n + 1.0))
+    if max(abs(measured), float(np.abs(simulated).max())) <= rounding:
+        p = 1.0
+    low, high = np.quantile(simulated, [0.025, 0.975])
+    return Discrepancy(name, measured, float(simulated.mean()), float(low), float(high), p)
+
+
+def _statistics(search: Search) -> dict[str, Callable[[Array], Array]]:
+    """Functions of residuals, shape (N, members), each giving one number for each member."""
+    records = search.records
+    spans = records.spans()
+    slope = records.average([centred_slope(r.history) for r in records.runs])
+    temperature = records.average([r.history.temperature_c for r in records.runs])
+    up, down = slope > _MOVING, slope < -_MOVING
+    width = max(round(_SLOW_S / records.block_s), 2)
+    cells = _cells(temperature)
+
+    def rms(e: Array) -> Array:
+        return np.asarray(np.sqrt((e**2).mean(axis=0)))
+
+    def autocorrelation(e: Array) -> Array:
+        top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)
+        return np.asarray(top / (e**2).sum(axis=0))
+
+    def slow(e: Array) -> Array:
+        parts = [_grouped(e[s], width) for s in spans if s.stop - s.start >= width]
+        return rms(np.concatenate(parts)) if parts else np.full(e.shape[1], np.nan)
+
+    def run_means(e: Array) -> Array:
+        means = np.array([e[s].mean(axis=0) for s in spans])
+        return np.sqrt((means**2).mean(axis=0)) if len(means) > 1 else np.full(e.shape[1], np.nan)
+
+    def loop(e: Array) -> Array:
+        """RMS over temperature of the mean difference between heating and cooling."""
+        gaps = []
+        for cell in np.unique(cells):
+            a, b = up & (cells == cell), down & (cells == cell)
+            if a.sum() >= 3 and b.sum() >= 3:
+                gaps.append(e[a].mean(axis=0) - e[b].mean(axis=0))
+        return rms(np.array(gaps)) if gaps else np.full(e.shape[1], np.nan)
+
+    def start(e: Array) -> Array:
+        parts = [e[s][:width].mean(axis=0) for s in spans]
+        return np.asarray(np.mean(parts, axis=0))
+
+    def outlying(e: Array) -> Array:
+        square = e * e
+        return np.asarray((square * square).mean(axis=0) / square.mean(axis=0) ** 2)
+
+    out: dict[str, Callable[[Array], Array]] = {
+        "residual_rms_dph": rms,
+        "residual_autocorrelation": autocorrelation,
+        "half_hour_means_rms_dph": slow,
+        "run_means_rms_dph": run_means,
+        "heating_cooling_loop_dph": loop,
+        "first_half_hour_dph": start,
+        "kurtosis": outlying,
+    }
+    days = [r.history.day for r in records.runs]
+    if len({d for d in days if d is not None}) >= 3 and None not in days:
+        line = np.array([float(d) for d in days if d is not None])
+        line = (line - line.mean()) / line.std()
+
+        def trend(e: Array) -> Array:
+            return np.asarray(
+                np.mean([x * e[s].mean(axis=0) for x, s in zip(line, spans, strict=True)], axis=0)
+            )
+
+        out["trend_with_date_dph"] = trend
+    return out
+
+
+def _grouped(e: Array, width: int) -> Array:
+    n = e.shape[0] // width
+    return np.asarray(e[: n * width].reshape(n, width, -1).mean(axis=1))
+
+
+def _cells(temperature: Array) -> NDArray[np.int64]:
+    """Number of the 8-C cell of every block."""
+    return np.floor(temperature / 8.0).astype(np.int64)

@@ -1,0 +1,173 @@
+"""Extension and its gain: the compensation model refitted with the named causes, measured on unseen runs.
+
+Where there are exam runs, the training runs choose and the exam runs measure. Where there are none, runs
+(or branches of few runs) are left out in turn, and causes and parameters are chosen anew without them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...dataset import Dataset
+from ...metrics import Averages
+from ...train import Fit, TrainingData
+from ...train.fitting import FitOptions
+from ..attribute.refine import Refined
+from ..screen.blocks import Records
+from .gain import Gain, floor_of, gain_of
+from .refit import Effect, joined, samples, score
+from .refitting import FEW_RUNS, Chain, Refitting, folds_of
+
+__all__ = ["Extension", "extend"]
+
+Progress = Callable[[str], None]
+
+_MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts
+_LEARNT = 0.67  # share of the dates that is learnt from where no exam run is later
+_MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What the extension gains.
+
+    Attributes:
+        steps: Gain of every cause, taken one after the other.
+        total: Gain of all shipped causes together; None if none is shipped.
+        rate_left_out: Gain with one ramp rate left out of everything, and its environment.
+        forward: Gain on runs later than everything that was learnt from; None without dates.
+        extended: Fit with the shipped causes, None if none is shipped.
+        shipped: Effects of the extended model.
+        samples: Training samples as the extended map sees them.
+        floor: Noise floor of the scored samples, deg/h.
+        baseline_rms, baseline_centers: Of the model without causes.
+        measured_on: "exam" or "left out".
+        before, after: Residuals of the scored runs without and with all causes.
+    """
+
+    steps: tuple[Gain, ...]
+    total: Gain | None
+    rate_left_out: tuple[str, Gain] | None
+    forward: Gain | None
+    extended: Fit | None
+    shipped: tuple[Effect, ...]
+    samples: TrainingData
+    floor: float
+    baseline_rms: float
+    baseline_centers: int
+    measured_on: str
+    before: list[Averages]
+    after: list[Averages]
+
+
+def extend(
+    dataset: Dataset,
+    records: Records,
+    causes: Sequence[Refined],
+    options: FitOptions,
+    say: Progress,
+    *,
+    single_cycle: bool = False,
+) -> Extension:
+    """Refits the model with the causes and measures the gain."""
+    say("measuring the gain")
+    refitting = Refitting(dataset, records, options, single_cycle=single_cycle)
+    effects = [Effect.of(c) for c in causes]
+    stages = [effects[:k] for k in range(len(effects) + 1)]
+    chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
+    if single_cycle and effects:  # found together: one alone is another model
+        chain = [chain[0], *(chain[-1] for _ in effects)]
+    floor = floor_of([*chain[-1], *refitting.on_training(effects)])
+    pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
+    steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
+    shipped, total = _shipped(refitting, effects, steps, chain, floor)
+    extended = refitting.fit(shipped) if shipped else None
+    return Extension(
+        steps=tuple(steps),
+        total=total,
+        rate_left_out=_rate_left_out(refitting, len(effects), floor) if effects else None,
+        forward=_forward(refitting, chain, len(effects), floor) if effects else None,
+        extended=extended,
+        shipped=tuple(shipped),
+        samples=joined([samples(run, shipped) for run in refitting.train]),
+        floor=floor,
+        baseline_rms=_rms(chain[0]),
+        baseline_centers=refitting.fit([]).n_centers,
+        measured_on="exam" if refitting.exam else "left out",
+        before=chain[0],
+        after=chain[-1],
+    )
+
+
+def _rms(runs: Sequence[Averages]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([r.after_dph for r in runs]) ** 2)))
+
+
+def _shipped(
+    refitting: Refitting, effects: list[Effect], steps: list[Gain], chain: Chain, floor: float
+) -> tuple[list[Effect], Gain | None]:
+    """Effects that a table can hold and that gain with confidence on unseen runs."""
+    able = [e for e, g in zip(effects, steps, strict=True) if e.term.shipped and g.positive][:_MOST_TERMS]
+    if not able:
+        return [], None
+    if able == effects:
+        both = [chain[0], chain[-1]]
+    elif refitting.exam:
+        both = refitting.on_exam([[], able])
+    else:
+        return able, next(g for e, g in zip(effects, steps, strict=True) if e in able)
+    total = gain_of(both[0], both[1], floor, refitting.average_s)
+    return (able, total) if total.positive else ([], None)
+
+
+def _crossed(refitting: Refitting, count: int) -> Chain:
+    """Every training run (or branch of few runs) left out in turn, in a few groups."""
+    folds = folds_of(refitting)
+    if not folds:
+        return [_score_self(refitting)] * (count + 1)
+    chains = [refitting.left_out(held, count) for held in folds]
+    return [[a for chain in chains for a in chain[k]] for k in range(count + 1)]
+
+
+def _score_self(refitting: Refitting) -> list[Averages]:
+    """Where nothing can be left out (one very short run): the training samples themselves, without gain."""
+    return score(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
+
+
+def _rate_left_out(refitting: Refitting, count: int, floor: float) -> tuple[str, Gain] | None:
+    """All runs of the fastest environment left out of everything, where another moving one remains."""
+    speeds: dict[str, float] = {}
+    for run in refitting.train:
+        speed = float(np.quantile(np.abs(run.data.slope_c_per_min), 0.9))
+        speeds[run.environment] = max(speeds.get(run.environment, 0.0), speed)
+    moving = [e for e, s in speeds.items() if s > _MOVING_C_PER_MIN]
+    if len(moving) < 2:
+        return None
+    fastest = max(moving, key=lambda e: speeds[e])
+    held = [np.full(len(r.data.bias_dph), r.environment == fastest, dtype=bool) for r in refitting.train]
+    chain = refitting.left_out(held, count)
+    return fastest, gain_of(chain[0], chain[-1], floor, refitting.average_s)
+
+
+def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Gain | None:
+    """Later runs from earlier ones: the exam where it came last, else the last third of the training runs."""
+    days = [run.day for run in refitting.train]
+    later = [run.day for run in refitting.exam]
+    if any(d is None for d in (*days, *later)) or len(days) < FEW_RUNS:
+        return None
+    known = [float(d) for d in days if d is not None]
+    if later and min(float(d) for d in later if d is not None) > max(known):
+        return gain_of(chain[0], chain[-1], floor, refitting.average_s)
+    cut = float(np.quantile(known, _LEARNT))
+    held = [
+        np.full(len(r.data.bias_dph), d > cut, dtype=bool)
+        for r, d in zip(refitting.train, known, strict=True)
+    ]
+    if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
+        return None
+    ends = refitting.left_out(held, count)
+    return gain_of(ends[0], ends[-1], floor, refitting.average_s)

@@ -1,0 +1,222 @@
+"""Runs as the target would see them, with the terms' corrections in force; fits and scores on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dataset import Dataset, Run
+from ...frontend import blocks_since_power_on
+from ...metrics import Averages, average
+from ...terms import CATALOGUE, Scene, Term
+from ...terms.recursion import Course, Outcome
+from ...train import Fit, TrainingData, fit, predict
+from ...train.fitting import FrontEnd, samples_of
+from ..attribute.refine import Refined
+
+__all__ = ["Effect", "Played", "fit_extended", "joined", "play_runs", "samples", "score"]
+
+Array = NDArray[np.float64]
+
+_RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
+_FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A cause with its fitted parameters, as the replay applies it."""
+
+    id: str
+    values: dict[str, float]
+    channel: str | None = None
+
+    @staticmethod
+    def of(cause: Refined) -> Effect:
+        """The effect with the middle of every interval."""
+        values = {name: interval.value for name, interval in cause.parameters.items()}
+        return Effect(cause.candidate.id, cause.candidate.values | values, cause.candidate.channel)
+
+    @property
+    def term(self) -> Term:
+        """What the catalogue knows of the cause."""
+        return CATALOGUE[self.id]
+
+
+@dataclass(frozen=True)
+class Played:
+    """One run after the front end.
+
+    Attributes:
+        data: Training samples (used blocks only); inputs are those in force.
+        in_force: For each of them, the correction in force that the map made, shape (n,).
+        course: Every correction of the run as terms see it.
+        slope: C per block, of every correction.
+        on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
+        day: Days since the first run, or None.
+        channels: Samples of the channels, one for every row.
+        block_s: Length of a block, s.
+        environment: As in the data set.
+    """
+
+    data: TrainingData
+    in_force: NDArray[np.int64]
+    course: Course
+    slope: Array
+    on_s: Array
+    day: float | None
+    channels: Mapping[str, Array]
+    block_s: float
+    environment: str
+    _outcomes: list[tuple[Effect, Outcome]] = field(default_factory=list)
+
+    def outcome(self, effect: Effect) -> Outcome:
+        """What a term makes of every correction; the last few are remembered."""
+        for known, outcome in self._outcomes:
+            if known == effect:
+                return outcome
+        table = effect.term.table
+        assert table is not None
+        x = self.course.temperature
+        made = Outcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
+        channel = None if effect.channel is None else self.channels[effect.channel]
+        table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
+        self._outcomes[:0] = [(effect, made)]
+        del self._outcomes[_REMEMBERED:]
+        return made
+
+
+_REMEMBERED = 8  # outcomes of terms for each run: those of two sets of causes at a time
+
+
+def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
+    """Front end over all runs."""
+    first = min((r.started for r in dataset.runs if r.started is not None), default=None)
+    return [_played(dataset, run, k, front, first) for k, run in enumerate(runs)]
+
+
+def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
+    blocks, rows = front.blocks(run), run.rows()
+    data = samples_of(blocks, front.block_s, number)
+    before = blocks_since_power_on(rows, run, front.block_s)
+    course = blocks.stream.course(blocks.steps, blocks.samples_per_block, before)
+    day = None
+    if run.started is not None and first is not None:
+        day = (run.started - first).total_seconds() / 86400.0
+    return Played(
+        data=data,
+        in_force=blocks.in_force[blocks.used],
+        course=replace(course, temperature=course.temperature.astype(np.float64)),
+        slope=blocks.steps.slope.astype(np.float64),
+        on_s=data.time_s - (run.power_on_s or 0.0),
+        day=day,
+        channels={name: rows.channels[name] for name in dataset.channels},
+        block_s=front.block_s,
+        environment=run.environment,
+    )
+
+
+def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
+    """Training samples with the inputs that the effects give and their additions taken off."""
+    data, at = run.data, run.in_force
+    temperature, slope = data.temperature_c, data.slope_c_per_min
+    added = np.zeros(at.size)
+    for effect in effects:
+        term = effect.term
+        if term.table is not None:
+            made = run.outcome(effect)
+            added = added + made.added[at]
+            if term.kind == "input":
+                temperature, slope = made.temperature[at], made.slope[at] * (60.0 / run.block_s)
+        elif term.mended is not None:
+            temperature, slope = term.mended(data.time_s, temperature, slope, effect.values)
+        elif term.kind == "add":
+            added = added + _simulated(run, effect)
+    return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
+
+
+def _simulated(run: Played, effect: Effect) -> Array:
+    """What a cause that no table holds adds, as the simulation has it, deg/h."""
+    seen = run.data.temperature_c
+    scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
+    assert effect.term.bias is not None
+    return effect.term.bias(scene, effect.values, np.random.default_rng(0))
+
+
+def joined(parts: Sequence[TrainingData]) -> TrainingData:
+    """Samples of several runs as one."""
+    names = TrainingData.__dataclass_fields__
+    return TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
+
+
+def fit_extended(
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    arguments: dict[str, Any],
+    kept: Sequence[NDArray[np.bool_]] | None = None,
+    *,
+    rate: bool = True,
+) -> Fit:
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
+    parts = [samples(run, effects) for run in runs]
+    if kept is not None:
+        parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
+    finer = [e.term.centers for e in effects if e.term.centers is not None]
+    if finer:
+        arguments = arguments | {"centers": max(finer)}
+    data = joined(parts)
+    return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
+
+
+def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
+    """A map of T alone, valid over the rates of the samples."""
+    slope = data.slope_c_per_min
+    fitted = fit(replace(data, slope_c_per_min=np.zeros_like(slope)), **arguments)
+    flat = [
+        {
+            **n,
+            "linear": [n["linear"][0], 0.0],
+            "centers": [[c[0], 0.0] for c in n["centers"]],
+            "widths": [[w[0], _FLAT] for w in n["widths"]],
+        }
+        for n in fitted.networks
+    ]
+    scaling = replace(
+        fitted.scaling,
+        half_range_c_per_min=max(float(np.abs(slope).max()), fitted.scaling.half_range_c_per_min),
+        slope_c_per_min=(float(slope.min()), float(slope.max())),
+    )
+    return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
+
+
+def score(
+    fitted: Fit,
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    average_s: float,
+    scored: Sequence[NDArray[np.bool_]],
+) -> list[Averages]:
+    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out."""
+    out = []
+    for run, chosen in zip(runs, scored, strict=True):
+        if not chosen.any():
+            continue
+        data = samples(run, effects)
+        rest = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
+        if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
+            rest = rest - rest[data.time_s < data.time_s[0] + _RE_ZERO_S].mean()
+        out.append(
+            average(
+                data.time_s,
+                run.data.temperature_c,
+                run.data.bias_dph,
+                rest,
+                scored=chosen,
+                average_s=max(average_s, run.block_s),
+            )
+        )
+    return out

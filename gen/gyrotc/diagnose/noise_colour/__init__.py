@@ -1,0 +1,1 @@
+"""Stage 2: covariance of noise: its colours, what a unit declares, whitening."""

@@ -1,0 +1,244 @@
+"""Stage 5 of diagnosis: gains against dense least squares, refinement, rivals, lack of fit, other shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from gyrotc.diagnose.attribute.attribution import Attribution, attribute, choose
+from gyrotc.diagnose.attribute.contest import contest
+from gyrotc.diagnose.attribute.cycle_fits import CycleFits
+from gyrotc.diagnose.attribute.gains import Gains, Point
+from gyrotc.diagnose.attribute.intervals import parabola_top, profile_interval, random_size
+from gyrotc.diagnose.attribute.misfit import misfit
+from gyrotc.diagnose.attribute.overlap import overlap
+from gyrotc.diagnose.attribute.pairs import best_of, clear_pair, makes_sense
+from gyrotc.diagnose.attribute.refine import Refined, model_columns, refine
+from gyrotc.diagnose.attribute.rivals import rivals_of
+from gyrotc.diagnose.detect.search import Search
+from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
+from numpy.typing import NDArray
+from scipy import stats
+from small_campaign import LEVEL_DPH, Campaign, small_campaign
+
+Array = NDArray[np.float64]
+SEED = 20260403
+WIDTH_C, SIZE = 6.0, 4e-4
+
+
+@dataclass(frozen=True)
+class Case:
+    """Hysteresis in white noise, and what diagnosis makes of it."""
+
+    campaign: Campaign
+    search: Search
+    gains: Gains
+    found: Attribution
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    print("seed", SEED)
+    campaign = small_campaign()
+    column = columns_of(campaign.records, "hysteresis", {"width_c": WIDTH_C})[:, 0]
+    noise = LEVEL_DPH * np.random.default_rng(SEED).standard_normal(campaign.records.size)
+    search = campaign.search(1e-4 * campaign.temperature + SIZE * column + noise)
+    return Case(campaign, search, Gains(search), attribute(search))
+
+
+def key(candidate: Candidate) -> tuple[str, tuple[float, ...]]:
+    return candidate.id, tuple(candidate.values.values())
+
+
+def left(columns: Array, y: Array) -> float:
+    """Energy that least squares leave."""
+    return float(np.sum((y - columns @ np.linalg.lstsq(columns, y, rcond=1e-10)[0]) ** 2))
+
+
+def test_gains_are_differences_of_dense_least_squares(case: Case) -> None:
+    gains, bank = case.gains, case.search.bank
+    static = left(gains.map, gains.target)
+    singles = {key(p.members[0]): p.gain for p in gains.single()}
+    for candidate, at in gains.plain[::9]:
+        expected = static - left(np.column_stack([gains.map, gains.whole[:, at]]), gains.target)
+        assert singles[key(candidate)] == pytest.approx(expected, rel=1e-5, abs=1e-5)
+    for i in (0, 9, 20):
+        candidate, known = bank.inputs[i], bank.known[i]
+        edges = gains.whiten(np.eye(known.size)[:, ~known])
+        maps = (gains.map, gains.whiten(bank.replaced[i]))
+        before, after = (left(np.column_stack([edges, m]), gains.target) for m in maps)
+        assert singles[key(candidate)] == pytest.approx(before - after, abs=1e-4)
+        assert gains.rest_after(candidate, gains.target) == pytest.approx(after, rel=1e-6)
+
+
+def test_gains_of_pairs_are_those_of_both_together(case: Case) -> None:
+    gains = case.gains
+    static = left(gains.map, gains.target)
+    pairs = [p for p in gains.pairs() if all(m.role == "columns" for m in p.members)]
+    where = {id(c): at for c, at in gains.plain}
+    checked = 0
+    for pair in pairs[:: max(len(pairs) // 15, 1)]:
+        columns = [gains.whole[:, where[id(m)]] for m in pair.members]
+        expected = static - left(np.column_stack([gains.map, *columns]), gains.target)
+        if pair.members[0].id != pair.members[1].id:
+            assert pair.gain == pytest.approx(expected, rel=1e-3, abs=0.05)
+            checked += 1
+    assert checked >= 5
+
+
+def test_the_planted_cause_is_named_with_its_parameters(case: Case) -> None:
+    [cause] = case.found.causes
+    assert cause.candidate.id == "hysteresis" and case.found.detected
+    width, size = cause.parameters["width_c"], cause.parameters["amplitude_dph_per_c"]
+    assert width.low < WIDTH_C < width.high and width.high - width.low < 0.5 * WIDTH_C
+    assert size.low < SIZE < size.high
+    assert case.found.share > 0.9 and case.found.misfit_p > 0.01
+    assert case.found.other.lead < -2.0, "no shape without a name does better"
+
+
+def test_refinement_ends_at_the_maximum_of_the_likelihood(case: Case) -> None:
+    records = case.campaign.records
+
+    def column(tau: float) -> Array:
+        return columns_of(records, "warm_up", {"tau_s": tau})
+
+    noise = LEVEL_DPH * np.random.default_rng(SEED + 2).standard_normal(records.size)
+    gains = Gains(case.campaign.search(4e-3 * column(1700.0)[:, 0] + noise))
+    grid = next(c for c, _ in gains.plain if c.id == "warm_up" and c.values["tau_s"] > 1400.0)
+    [cause] = refine(gains.search, gains, (grid,))
+
+    def rest(tau: float) -> float:
+        return left(np.column_stack([gains.map, gains.whiten(column(tau))]), gains.target)
+
+    fine = np.geomspace(900.0, 6000.0, 400)
+    best = float(fine[np.argmin([rest(t) for t in fine])])
+    assert cause.candidate.values["tau_s"] == pytest.approx(best, rel=0.02)
+    inside = fine[np.array([rest(t) for t in fine]) <= rest(best) + stats.chi2.ppf(0.95, 1)]
+    interval = cause.parameters["tau_s"]
+    assert (interval.low, interval.high) == pytest.approx((inside[0], inside[-1]), rel=0.05)
+    assert model_columns([cause]).shape[1] == 2, "the column and its derivative to the time constant"
+    tau = cause.candidate.values["tau_s"]
+    slope = (column(tau + 1.0) - column(tau - 1.0)) / 2.0
+    assert cause.tangent is not None
+    assert np.allclose(cause.tangent, slope, atol=0.01 * np.abs(slope).max())
+
+
+def test_a_choice_without_asking_takes_the_same_cause(case: Case) -> None:
+    assert [c.candidate.id for c in choose(case.search, 1)] == ["hysteresis"]
+
+
+def test_what_is_left_after_a_wrong_cause_is_not_noise(case: Case) -> None:
+    wrong = Candidate("warm_up", {"tau_s": 1800.0}, "columns")
+    refined = refine(case.search, case.gains, (wrong,))
+    p_value, share = misfit(case.search.extended(model_columns(refined)), "map and beside", refined, 1.0)
+    assert p_value < 1e-6 and share < 0.1
+
+
+def test_a_shape_without_a_name_beats_causes_where_it_was_planted(case: Case) -> None:
+    bank = case.search.bank
+    group = next(g for g in bank.alternative_groups if g.name == "a switch with hysteresis")
+    shape = bank.alternatives[:, group.columns][:, 0]
+    noise = LEVEL_DPH * np.random.default_rng(SEED + 1).standard_normal(shape.size)
+    search = case.campaign.search(0.05 * shape + noise)
+    gains = Gains(search)
+    causes = choose(search, 1)
+    assert contest(gains, causes, [[] for _ in causes]).lead > 0.0
+
+
+def test_what_a_cause_mimics_itself_cannot_be_told_apart(case: Case) -> None:
+    [cause] = case.found.causes
+    d = overlap(case.gains, cause, ["thermal_gradient", "ageing", "hysteresis"])
+    assert d["hysteresis"] > 15.0
+    assert np.sqrt(10.0) <= d["ageing"] < 4.5, "an offset of each run holds next to nothing of it"
+    assert d["ageing"] < d["thermal_gradient"] < d["hysteresis"]
+
+
+def _point(gain: float, *members: tuple[str, float]) -> Point:
+    return Point(tuple(Candidate(id, {"x": x}, "columns") for id, x in members), gain)
+
+
+def test_pairs_are_of_two_causes_or_of_two_states_far_apart() -> None:
+    assert makes_sense(_point(0.0, ("hysteresis", 1.0), ("warm_up", 1.0)))
+    assert not makes_sense(_point(0.0, ("map_too_coarse", 1.0), ("path_length_periodicity", 1.0)))
+    assert makes_sense(_point(0.0, ("thermal_gradient", 100.0), ("thermal_gradient", 300.0)))
+    assert not makes_sense(_point(0.0, ("thermal_gradient", 100.0), ("thermal_gradient", 150.0)))
+    assert not makes_sense(_point(0.0, ("warm_up", 100.0), ("warm_up", 900.0))), "there is one power-on"
+
+
+def test_a_pair_must_gain_and_need_both() -> None:
+    singles = [_point(500.0, ("hysteresis", 1.0)), _point(300.0, ("warm_up", 1.0))]
+    both = (("hysteresis", 1.0), ("warm_up", 1.0))
+    size = 400
+    assert best_of(singles, size) is singles[0]
+    assert clear_pair(singles, [_point(800.0, *both)], size) is not None
+    assert clear_pair(singles, [_point(510.0, *both)], size) is None, "the second adds next to nothing"
+    weak = [_point(100.0, ("hysteresis", 1.0)), _point(90.0, ("warm_up", 1.0))]
+    assert clear_pair(weak, [_point(800.0, *both)], size) is None, "neither says anything alone"
+
+
+def test_rivals_are_near_in_the_criterion() -> None:
+    singles = [
+        _point(g, (id, 1.0))
+        for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))
+    ]
+    [near] = rivals_of(singles, [], singles[0].members, 400)
+    assert [r.id for r in near] == ["thermal_gradient"]
+    prices = [p.criterion(400) for p in singles]
+    assert near[0].distance == pytest.approx(prices[0] - prices[1])
+    pairs = [
+        _point(200.0, ("hysteresis", 1.0), ("warm_up", 1.0)),
+        _point(198.0, ("hysteresis", 1.0), ("ageing", 1.0)),
+        _point(199.0, ("thermal_gradient", 1.0), ("ageing", 1.0)),
+    ]
+    first, second = rivals_of(singles, pairs, pairs[0].members, 400)
+    assert [r.id for r in first] == [] and [r.id for r in second] == ["ageing"]
+
+
+def test_a_parabola_is_read_exactly() -> None:
+    def energy(x: float) -> float:
+        return 7.0 - 0.5 * (x - 3.0) ** 2
+
+    top, curve = parabola_top(energy, 2.5, 1.0, -np.inf)
+    assert (top, curve) == pytest.approx((3.0, 0.5))
+    x = np.linspace(-5.0, 11.0, 4001)
+    low, high = profile_interval(np.array([x, energy(x)]))
+    half = np.sqrt(stats.chi2.ppf(0.95, 1) / 0.5)
+    assert (low, high) == pytest.approx((3.0 - half, 3.0 + half), abs=1e-5)
+    flat = profile_interval(np.array([x, np.zeros(x.size)]))
+    assert flat == (-5.0, 11.0), "what does not fall has no end"
+
+
+def test_the_size_of_random_draws_covers_the_truth_as_often_as_it_says() -> None:
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    noise = 0.04 * np.eye(8)
+    inside = []
+    for _ in range(400):
+        weights = rng.standard_normal(8) + 0.2 * rng.standard_normal(8)
+        found = random_size(weights, noise)
+        inside.append(found.low <= 1.0 <= found.high)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.045), "four standard deviations of 400 draws"
+
+
+def test_all_combinations_of_states_explain_what_least_squares_say(case: Case) -> None:
+    records = case.campaign.with_rate(
+        [1e-4 * r.history.temperature_c for r in case.campaign.records.runs], case.search.y
+    )
+    fits = CycleFits(records)
+    total = left(fits.static, fits.y)
+    kinds = tuple(fits.grid)[:2]
+    energy = fits.energies(kinds)
+    for i, j in ((3, 5), (10, 2)):
+        members = (fits.grid[kinds[0]][i], fits.grid[kinds[1]][j])
+        raw = np.column_stack([columns_of(records, m.id, m.values) for m in members])
+        rest = left(np.column_stack([fits.static, raw]), fits.y)
+        assert energy[i, j] == pytest.approx(total - rest, rel=1e-5)
+        assert float(np.sum(fits.left(members) ** 2)) == pytest.approx(rest, rel=1e-6)
+    same = fits.energies((kinds[0], kinds[0]))
+    assert not same[np.tril_indices(len(same))].any(), "a state is not its own partner"
+
+
+def test_nothing_is_taken_from_an_empty_model() -> None:
+    none = Refined(Candidate("x", {}, "columns"), np.ones((3, 1)), None, {}, np.ones(3), None, None)
+    assert model_columns([none, none]).shape == (3, 2)
