@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 # From left to right. A stage is a module or a package of gyrotc.
 ORDER = [
     "errors",
+    "status",
     "outputs",
     "inputs",
     "texts",

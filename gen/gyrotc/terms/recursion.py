@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..status import HELD
 from .arithmetic import Operations
 from .operators import play
 
 __all__ = ["Course", "Outcome", "Recursion", "TableKind", "recursion_of"]
 
 Numbers = NDArray[Any]
-
-_HELD = 8  # GTC_HELD
 
 
 class TableKind(IntEnum):
@@ -139,7 +138,7 @@ class _Auxiliary(Recursion):
         added = self.do.scaled_difference(mean, reference, slope)
         zero = added.dtype.type(0)
         outcome.added = outcome.added + np.where(self.do.is_missing(mean), zero, added)
-        outcome.remarks = outcome.remarks | np.where(here, 0, _HELD).astype(np.int32)
+        outcome.remarks = outcome.remarks | np.where(here, 0, HELD).astype(np.int32)
 
     def _means(self, course: Course, channel: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
         """Mean in force for every correction, and whether its block had enough samples.
