@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import CheckFailed, InputError
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     OUT,
     AppliedOption,
@@ -25,7 +25,6 @@ from .base import (
     RhoOption,
     SeedOption,
     app,
-    json_text,
     numerics_of,
     progress,
     tell,

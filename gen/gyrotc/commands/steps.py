@@ -9,7 +9,7 @@ import typer
 
 from .. import __version__
 from ..errors import CheckFailed, InputError
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     ERR,
     OUT,
@@ -28,7 +28,6 @@ from .base import (
     SeedOption,
     TrustOption,
     app,
-    json_text,
     numerics_of,
     progress,
     tell,

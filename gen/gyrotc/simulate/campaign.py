@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator
 from datetime import timedelta
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..outputs import result_folder
+from ..outputs import json_text, result_folder
 from .biasmap import BiasMap, draw
 from .instrument import Record, record
 from .noise import CELL_S
@@ -216,7 +215,7 @@ def _write_texts(
         "plan": plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
         "runs": truths,
     }
-    (folder / TRUTH_FILE).write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    (folder / TRUTH_FILE).write_text(json_text(truth), "ascii")
 
 
 def _serial(plan: Scenario, seed: int) -> str:

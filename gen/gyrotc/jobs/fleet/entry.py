@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...errors import GyrotcError
 from ...inputs import read_json
-from ...outputs import faults, write_atomically
+from ...judge.judged import Kind
+from ...outputs import faults, json_text, write_atomically
 
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
@@ -32,7 +32,7 @@ class _Stored(BaseModel):
     status: Literal["done", "failed"]
     reason: str | None = None
     serial: str
-    judged_on: Literal["exam", "left_out", "train"] | None
+    judged_on: Kind | None
     before_rms_dph: float | None
     after_rms_dph: float | None
     after_mean_dph: float | None
@@ -50,7 +50,7 @@ class _Stored(BaseModel):
 
 def write_entry(folder: Path, entry: Entry) -> Entry:
     """Writes `entry.json` into a unit's result, whose marker will hold its hash; returns it."""
-    write_atomically(folder / ENTRY, json.dumps(entry, indent=1, allow_nan=False) + "\n")
+    write_atomically(folder / ENTRY, json_text(entry))
     return entry
 
 
