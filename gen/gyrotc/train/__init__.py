@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
+from ..metrics import LEAST_SPAN_C
 from .bank import fit_bank
-from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
+from .data import Scaling, TrainingData, cleaned, scaling_of
 from .linear import fit_mlr, fit_poly
 from .mrbf import fit_mrbf
 from .noise import floor_dph
@@ -63,7 +64,7 @@ def fit(
     samples = cleaned(data)
     scaling = scaling_of(samples)
     findings = []
-    if np.ptp(samples.temperature_c) < MIN_TEMPERATURE_SPAN_C:
+    if np.ptp(samples.temperature_c) < LEAST_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
     else:
@@ -123,5 +124,5 @@ def _no_information(samples: TrainingData) -> dict[str, object]:
     return {
         "id": "no_temperature_information",
         "text": f"Temperature spans only {span:.2f} C: nothing can be learnt about it; the model is the mean bias.",
-        "evidence": {"span_c": span, "required_c": MIN_TEMPERATURE_SPAN_C},
+        "evidence": {"span_c": span, "required_c": LEAST_SPAN_C},
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "scaling_of"]
+__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "joined", "scaling_of"]
 
 Floats = NDArray[np.float64]
 
-MIN_TEMPERATURE_SPAN_C = 2.0
 _MIN_HALF_RANGE_C = 1.0
 _MIN_HALF_RANGE_C_PER_MIN = 0.05
 _BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
@@ -76,6 +76,12 @@ class Bins:
     mean: Floats
     within: float
     samples: float
+
+
+def joined(parts: Sequence[TrainingData]) -> TrainingData:
+    """Samples of several parts as one, in their order."""
+    names = TrainingData.__slots__
+    return TrainingData(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
 def cleaned(data: TrainingData) -> TrainingData:

@@ -20,6 +20,7 @@ from ..frontend import Blocks, run_blocks
 from ..metrics import Averages, pooled
 from ..model import Model
 from . import NETWORK_METHODS, Fit, TrainingData, coverage, fit, predict, uncertainty
+from .data import joined
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 
@@ -108,11 +109,6 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
-def _joined(parts: Sequence[TrainingData]) -> TrainingData:
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
-
-
 def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
     """Fits a model to the training runs of a data set.
 
@@ -131,7 +127,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     for k, run in enumerate(runs):
         say(f"reading {run.file}")
         parts.append(samples_of(front.blocks(run), front.block_s, k))
-    data = _joined(parts)
+    data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
             str(dataset.folder),

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from ..metrics import MAD_TO_SIGMA
 from .data import TrainingData, average
 
 __all__ = ["floor_dph", "not_white"]
 
 Floats = NDArray[np.float64]
-_MAD_TO_SIGMA = 1.4826
 _CLIP = 4.5
 _SIGNIFICANCE = 1e-3
 _LAGS = 10
@@ -23,7 +23,7 @@ def robust_sigma(x: Floats) -> float:
     """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
     if len(x) == 0:
         return 0.0
-    limit = _CLIP * _MAD_TO_SIGMA * float(np.median(np.abs(x)))
+    limit = _CLIP * MAD_TO_SIGMA * float(np.median(np.abs(x)))
     inside = x[np.abs(x) <= limit]
     return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..metrics import MAD_TO_SIGMA
 from .data import Bins, Scaling, TrainingData, average, gather
 
 __all__ = ["Process", "fit_process"]
@@ -88,7 +89,7 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
         else:
             model.optimise_from(start)
         residual = np.abs(y - model.mean(t, r)) * np.sqrt(weight)
-        inside = residual <= _TRIM_SIGMA * 1.4826 * np.median(residual[kept])
+        inside = residual <= _TRIM_SIGMA * MAD_TO_SIGMA * np.median(residual[kept])
         if round_ == _TRIMS or np.array_equal(inside, kept) or inside.sum() < 0.5 * len(kept):
             break
         kept, start = inside, model.log_parameters
