@@ -1,3 +1,4 @@
+# long: one file format; its fields, their checks and the equation are read together
 """The fitted model of one axis of one gyro: frozen in memory, JSON on disk (docs/FORMAT.md, section 1).
 
 Stage 4 of the house (recordings → samples → **model** → tables → C → proof → report). Reads and

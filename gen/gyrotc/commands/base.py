@@ -59,7 +59,12 @@ AverageOption = Annotated[
     float, typer.Option("--average-s", min=0.001, help="Averaging of all RMS figures, s.")
 ]
 MethodOption = Annotated[str, typer.Option("--method", help="mrbf (default), mrbf_paper, rbf_ols, ...")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.")]
+SeedOption = Annotated[
+    int,
+    typer.Option(
+        "--seed", help="Number from which everything random is drawn; the same number, the same result."
+    ),
+]
 CentersOption = Annotated[
     int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")
 ]

@@ -157,7 +157,7 @@ def compare(
 
 
 @app.command()
-def diagnose(
+def diagnose(  # long: the parts of a command in the order in which they are printed
     dataset: DatasetArg,
     model: Annotated[Path | None, typer.Option("--model", help="A model.json made before.")] = None,
     out: Annotated[

@@ -123,7 +123,7 @@ def emit(
 
 
 @app.command()
-def verify(
+def verify(  # long: the parts of a command in the order in which they are printed
     folder: DirArg,
     target: Annotated[
         list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")

@@ -71,7 +71,7 @@ def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
     return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
 
 
-def run_blocks(
+def run_blocks(  # long: one line for each field of the result
     rows: Rows,
     run: Run,
     *,

@@ -138,7 +138,9 @@ def build_into(
     )
 
 
-def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
+def _build_axis(
+    dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress
+) -> Built:  # long: the stages in their order
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)

@@ -52,7 +52,7 @@ def findings_of(
     """All findings, the gravest first.
 
     Args:
-        facts: Of the runs that were evaluated.
+        facts: What was seen in each run that was evaluated.
         model: The model that was evaluated.
         result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
         training: The object of `training.json`, for figures of spans left out of training.
@@ -171,7 +171,7 @@ def _contradictions(
     Args:
         keys: Place (two columns) and number of the run, shape (n, 3).
         mean: Mean rate there, deg/h, shape (n,).
-        scatter: Of a minute within a place, deg/h.
+        scatter: By how much means over a minute scatter within a place, deg/h.
     """
     _, place = np.unique(keys[:, :2], axis=0, return_inverse=True)
     order = np.argsort(place.reshape(-1), kind="stable")

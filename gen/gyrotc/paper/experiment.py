@@ -53,7 +53,7 @@ class Cell:
     Attributes:
         before, predicted: Measured bias and the model's, shape (n,).
         train_rms_dph: RMS of what is left of the training means.
-        centers: Of the model that was used here.
+        centers: How many the model has that was used here.
     """
 
     before: Array

@@ -50,7 +50,7 @@ def corrections(
         steps: The corrections of the history.
         stream: Its samples.
         channels: Bits of every row's channels, shape (n, n_channels).
-        samples_per_block: As given to `gtc_<n>_init`.
+        samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     made = np.flatnonzero(steps.kind == MAP)
     outcome = _outcome(table, steps, stream, table.numbers(channels), samples_per_block)

@@ -56,7 +56,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         table: The table.
         channels: Bits of every row's channels, shape (n, n_channels).
         missed: Samples that did not arrive before each row, shape (n,).
-        samples_per_block: As given to `gtc_<n>_init`.
+        samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     settings = settings_of(table, samples_per_block)
     channels, missed = np.asarray(channels), np.asarray(missed, dtype=np.int64)

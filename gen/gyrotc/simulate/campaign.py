@@ -72,7 +72,7 @@ def simulate(
         row_s: Length of a row, s: a whole number, or one that divides a second.
         raw_hz: Rows a second instead of `row_s`.
         pulses: Integer pulses instead of rates.
-        format: Of the run files.
+        format: The run files are written in it: "csv" or "parquet".
         noise: Levels where the scenario gives none: the paper's, or typical ones of the class.
         progress: Called with the share that is done, 0 ... 1.
 

@@ -46,7 +46,7 @@ class Course:
         closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
         elapsed: Blocks since power-on, shape (n,).
         taken: How many samples of the channels had come, shape (n,).
-        samples_per_block: As in the table's front end.
+        samples_per_block: Temperature samples in a block of the front end.
     """
 
     temperature: Numbers

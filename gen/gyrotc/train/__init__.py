@@ -51,7 +51,7 @@ def fit(
     Args:
         data: Samples; exact duplicates by run and time count once.
         method: One of `METHODS`.
-        seed: Of everything random.
+        seed: Whatever is drawn at random (start of the Kohonen network, random centers) follows from it.
         centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
         rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.

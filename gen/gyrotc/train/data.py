@@ -91,6 +91,21 @@ def cleaned(data: TrainingData) -> TrainingData:
         InputError: Lengths differ, nothing is there, a value is not finite, a weight or duration is not
             positive.
     """
+    columns = _checked(data)
+    run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
+    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
+        run_of = columns.pop("run").astype(np.int64)
+        return TrainingData(run=run_of, **columns)
+    keys = ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph")  # the first counts most
+    order = np.lexsort([columns[name] for name in reversed(keys)])
+    same = np.all([np.diff(columns[name][order]) == 0 for name in keys], axis=0)
+    first = np.r_[True, ~same]
+    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
+    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
+
+
+def _checked(data: TrainingData) -> dict[str, Floats]:
+    """Columns by name, after the checks of `cleaned`."""
     columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
         raise InputError(
@@ -106,26 +121,7 @@ def cleaned(data: TrainingData) -> TrainingData:
     for name in ("weight", "duration_s"):
         if columns[name].min() <= 0.0:
             raise InputError(f"training data, {name}", repr(float(columns[name].min())), "a number above 0")
-    run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
-    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
-        run_of = columns.pop("run").astype(np.int64)
-        return TrainingData(run=run_of, **columns)
-    order = np.lexsort(
-        (
-            columns["bias_dph"],
-            columns["slope_c_per_min"],
-            columns["temperature_c"],
-            columns["time_s"],
-            columns["run"],
-        )
-    )
-    first = np.ones(len(order), dtype=bool)
-    same = np.ones(len(order) - 1, dtype=bool)
-    for name in ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph"):
-        same &= np.diff(columns[name][order]) == 0
-    first[1:] = ~same
-    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
-    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
+    return columns
 
 
 def scaling_of(data: TrainingData) -> Scaling:
@@ -145,7 +141,7 @@ def average(data: TrainingData, length_s: float) -> TrainingData:
     """Weighted means over `length_s` within each run, in cells of the run's clock; samples that long stay.
 
     Args:
-        data: As `cleaned` returns it.
+        data: Samples as `cleaned` returns them.
         length_s: Length of a mean, s.
 
     Returns:

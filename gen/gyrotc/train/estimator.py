@@ -54,7 +54,7 @@ class RBFNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         n_centers: Largest number of Gaussians; None: chosen from the data.
-        random_state: Of the candidate centers: an integer, a RandomState or None.
+        random_state: Draws the candidate centers: an integer, a RandomState or None.
 
     Attributes (after `fit`):
         centers_: Centers, shape (M, n_features), in the units of X.

@@ -184,7 +184,7 @@ def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: floa
     return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
 
 
-def model_of(
+def model_of(  # long: one line for each field of model.json
     dataset: Dataset,
     runs: Sequence[Run],
     data: TrainingData,

@@ -42,7 +42,7 @@ def fit_mrbf(
     Args:
         data: Cleaned samples.
         scaling: Normalisation of the inputs.
-        seed: Of the Kohonen network.
+        seed: Draws the start of the Kohonen network.
         centers: Number of centers asked for; None: chosen from the data.
         average_s: Averaging of RMS figures, s.
     """
@@ -60,16 +60,8 @@ def fit_mrbf(
         ],
         "chosen": chosen,
         "expected_error": float(expected),
-        "evidence": {
-            "log_parameters": [float(p) for p in model.log_parameters],
-            "value": float(model.value),
-            "evaluations": int(model.evaluations),
-            "freedom": float(model.freedom),
-        },
+        **_facts(process),
         "samples": len(data),
-        "means": len(process.y),
-        "bins": len(process.bins.t),
-        "trimmed": int(np.sum(~process.kept)),
         "seconds": {"evidence": evidence_s, "compression": time.process_time() - began - evidence_s},
     }
     kept = process.kept
@@ -83,6 +75,22 @@ def fit_mrbf(
         withheld=withheld,
         process=process,
     )
+
+
+def _facts(process: Process) -> dict[str, Any]:
+    """What was trained on, and how the maximum of the evidence was found."""
+    model = process.model
+    return {
+        "evidence": {
+            "log_parameters": [float(p) for p in model.log_parameters],
+            "value": float(model.value),
+            "evaluations": int(model.evaluations),
+            "freedom": float(model.freedom),
+        },
+        "means": len(process.y),
+        "bins": len(process.bins.t),
+        "trimmed": int(np.sum(~process.kept)),
+    }
 
 
 def _compress(

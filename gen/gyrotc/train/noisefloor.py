@@ -78,7 +78,7 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
     not show is 0; all are None where the record is too short.
 
     Args:
-        residuals: As for `allan_variance`.
+        residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
         step_s: Length of a mean, s.
     """
     points = allan_variance(residuals, step_s)

@@ -89,7 +89,7 @@ def fit_ols(
         method: Name of the method.
         data: Cleaned samples.
         scaling: Normalisation of the inputs.
-        seed: Of the random samples or the Kohonen network.
+        seed: Draws the random samples, or the start of the Kohonen network.
         centers: Number of centers (the rule then only chooses the width); None: by the rule.
         rho: Threshold of eq. (16); None: where the residual reaches the noise that the samples show.
         size_rule: One of `SIZE_RULES`; None: the method's own, or `rho` where `rho` is given.
