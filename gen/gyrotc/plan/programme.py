@@ -35,7 +35,7 @@ class Programme:
         records: Temperatures as the sensor will show them; rates are the simulated bias without noise, deg/h.
         declared: Noise that the gyro is taken to have.
         hours: Length of every run, h.
-        bias_range_dph: By how much the simulated gyro's bias changes over the programme, deg/h.
+        bias_range_dph: Lowest and highest bias of the simulated gyro, deg/h.
     """
 
     name: str
