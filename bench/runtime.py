@@ -14,7 +14,7 @@ from unittest import mock
 
 import numpy as np
 from gyrotc.emit.files import emit, emitted_tables, vectors
-from gyrotc.emit.files.vectors import make_vectors
+from gyrotc.emit.vectors import make_vectors
 from gyrotc.errors import CheckFailed
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
 from gyrotc.reference import answers, evaluate_map

@@ -16,7 +16,7 @@ from gyrotc.diagnose import cache, diagnose
 from gyrotc.diagnose.bank import build
 from gyrotc.diagnose.recordings import records_of
 from gyrotc.emit.files import emit
-from gyrotc.emit.files.record import RECORD, read_options
+from gyrotc.emit.record import RECORD, read_options
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
 from gyrotc.inputs.stored import read_result
