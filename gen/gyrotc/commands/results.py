@@ -8,7 +8,6 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..judge.judged import judged_by
 from ..pages.published import ENVIRONMENTS
 
 
@@ -139,11 +138,10 @@ def _difference_text(file: dict[str, Any]) -> str:
 
 def summary(result: dict[str, Any]) -> str:
     """One line that says what was gained; the paper's own figure beside it for the paper's scenario."""
-    judged = judged_by(result)
-    if not judged or not judged.pooled["improvement"]:
+    part = result.get("exam") or result.get("left_out") or result.get("train")
+    if not part or not part["improvement"]:
         return "no sample to judge by"
-    part = judged.pooled
-    if judged.kind == "exam":
+    if result.get("exam"):
         published = {run["environment"] for run in result["runs"]} == set(ENVIRONMENTS)
         text = f"improvement {part['improvement']:.2f}" + (" (paper: 9.8-10.4)" if published else "")
     else:

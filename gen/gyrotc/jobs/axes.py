@@ -11,7 +11,6 @@ from ..emit import emitted_tables
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..inputs.stored import read_result
-from ..judge.judged import judged_by
 from ..model import Model, load_model
 from ..outputs import write_atomically
 from ..pages.report import page_environment
@@ -43,11 +42,8 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
         (c / name).write_bytes(data)
     _run_together(c, [m.id for m in models.values()])
     results = [read_result(folder / axis / "evaluate.json", "evaluate") for axis in axes]
-    judged = [judged_by(result) for result in results]
     text = (
-        page_environment()
-        .get_template("axes.html.j2")
-        .render(models=list(models.values()), results=list(zip(results, judged, strict=True)))
+        page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
     )
     write_atomically(folder / "report.html", text)
 

@@ -16,7 +16,6 @@ from .. import __version__
 from ..errors import InputError
 from ..inputs.stored import read_result
 from ..model import Model, load_model
-from .judged import judged_by
 
 __all__ = ["Earlier", "changes_since", "load_earlier"]
 
@@ -111,16 +110,23 @@ def _map(old: Model, new: Model) -> dict[str, Any] | None:
     }
 
 
+def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any]] | None:
+    for name in ("exam", "left_out", "train"):
+        if evaluation.get(name):
+            return name, evaluation[name]
+    return None
+
+
 def _figures(earlier: Earlier, model: Model, evaluation: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Figures before and after; those of recordings only where both were judged on the same kind."""
     yield "centers", {"before": earlier.model.n_centers, "after": model.n_centers}
     yield "noise_floor_dph", {"before": earlier.model.noise_floor_dph, "after": model.noise_floor_dph}
-    old, new = judged_by(earlier.evaluation), judged_by(evaluation)
-    if old is None or new is None or old.kind != new.kind:
+    old, new = _judged(earlier.evaluation), _judged(evaluation)
+    if old is None or new is None or old[0] != new[0]:
         return
-    yield "judged_on", new.kind
+    yield "judged_on", new[0]
     for name in _FIGURES:
-        yield name, {"before": old.pooled["after"].get(name), "after": new.pooled["after"].get(name)}
+        yield name, {"before": old[1]["after"].get(name), "after": new[1]["after"].get(name)}
 
 
 def _ids(evaluation: dict[str, Any]) -> set[str]:

@@ -16,7 +16,6 @@ import pyarrow.csv as pacsv
 from ..errors import InputError
 from ..inputs import need_memory, open_input, refuse_above
 from ..inputs.stored import read_result
-from ..judge.judged import KINDS, judged_by
 from ..metrics import Averages, average
 from ..model import Model, load_model
 from ..outputs import result_folder, write_atomically
@@ -47,7 +46,6 @@ def write_report(folder: Path) -> Path:
         "changes": read_result(folder / "changes.json", "changes", optional=True),
     }
     with page_from(folder):
-        judged = judged_by(evaluation)
         pictures = _pictures(folder, model, evaluation, training)
         text = (
             page_environment()
@@ -56,8 +54,7 @@ def write_report(folder: Path) -> Path:
                 model=model,
                 evaluation=evaluation,
                 training=training,
-                judged=judged,
-                judged_on=KINDS[judged.kind] if judged else "nothing",
+                judged=_judged(evaluation),
                 pictures=pictures,
                 **beside,
             )
@@ -108,6 +105,18 @@ def page_from(source: Path) -> Iterator[None]:
         raise InputError(
             str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them"
         ) from error
+
+
+def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
+    """What the model is judged by: exam runs, else spans left out, else the training runs themselves."""
+    for key, text in (
+        ("exam", "exam runs, never seen in training"),
+        ("left_out", "spans left out of training in turn"),
+        ("train", "the training runs themselves"),
+    ):
+        if evaluation.get(key):
+            return text, evaluation[key]
+    return "nothing", None
 
 
 def _pictures(

@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...errors import GyrotcError
 from ...inputs import read_json
-from ...judge.judged import Kind
 from ...outputs import faults, json_text, write_atomically
 
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
@@ -32,7 +31,7 @@ class _Stored(BaseModel):
     status: Literal["done", "failed"]
     reason: str | None = None
     serial: str
-    judged_on: Kind | None
+    judged_on: Literal["exam", "left_out", "train"] | None
     before_rms_dph: float | None
     after_rms_dph: float | None
     after_mean_dph: float | None

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ...dataset import load
 from ...errors import CheckFailed, GyrotcError, InputError
-from ...judge.judged import judged_by
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ..build import build_into
@@ -108,15 +107,16 @@ def _built(task: Task) -> Entry:
 
 def _figures(model: Model, evaluation: Entry, verification: Entry) -> Entry:
     """What the summary shows and outliers are sought in."""
-    judged = judged_by(evaluation)
-    before, after = (judged.pooled[part] if judged else {} for part in ("before", "after"))
-    floor, rms = evaluation["noise_floor_dph"], after.get("rms_dph")
+    role = next((r for r in ("exam", "left_out", "train") if evaluation.get(r)), None)
+    judged = evaluation[role] if role else None
+    floor = evaluation["noise_floor_dph"]
+    after = judged["after"]["rms_dph"] if judged else None
     return {
-        "judged_on": judged.kind if judged else None,
-        "before_rms_dph": before.get("rms_dph"),
-        "after_rms_dph": rms,
-        "after_mean_dph": after.get("mean_dph"),
-        "rms_over_floor": rms / floor if floor and rms is not None else None,
+        "judged_on": role,
+        "before_rms_dph": judged["before"]["rms_dph"] if judged else None,
+        "after_rms_dph": after,
+        "after_mean_dph": judged["after"]["mean_dph"] if judged else None,
+        "rms_over_floor": after / floor if floor and after is not None else None,
         "noise_floor_dph": floor,
         "bias_dph": model.fallback_dph,
         "centers": model.n_centers,
