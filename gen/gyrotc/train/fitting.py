@@ -27,14 +27,14 @@ from .spans import Span, training_spans
 __all__ = ["FitOptions", "Fitted", "fit_dataset", "front_end", "model_of", "samples_of", "training_of"]
 
 Progress = Callable[[str], None]
-_SLOPE_WINDOW_S = 100.0
+_SLOPE_WINDOW_S = 100.0  # as long as the paper's means
 _HOLD_S = 300.0
 _MAX_RATE_C_PER_MIN = 30.0
 _MAX_STEP_C = 1.0
-_COVERAGE_CELLS = (32, 12)
-_UNCERTAINTY_CELLS = (6, 4)
+_COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
+_UNCERTAINTY_CELLS = (6, 4)  # of T and of dT/dt: 24 words in a table
 _MIN_SAMPLES = 8
-_CENTER_GRID = 2.0**20
+_CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 
 
 @dataclass(frozen=True, slots=True)

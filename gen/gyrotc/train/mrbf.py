@@ -26,12 +26,12 @@ __all__ = ["fit_mrbf"]
 Floats = NDArray[np.float64]
 
 MAX_CENTERS = 24
-_DEPARTURE = 0.1
+_DEPARTURE = 0.1  # of the expected squared error: docs/training.md, section 1, step 5
 _SETTLED = 0.01
-_RIDGE = 0.01
-_KOHONEN_NODES = 40
-_GAP_GRID = (17, 9)
-_GAP_WEIGHT = 0.02
+_RIDGE = 0.01  # of the noise variance: it bounds the weights (docs/training.md, section 1)
+_KOHONEN_NODES = 40  # candidates: docs/training.md, section 1, step 3
+_GAP_GRID = (17, 9)  # points of T and of dT/dt over the envelope
+_GAP_WEIGHT = 0.02  # of all samples together: the network follows the process between the ramps, too (step 4)
 
 
 def fit_mrbf(

@@ -14,9 +14,9 @@ from .data import TrainingData, average
 __all__ = ["floor_dph", "not_white"]
 
 Floats = NDArray[np.float64]
-_CLIP = 4.5
-_SIGNIFICANCE = 1e-3
-_LAGS = 10
+_CLIP = 4.5  # robust σ, as outliers are dropped in training (process.py)
+_SIGNIFICANCE = 1e-3  # of each test: docs/training.md, section 1, step 5
+_LAGS = 10  # of the autocorrelation, Ljung and Box 1978
 
 
 def robust_sigma(x: Floats) -> float:

@@ -37,7 +37,7 @@ _MAX_CENTERS = 30
 _FOLDS = 5
 _BLOCKS = 20
 _GUARD_S = 300.0
-_RIDGE = 1e-8
+_RIDGE = 1e-8  # times all weight: slight, for candidates that nearly coincide (docs/training.md, section 2)
 _TOLERANCE = 1e-3  # a smaller model whose criterion is worse by this share is preferred
 _EXCESS = 1.02  # of the noise floor: what the default ρ asks for
 

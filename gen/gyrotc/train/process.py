@@ -19,8 +19,8 @@ __all__ = ["Process", "fit_process"]
 Floats = NDArray[np.float64]
 
 MEAN_S = 50.0
-_TRIM_SIGMA = 4.5
-_TRIMS = 3
+_TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
+_TRIMS = 3  # rounds of dropping and fitting again
 _GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
 
 
