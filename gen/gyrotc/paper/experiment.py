@@ -48,17 +48,15 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one method makes of one environment: exam means over 100 s, deg/h, and how it was trained.
+    """What one method makes of one environment: exam means over 100 s, deg/h, and how many centers it took.
 
     Attributes:
         before, predicted: Measured bias and the model's, shape (n,).
-        train_rms_dph: RMS of what is left of the training means.
         centers: How many the model has that was used here.
     """
 
     before: Array
     predicted: Array
-    train_rms_dph: float
     centers: int
 
     @property
@@ -136,11 +134,9 @@ def _least_squares(data: TrainingData, variables: int) -> Outcome:
 
 
 def _cell(group: Group, trained: Fit) -> Cell:
-    left = _means(group.train, group.train.bias_dph) - _means(group.train, _predicted(trained, group.train))
     return Cell(
         before=_means(group.exam, group.exam.bias_dph),
         predicted=_means(group.exam, _predicted(trained, group.exam)),
-        train_rms_dph=float(np.sqrt(np.mean(left**2))),
         centers=sum(len(part["centers"]) for part in trained.networks),
     )
 
