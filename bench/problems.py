@@ -12,7 +12,7 @@ import numpy as np
 from gyrotc.dataset import load
 from gyrotc.simulate import read_truth, simulate
 from gyrotc.train import TrainingData
-from gyrotc.train.data import average
+from gyrotc.train.data import average, joined
 from gyrotc.train.fitting import front_end, samples_of
 from numpy.typing import NDArray
 
@@ -49,12 +49,6 @@ def gyro(scenario: str, seed: int) -> Gyro:
     train = tuple(p for p, role in zip(parts, roles, strict=True) if role == "train")
     exam = tuple(p for p, role in zip(parts, roles, strict=True) if role == "exam")
     return Gyro(train, exam, noise)
-
-
-def joined(parts: Sequence[TrainingData]) -> TrainingData:
-    """Several runs as one set of samples."""
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
 def means(data: TrainingData) -> tuple[Floats, Floats, Floats]:

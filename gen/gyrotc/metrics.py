@@ -7,6 +7,7 @@ with ddof 0; pooled figures are over all averaged samples.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,16 @@ from numpy.typing import NDArray
 
 from .inputs import need_memory
 
-__all__ = ["Averages", "average", "pooled", "statistics", "time_statistics"]
+__all__ = ["LEAST_SPAN_C", "MAD_TO_SIGMA", "Averages", "average", "pooled", "statistics", "time_statistics"]
 
 Array = NDArray[np.float64]
+
+MAD_TO_SIGMA = 1.0 / NormalDist().inv_cdf(0.75)
+"""σ of a normal distribution over its median absolute deviation: half of it lies within its quartiles."""
+
+LEAST_SPAN_C = 2.0
+"""A smaller span of temperature says nothing about temperature (finding `no_temperature_information`)."""
+
 _HALF_HOUR_S = 1800.0
 _HOUR_S = 3600.0
 _FIRST_S = 600.0

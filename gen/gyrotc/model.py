@@ -1,3 +1,4 @@
+# long: one file format; its fields, their checks and the equation are read together
 """The fitted model of one axis of one gyro: frozen in memory, JSON on disk (docs/FORMAT.md, section 1).
 
 Stage 4 of the house (recordings → samples → **model** → tables → C → proof → report). Reads and
@@ -26,7 +27,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from .errors import InputError
 from .inputs import read_json
-from .outputs import write_atomically
+from .outputs import canonical_json, json_text, write_atomically
 from .terms import CATALOGUE
 from .terms import Term as Cause
 from .terms.tabled import Tabled
@@ -319,15 +320,12 @@ class Model(_Frozen):
     def to_json(self) -> str:
         """Text of `model.json`: the object, and last the checksum that `load_model` demands."""
         content = {**self.to_dict(), CHECKSUM: self.hash}
-        return json.dumps(content, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
+        return json_text(content)
 
     @property
     def hash(self) -> str:
         """SHA-256 of the canonical form: sorted keys, no spaces, ASCII."""
-        text = json.dumps(
-            self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False
-        )
-        return hashlib.sha256(text.encode("ascii")).hexdigest()
+        return hashlib.sha256(canonical_json(self.to_dict())).hexdigest()
 
     def save(self, path: Path) -> None:
         """Writes `model.json` to a temporary name, then renames."""

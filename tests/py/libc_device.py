@@ -15,7 +15,6 @@ from gyrotc.reference.table import Table, Words
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 
-E_LAYOUT, E_IMAGE, E_ID = -2, -4, -5
 OPTIONS = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4}
 
 

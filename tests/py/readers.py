@@ -17,7 +17,7 @@ from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.diagnose.signatures import cache
 from gyrotc.diagnose.signatures.signature_bank import build
 from gyrotc.emit.files import emit
-from gyrotc.emit.files.record import RECORD, read_options
+from gyrotc.emit.record import RECORD, read_options
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
 from gyrotc.inputs.stored import read_result

@@ -12,16 +12,17 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 # From left to right. A stage is a module or a package of gyrotc.
 ORDER = [
     "errors",
+    "status",
     "outputs",
     "inputs",
     "texts",
+    "metrics",
     "_core",
     "terms",
     "dataset",
     "importers",
     "simulate",
     "frontend",
-    "metrics",
     "model",
     "train",
     "reference",
@@ -79,3 +80,21 @@ def test_the_reader_of_imports_sees_a_wrong_one(tmp_path: Path) -> None:
     """The check itself can fail: cli is seen as an import of any module that names it."""
     assert "model" in _imported(PACKAGE / "emit" / "files.py")
     assert "errors" in _imported(PACKAGE / "model.py")
+
+
+def _exists(module: str) -> bool:
+    path = PACKAGE.joinpath(*module.split(".")[1:])
+    return module == "gyrotc._core" or path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
+
+
+def test_what_stands_beside_the_package_imports_modules_that_are_there() -> None:
+    """Much of it runs in an hour of `make bench` or `make blind` only: a module that moved must not wait for that."""
+    root = PACKAGE.parents[1]
+    for path in (
+        p for folder in ("tests", "bench", "tools", "examples") for p in (root / folder).rglob("*.py")
+    ):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            found = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            for module in (m for m in found if m.split(".")[0] == "gyrotc"):
+                assert _exists(module), f"{path.relative_to(root)}:{node.lineno} imports {module}"

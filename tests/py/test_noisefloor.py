@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import allantools
 import numpy as np
 import pytest
 from gyrotc.train.noisefloor import allan_variance, noise_terms, sensitivities, stretches
@@ -49,6 +50,19 @@ def test_terms_scale_with_the_rate() -> None:
     one = noise_terms(runs(2), STEP_S)
     ten = noise_terms([10.0 * r for r in runs(2)], STEP_S)
     assert ten["arw_deg_per_sqrt_h"] == pytest.approx(10.0 * one["arw_deg_per_sqrt_h"])
+
+
+def test_the_deviation_is_that_of_allantools() -> None:
+    """Of a stretch with white noise, a walk and a mean far from 0, whose length is no power of two."""
+    rng = np.random.default_rng(SEED)
+    rate = 30.0 + rng.normal(0.0, 1.0, 1237) + np.cumsum(rng.normal(0.0, 0.1, 1237))
+    points = allan_variance([rate], STEP_S)
+    taus, expected, _, pairs = allantools.oadev(
+        rate, rate=1.0 / STEP_S, data_type="freq", taus=[point.tau_s for point in points]
+    )
+    assert [p.tau_s for p in points] == taus.tolist() == [STEP_S * 2**k for k in range(len(points))]
+    assert [p.deviation_dph for p in points] == pytest.approx(expected.tolist(), rel=1e-9), f"seed {SEED}"
+    assert [p.freedom * p.tau_s / STEP_S for p in points] == pytest.approx(pairs.tolist())
 
 
 def test_stretches_are_not_joined() -> None:

@@ -11,8 +11,9 @@ from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import Model
 from gyrotc.quantise import NUMERICS
 from gyrotc.reference.table import Table, Words
+from gyrotc.status import E_ID, E_IMAGE, E_LAYOUT
 from libc_build import Runtime, runtime
-from libc_device import E_ID, E_IMAGE, E_LAYOUT, Device, history, variant
+from libc_device import Device, history, variant
 from models import random_model
 
 MINIMAL = ("-UGTC_WITH_BANK", "-UGTC_OPEN_TERMS")

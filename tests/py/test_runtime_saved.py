@@ -9,8 +9,9 @@ import pytest
 from gyrotc.model import Model, Term
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference.table import Words
+from gyrotc.status import E_ID, E_IMAGE
 from libc_build import Runtime, runtime
-from libc_device import E_ID, E_IMAGE, SAVE_WORDS, Device, history, variant
+from libc_device import SAVE_WORDS, Device, history, variant
 from models import random_history
 
 

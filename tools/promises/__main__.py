@@ -1,4 +1,4 @@
-"""What the C runtime promises, checked on its text, its objects and by the analysers: `python tools/promises`.
+"""What the C runtime and the generator promise, checked on text, objects and by analysers: `python tools/promises`.
 
 Prints what is broken, one line each; exit status 1 if there is anything. Standard library only.
 """
@@ -11,12 +11,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import analysers
+import lengths
 import objects
 import source
 
 CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "words": source.forbidden_words,
     "functions": source.long_functions,
+    "lengths": lengths.long_python,
     "warnings": objects.warnings,
     "cplusplus": objects.cplusplus,
     "symbols": objects.symbols,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from rich.text import Text
 
 from .. import __version__
 from ..inputs import CEILINGS, set_ceilings
-from ..outputs import check_replaceable, write_result
+from ..outputs import check_replaceable, json_text, write_result
 from ..texts import terminal_text
 
 app = typer.Typer(
@@ -66,7 +65,12 @@ MethodOption = Annotated[
         help="auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ...",
     ),
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.")]
+SeedOption = Annotated[
+    int,
+    typer.Option(
+        "--seed", help="Number from which everything random is drawn; the same number, the same result."
+    ),
+]
 CentersOption = Annotated[
     int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")
 ]
@@ -111,10 +115,6 @@ def tell(text: str) -> None:
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
     if path is not None:
         write_result(path, json_text(result))
-
-
-def json_text(result: dict[str, Any]) -> str:
-    return json.dumps(result, indent=1, allow_nan=False) + "\n"
 
 
 def numerics_of(text: str | None) -> list[str] | None:

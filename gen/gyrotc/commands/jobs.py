@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import CheckFailed, InputError
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     OUT,
     AppliedOption,
@@ -26,7 +26,6 @@ from .base import (
     SeedOption,
     TrustUnitsOption,
     app,
-    json_text,
     numerics_of,
     progress,
     tell,
@@ -171,7 +170,7 @@ def compare(
 
 
 @app.command()
-def diagnose(
+def diagnose(  # long: the parts of a command in the order in which they are printed
     dataset: DatasetArg,
     model: Annotated[Path | None, typer.Option("--model", help="A model.json made before.")] = None,
     out: Annotated[

@@ -9,7 +9,7 @@ import typer
 
 from .. import __version__
 from ..errors import CheckFailed, InputError
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     ERR,
     OUT,
@@ -29,7 +29,6 @@ from .base import (
     TrustOption,
     TrustUnitsOption,
     app,
-    json_text,
     numerics_of,
     progress,
     tell,
@@ -134,7 +133,7 @@ def emit(
 
 
 @app.command()
-def verify(
+def verify(  # long: the parts of a command in the order in which they are printed
     folder: DirArg,
     target: Annotated[
         list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")

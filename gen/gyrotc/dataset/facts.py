@@ -8,6 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from ..metrics import MAD_TO_SIGMA
 from .records import EarthRate, Floats, Rows, Run
 
 __all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
@@ -23,7 +24,6 @@ _MAX_JUMPS = 20
 _OUTLIER_SIGMAS = 8.0
 _OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
-_MAD_TO_SIGMA = 1.4826
 _PART = 2**16  # rows that are looked at together
 
 Mask = NDArray[np.bool_]
@@ -113,7 +113,7 @@ class RunFacts:
     earth: EarthRate | None
 
 
-def facts_of(run: Run, rows: Rows) -> RunFacts:
+def facts_of(run: Run, rows: Rows) -> RunFacts:  # long: one line for each fact
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
     time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
@@ -176,7 +176,7 @@ def _robust_sigma(values: Floats) -> float:
     """
     if len(values) == 0:
         return 0.0
-    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(values, out=values), overwrite_input=True))
+    sigma = MAD_TO_SIGMA * float(np.median(np.abs(values, out=values), overwrite_input=True))
     return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
 
 
@@ -203,7 +203,7 @@ def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, 
     if len(temperature) < 7:
         return ()
     departure = _departures(np.diff(temperature))
-    noise = _MAD_TO_SIGMA * float(np.median(departure))
+    noise = MAD_TO_SIGMA * float(np.median(departure))
     found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
     changes = _changes(temperature)
     last = changes[np.searchsorted(changes, found, side="right") - 1]
@@ -235,7 +235,7 @@ def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
         return 0, None
     step = np.diff(np.r_[rate[2], rate, rate[-3]])
     moved = np.abs(step[step != 0.0])
-    limit = _OUTLIER_SIGMAS * _MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0) if len(moved) else np.inf
+    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0) if len(moved) else np.inf
     large = np.flatnonzero(np.abs(step) > limit)
     first, last = large[:-1], large[1:]
     pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
@@ -268,7 +268,7 @@ def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[flo
             continue
         rest = np.abs(step - size * np.rint(step / size))
         wraps = np.flatnonzero((np.abs(step) > 0.5 * size) & (rest < size / 8.0))
-        usual = _MAD_TO_SIGMA * float(np.median(rest))
+        usual = MAD_TO_SIGMA * float(np.median(rest))
         wraps = wraps[rest[wraps] <= _OUTLIER_SIGMAS * usual + 4.0]
         if len(wraps) and usual < size / 32.0:
             return float(time[use][wraps[0] + 1]), bits, len(wraps)

@@ -69,7 +69,7 @@ def axes_of(folder: Path) -> tuple[str, ...]:
     return tuple(layout.axes)
 
 
-def survey(
+def survey(  # long: a reader is told everything that it needs, by name
     folder: Path,
     problems: Problems,
     *,

@@ -163,7 +163,7 @@ class Dataset:
         serial: Serial of the gyro.
         axis: Chosen axis, None where the recordings have one rate.
         description: Free text.
-        earth_rate: As stated: "removed", "none" or "compute"; None if not stated.
+        earth_rate: What the data set states: "removed", "none" or "compute"; None if not stated.
         noise: Declared noise, None if not declared.
         applied_table: Hash of the model that was subtracted while recording, None: none.
         meta: Free facts, JSON types only.

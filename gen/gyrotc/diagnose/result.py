@@ -10,9 +10,9 @@ import numpy as np
 
 from .. import __version__
 from ..dataset import Dataset
+from ..metrics import LEAST_SPAN_C
 from ..model import Model
 from ..terms import CATALOGUE, separate_by
-from ..train.data import MIN_TEMPERATURE_SPAN_C
 from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
 from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
@@ -81,7 +81,7 @@ def diagnose(
     say("reading")
     records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
-    if float(np.ptp(temperature)) < MIN_TEMPERATURE_SPAN_C:
+    if float(np.ptp(temperature)) < LEAST_SPAN_C:
         return Diagnosis(_not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if is_single_cycle(records) else None

@@ -29,7 +29,7 @@ from ..texts import CText, c_code, c_environment, c_literal
 from .amalgamate import amalgamate
 from .record import RECORD, Options, read_options, record_text
 from .table_text import table_text
-from .vectors import MISSING, make_vectors
+from .vectors import MISSING, Vectors, make_vectors
 
 __all__ = [
     "Emission",
@@ -132,7 +132,26 @@ def emit_texts(
     numerics = tuple(emission.tables)
     options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
     vectors = make_vectors(model, numerics)
-    first = next(iter(emission.tables.values()))
+    texts = _from_templates(model, emission, options, vectors)
+    header, source = amalgamate(
+        *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
+    )
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
+    texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
+    for numeric, table in emission.tables.items():
+        suffix = "" if numeric == numerics[0] else f"_{numeric}"
+        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
+    if expected is None:
+        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
+    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
+    texts[RECORD] = record_text(model, options, texts)
+    return texts
+
+
+def _from_templates(model: Model, emission: Emission, options: Options, vectors: Vectors) -> dict[str, bytes]:
+    """Header, table, vectors and example of a model."""
+    numerics = tuple(emission.tables)
     values: dict[str, Any] = {
         "id": model.id,
         "symbol": model.symbol,
@@ -145,7 +164,7 @@ def emit_texts(
         "v": vectors,
         "n": numerics[0],
         "n_channels": vectors.n_channels,
-        "id_code": first.id,
+        "id_code": emission.tables[numerics[0]].id,
         "tables": [table_text(t, model) for t in emission.tables.values()],
         "facts": list(_facts(model)),
         "valid": _valid(model),
@@ -161,23 +180,7 @@ def emit_texts(
         f"vectors_{model.id}.h": "vectors.h.j2",
         "main.c": "main.c.j2",
     }
-    texts = {
-        name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()
-    }
-    header, source = amalgamate(
-        *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
-    )
-    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
-    texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
-    for numeric, table in emission.tables.items():
-        suffix = "" if numeric == numerics[0] else f"_{numeric}"
-        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
-        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
-    if expected is None:
-        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
-    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
-    texts[RECORD] = record_text(model, options, texts)
-    return texts
+    return {name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()}
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:

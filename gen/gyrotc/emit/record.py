@@ -7,7 +7,6 @@ does not pass either. It is also what a signature covers (docs/signing.md). docs
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..errors import InputError
 from ..inputs import read_input
 from ..model import Model
+from ..outputs import json_text
 from ..reference.table import Numeric
 
 __all__ = ["BESIDES", "RECORD", "SIGNATURE", "Options", "joint_record_text", "read_options", "record_text"]
@@ -70,7 +70,7 @@ def _text(model: Model, files: Mapping[str, bytes], axis: str | None, **facts: A
         **facts,
         "files": {name: hashlib.sha256(files[name]).hexdigest() for name in sorted(files)},
     }
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode("ascii")
+    return json_text(content).encode("ascii")
 
 
 def read_options(c_folder: Path) -> Options:

@@ -60,7 +60,7 @@ class TableText:
     term_codes: tuple[str, ...]
 
 
-def table_text(table: Table, model: Model) -> TableText:
+def table_text(table: Table, model: Model) -> TableText:  # long: member after member, as in gtc_table.h
     """Decodes the image's words into named members; the order is that of gtc_table.h."""
     comments = _row_comments(model)
     words = iter(table.words[_HEAD_WORDS:])

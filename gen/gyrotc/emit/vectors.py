@@ -213,7 +213,7 @@ def _one(numeric: str, value: float) -> int:
     return int(np.clip(round(value * 65536), -(2**31) + 1, 2**31 - 1)) & 0xFFFFFFFF
 
 
-def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:
+def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # long: one script, call by call
     """Start-up, hold, ramps over the envelope and beyond, then every fault, and recovery from it."""
     zero = dict.fromkeys(numerics, 0)
     n = SAMPLES_PER_BLOCK

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs import need_memory
+from ..status import WARMING
 from .believe import HELD, RESTART, believe
 from .numbers import Arithmetic, Numbers
 
@@ -29,7 +30,6 @@ __all__ = [
 ]
 
 MAP, KEEP, FALLBACK = 0, 1, 2
-_WARMING = 1  # GTC_WARMING
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
 
@@ -127,7 +127,7 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
         kind=np.zeros(restarts.size, dtype=np.int8),
         temperature=x[restarts],
         slope=np.zeros_like(x[restarts]),
-        remarks=np.full(restarts.size, _WARMING, dtype=np.int32),
+        remarks=np.full(restarts.size, WARMING, dtype=np.int32),
     )
     # Stable: a block closes before the sample that opens the next one is judged.
     order = np.argsort(np.concatenate([closings.at, starts.at]), kind="stable")
@@ -254,5 +254,5 @@ def _closings(
         kind=kind,
         temperature=mean[blocks],
         slope=slope,
-        remarks=np.where(good & warming, _WARMING, 0).astype(np.int32),
+        remarks=np.where(good & warming, WARMING, 0).astype(np.int32),
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import status as status_bits
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
 from .numbers import F32
 from .stream import Stream
@@ -19,7 +20,6 @@ __all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks", "sa
 
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1
-_HELD, _FALLBACK = 8, 16  # as in gtc.h
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
     return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
 
 
-def run_blocks(
+def run_blocks(  # long: one line for each field of the result
     rows: Rows,
     run: Run,
     *,
@@ -143,12 +143,12 @@ def _in_force(
     source = k[started]
     temperature = np.full(k.size, np.nan, dtype=np.float32)
     slope = np.zeros(k.size, dtype=np.float32)
-    status = np.full(k.size, _HELD, dtype=np.int32)
+    status = np.full(k.size, status_bits.HELD, dtype=np.int32)
     temperature[started] = steps.temperature[source]
     slope[started] = steps.slope[source]
     kind = steps.kind[source]
-    kept = steps.remarks[source] | np.where(kind == KEEP, _HELD, 0)
-    status[started] = np.where(kind == FALLBACK, _HELD | _FALLBACK, kept)
+    kept = steps.remarks[source] | np.where(kind == KEEP, status_bits.HELD, 0)
+    status[started] = np.where(kind == FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)
     return temperature, slope, status
 
 

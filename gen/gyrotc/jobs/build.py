@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from ..judge.changes import changes_since, load_earlier
 from ..judge.evaluate import evaluate
 from ..judge.limits import Limits, held_against, load_limits
 from ..model import Model
-from ..outputs import MARKER, result_folder, sha256, write_atomically
+from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
 from ..pages.report import write_report
 from ..quantise.applied import applied_of
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
@@ -33,11 +32,14 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What `build` made: the JSON objects of its stages, the arithmetics that were refused (with the reason), and the
-    checks that failed (none: exit 0); with `extend` what was diagnosed, with `limits` and `previous` the objects of
+    """What `build` made: the model and the JSON objects of its stages.
+
+    `refused` names the arithmetics that were refused, with the reason; `failures` are the checks that failed (none:
+    exit 0); with `extend` what was diagnosed, with `limits` and `previous` the objects of
     `limits.json` and `changes.json`.
     """
 
+    model: Model
     training: dict[str, Any]
     evaluation: dict[str, Any]
     verification: dict[str, Any]
@@ -56,6 +58,7 @@ class _Order:
     extend: bool
     limits: Limits | None
     previous: Path | None
+    compiled: bool = True
 
 
 def build(
@@ -121,16 +124,25 @@ def build_into(
     *,
     numerics: Sequence[str] | None = None,
     limits: Limits | None = None,
+    compiled: bool = True,
 ) -> Built:
     """The main job for one axis, into a folder that is there; the caller sees to it that it appears whole.
+
+    Args:
+        compiled: False: no compiler and no drawing. What the C code answers is taken from the reference, which is the
+            same bit for bit; traces and `report.html` are left out.
 
     Raises:
         CheckFailed: Every arithmetic is refused.
     """
-    return _build_axis(dataset, work, options, _Order(numerics, False, limits, None), lambda _: None)
+    return _build_axis(
+        dataset, work, options, _Order(numerics, False, limits, None, compiled), lambda _: None
+    )
 
 
-def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
+def _build_axis(
+    dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress
+) -> Built:  # long: the stages in their order
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)
@@ -138,14 +150,15 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     _write(work / "training.json", fitted.training)
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics)
-    verification = verify(work, progress=lambda name: say(f"verifying {name}"))
+    verification = verify(work, compiled=order.compiled, progress=lambda name: say(f"verifying {name}"))
     _write(work / "verify.json", verification)
     evaluation = evaluate(
         work,
         dataset,
         average_s=options.average_s,
-        trace=work / "trace",
+        trace=work / "trace" if order.compiled else None,
         training=fitted.training,
+        compiled=order.compiled,
         progress=lambda file: say(f"replaying {file}"),
     )
     _write(work / "evaluate.json", evaluation)
@@ -157,9 +170,11 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     changes = changes_since(earlier, fitted.model, evaluation, manifest) if earlier else None
     if changes:
         _write(work / "changes.json", changes)
-    say("drawing the report")
-    write_report(work)
+    if order.compiled:
+        say("drawing the report")
+        write_report(work)
     return Built(
+        fitted.model,
         fitted.training,
         evaluation,
         verification,
@@ -197,6 +212,12 @@ def _failures(
     for file in verification["emitted"]:
         if file["status"] == "fail":
             yield f"{file['file']}: {file['verdict']}"
+    for error in verification["errors"]:
+        if error["status"] == "fail":
+            yield (
+                f"{error['numeric']}: {error['worst_dph']:.3g} deg/h from the model, above the proven bound of "
+                f"{error['bound_dph']:.3g}"
+            )
     if evaluation["mismatches"]:
         yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
     for check in held["limits"] if held else ():
@@ -205,7 +226,7 @@ def _failures(
 
 
 def _write(path: Path, result: dict[str, Any]) -> None:
-    write_atomically(path, json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_atomically(path, json_text(result))
 
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from ..dataset import Dataset
 from ..errors import InputError
 from ..metrics import Averages, average, pooled
 from ..train import METHODS, Fit, TrainingData, fit, predict
+from ..train.data import joined
 from ..train.fitting import front_end, samples_of
 from ..train.spans import training_spans
 
@@ -94,7 +95,7 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     front = front_end(training, options.block_s)
     parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(training)]
-    data = _joined(parts)
+    data = joined(parts)
     if len(data) == 0:
         raise InputError(
             str(dataset.folder), "no usable sample", "at least one valid block of a training run"
@@ -118,11 +119,6 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     else:
         held = [_Held(run.environment or run.file, parts[k], data.run != k) for k, run in enumerate(training)]
     return data, [h for h in held if h.seen.any()], "left_out"
-
-
-def _joined(parts: Sequence[TrainingData]) -> TrainingData:
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
 def _judged(

@@ -6,7 +6,6 @@ stands in the folder.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -16,7 +15,7 @@ from typing import Any
 from ..dataset import Dataset
 from ..diagnose import Diagnosis, diagnose
 from ..model import Model
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from ..pages.diagnosis_page import PICTURES, write_diagnosis_page
 from ..pages.diagnosis_plots import draw
 from ..texts import toml_comment, toml_key, toml_value
@@ -64,7 +63,7 @@ def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagn
     for name, svg in draw(found).items():
         write_atomically(out / PICTURES / f"{name}.svg", svg)
         result["pictures"].append(f"{PICTURES}/{name}.svg")
-    write_atomically(out / "diagnose.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_atomically(out / "diagnose.json", json_text(result))
     write_diagnosis_page(out)
     return replace(found, result=result)
 

@@ -59,8 +59,8 @@ class CheckResult:
     """What `check` found.
 
     Attributes:
-        serial: As stated; None if that could not be read.
-        axis: As asked for.
+        serial: The stated one; None if that could not be read.
+        axis: The one that was asked for.
         problems: What `fit` refuses.
         doubts: What a person should look at.
         facts: Axis and facts of every run that could be read.

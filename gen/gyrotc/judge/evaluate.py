@@ -219,7 +219,7 @@ def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:
     }
 
 
-def _result(
+def _result(  # long: one line for each field of the result
     model: Model,
     dataset: Dataset,
     table: Table,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Dataset, RunFacts, earth_rate_warning
+from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA
 from ..model import Model
 
 __all__ = [
@@ -27,7 +28,6 @@ __all__ = [
 
 Finding = dict[str, Any]
 
-_LEAST_SPAN_C = 2.0
 _UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
 _UNSEEN_TO_FLOOR = 3.0
 _WEIGHTS_TO_RANGE = 10.0
@@ -35,7 +35,6 @@ _LEAST_COVERAGE = 0.25
 _OUTLIER_SIGMAS = 6.0
 _OUTLIER_SCATTER = 3.0
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
-_MAD_TO_SIGMA = 1.4826
 _GROSS_OUTLIER = 100.0  # times the noise of a row: no noise of a gyro, whatever its tails
 _PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature and rate of it
 _COMMON_PLACES = 5
@@ -55,7 +54,7 @@ def findings_of(
     """All findings, the gravest first.
 
     Args:
-        facts: Of the runs that were evaluated.
+        facts: What was seen in each run that was evaluated.
         model: The model that was evaluated.
         result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
         training: The object of `training.json`, for figures of spans left out of training.
@@ -81,13 +80,13 @@ def temperature_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     if not runs:
         return
     low, high = min(f.temperature_c[0] for f in runs), max(f.temperature_c[1] for f in runs)
-    if high - low < _LEAST_SPAN_C:
+    if high - low < LEAST_SPAN_C:
         yield _finding(
             "no_temperature_information",
             f"Temperature spans {high - low:.3g} C in training: nothing can be learnt about temperature, "
             "and the model is a constant.",
             span_c=high - low,
-            required_c=_LEAST_SPAN_C,
+            required_c=LEAST_SPAN_C,
         )
 
 
@@ -175,7 +174,7 @@ def _contradictions(
     Args:
         keys: Place (two columns) and number of the run, shape (n, 3).
         mean: Mean rate there, deg/h, shape (n,).
-        scatter: Of a minute within a place, deg/h.
+        scatter: By how much means over a minute scatter within a place, deg/h.
     """
     _, place = np.unique(keys[:, :2], axis=0, return_inverse=True)
     order = np.argsort(place.reshape(-1), kind="stable")
@@ -312,7 +311,7 @@ def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:
     samples = np.array([run["samples"] for run in runs])
     floor = result.get("noise_floor_dph") or float(np.median(scatter))
     departure = np.abs(mean - np.median(mean))
-    usual = np.maximum(_MAD_TO_SIGMA * np.median(departure), floor / np.sqrt(samples))
+    usual = np.maximum(MAD_TO_SIGMA * np.median(departure), floor / np.sqrt(samples))
     off = (departure > _OUTLIER_SIGMAS * usual) & (departure > floor)
     loud = scatter > _OUTLIER_SCATTER * np.maximum(np.median(scatter), floor)
     for k in np.flatnonzero(off | loud):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from .files import check_replaceable, write_atomically
 from .folder import Stage, clean, leftovers, result_folder, write_result
 from .interrupts import Interrupted, deferred, die_of, raise_on_signals
+from .jsontext import canonical_json, json_text
 from .lock import Lock
 from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
 
@@ -20,11 +21,13 @@ __all__ = [
     "Lock",
     "Marker",
     "Stage",
+    "canonical_json",
     "check_replaceable",
     "clean",
     "deferred",
     "die_of",
     "faults",
+    "json_text",
     "leftovers",
     "raise_on_signals",
     "read_marker",

@@ -79,7 +79,7 @@ def result_folder(
     Args:
         out: Where the result goes.
         command: The command that writes it.
-        kind: Of the folder; default: the kind of the command. "" for any kind that is there.
+        kind: What kind of folder it becomes; default: the kind of the command. "" takes any kind that is there.
         entries: Names in `out` that are written; all else in it stays. None: the folder is replaced as a whole.
         inputs: What the job reads: `out` must be apart from it.
 

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 from ..errors import InputError
+from .jsontext import json_text
 
 __all__ = ["Lock"]
 
@@ -67,7 +68,7 @@ class Lock:
 def _who(command: str) -> str:
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime())
     who = {"command": command, "pid": os.getpid(), "host": socket.gethostname(), "since": since}
-    return json.dumps(who) + "\n"
+    return json_text(who)
 
 
 def _holder(file: int) -> str:

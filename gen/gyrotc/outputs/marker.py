@@ -18,6 +18,7 @@ from typing import Any
 
 from .. import __version__
 from ..errors import InputError
+from .jsontext import json_text
 
 __all__ = [
     "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "read_marker", "remove_listed", "sha256", "survey",
@@ -87,7 +88,7 @@ class Marker:
         for name in ("pending", "unfinished"):
             if getattr(self, name):
                 content[name] = getattr(self, name)
-        return json.dumps(content, indent=1) + "\n"
+        return json_text(content)
 
     def known(self, name: str) -> set[str]:
         """SHA-256 that a file of this path may have."""

@@ -35,7 +35,7 @@ class Update:
 
     Args:
         earlier: The marker of `place`, if it has one.
-        marker: Of what lies in `work`.
+        marker: Says what lies in `work`.
         entries: Names in `place` that belong to this job: those that were not written again are removed.
     """
 

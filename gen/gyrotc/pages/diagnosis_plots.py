@@ -1,3 +1,4 @@
+# long: one function for each picture of a page
 """Pictures of a diagnosis: what the simulation does not do, what the named cause does, who else was considered.
 
 Draws; computes nothing but running means. `draw` gives all pictures of a diagnosis by name, each one `<svg>` element.
@@ -12,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from ..diagnose import Diagnosis
 from ..diagnose.attribute.attribution import Attribution
@@ -34,6 +36,7 @@ _SMOOTH_S = 1800.0
 _LEVEL = 0.01
 _MOVING = 0.1  # C/min
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
+_WITHIN_95 = float(chdtri(1, 0.05))  # fall of 2 log likelihood of one parameter at 95 % (Wilks 1938)
 _LINEAR = 20.0
 
 
@@ -268,7 +271,7 @@ def _likelihood(cause: Refined) -> str | None:
         ax = figure.subplots()
         ax.axvspan(interval.low, interval.high, color=AFTER, alpha=0.12, linewidth=0)
         ax.plot(x, gain - gain.max(), "o-", color=AFTER, markersize=3, linewidth=1.0)
-        ax.axhline(-3.84, color=ACCENT, linewidth=0.6, linestyle="--")
+        ax.axhline(-_WITHIN_95, color=ACCENT, linewidth=0.6, linestyle="--")
         ax.set_ylim(bottom=max(-40.0, float((gain - gain.max()).min()) * 1.05))
         ax.set_xlabel(name)
         ax.set_ylabel("2 Δ log likelihood")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from ..inputs.stored import read_result
-from ..outputs import result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
 from .report import page_environment, page_from, write_page
 
@@ -22,7 +21,7 @@ def is_plan(folder: Path) -> bool:
 def write_plan(folder: Path, result: dict[str, Any]) -> Path:
     """Writes `folder/plan.json` and `folder/report.html`; returns the page's path."""
     with result_folder(folder, "plan") as stage:
-        write_atomically(stage.folder / "plan.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+        write_atomically(stage.folder / "plan.json", json_text(result))
         write_plan_page(stage.folder)
     return folder / "report.html"
 

@@ -5,7 +5,6 @@ Beside it gyrotc's own way: one model over all environments.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from ..simulate import simulate
 from ..simulate.campaign import Noise
 from ..simulate.truth import simulated_floor
 from ..train import Fit, TrainingData, fit, predict
-from ..train.data import scaling_of
+from ..train.data import joined, scaling_of
 from ..train.fitting import front_end, samples_of
 from ..train.ols import fit_ols
 from ..train.result import Outcome, network
@@ -49,17 +48,15 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one method makes of one environment: exam means over 100 s, deg/h, and how it was trained.
+    """What one method makes of one environment: exam means over 100 s, deg/h, and how many centers it took.
 
     Attributes:
         before, predicted: Measured bias and the model's, shape (n,).
-        train_rms_dph: RMS of what is left of the training means.
-        centers: Of the model that was used here.
+        centers: How many the model has that was used here.
     """
 
     before: Array
     predicted: Array
-    train_rms_dph: float
     centers: int
 
     @property
@@ -88,7 +85,7 @@ def experiment(seed: int, noise: Noise, folder: Path) -> Experiment:
     cells: dict[str, dict[str, Cell]] = {}
     for method in ("constant", "mlr", "rbf_random", "mrbf_paper"):
         cells[method] = {group.environment: _cell(group, _trained(method, group, seed)) for group in groups}
-    whole = _joined([group.train for group in groups])
+    whole = joined([group.train for group in groups])
     trained = fit(whole, method="mrbf", average_s=AVERAGE_S)
     cells["mrbf"] = {group.environment: _cell(group, trained) for group in groups}
     return Experiment(cells, floor)
@@ -105,11 +102,6 @@ def _groups(folder: Path) -> tuple[list[Group], float]:
     floor = simulated_floor(folder, [run.file for run in dataset.runs if run.role == "exam"], AVERAGE_S)
     assert floor is not None  # this data set was simulated
     return groups, floor
-
-
-def _joined(parts: Sequence[TrainingData]) -> TrainingData:
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
 def _trained(method: str, group: Group, seed: int) -> Fit:
@@ -142,11 +134,9 @@ def _least_squares(data: TrainingData, variables: int) -> Outcome:
 
 
 def _cell(group: Group, trained: Fit) -> Cell:
-    left = _means(group.train, group.train.bias_dph) - _means(group.train, _predicted(trained, group.train))
     return Cell(
         before=_means(group.exam, group.exam.bias_dph),
         predicted=_means(group.exam, _predicted(trained, group.exam)),
-        train_rms_dph=float(np.sqrt(np.mean(left**2))),
         centers=sum(len(part["centers"]) for part in trained.networks),
     )
 

@@ -29,7 +29,7 @@ _PICTURE_POINTS = 200
 _HARD = 10.0  # d above which two causes count as hard to tell apart
 
 
-def plan(
+def plan(  # long: one line for each field of the result
     scenario: str | Path,
     *,
     noise: Noise = "paper",

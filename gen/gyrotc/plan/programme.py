@@ -31,11 +31,11 @@ class Programme:
     """Runs that are planned.
 
     Attributes:
-        name: Of the scenario.
+        name: What the scenario is called.
         records: Temperatures as the sensor will show them; rates are the simulated bias without noise, deg/h.
         declared: Noise that the gyro is taken to have.
         hours: Length of every run, h.
-        bias_range_dph: Of the simulated gyro's bias.
+        bias_range_dph: Lowest and highest bias of the simulated gyro, deg/h.
     """
 
     name: str

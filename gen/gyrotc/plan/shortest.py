@@ -29,7 +29,7 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
     """Adds the run that helps most for its hours, until every limit is reached.
 
     Args:
-        sensitivity: Of the programme whose runs may be used, each as often as needed.
+        sensitivity: Belongs to the programme whose runs may be used, each as often as needed.
         required: Limits by cause, in the unit of its limit.
 
     Raises:

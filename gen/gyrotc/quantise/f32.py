@@ -7,6 +7,7 @@ the bias, summed over all Gaussians.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,15 +49,7 @@ def table_of(model: Model) -> Table:
         np.concatenate([np.array([len(n.weights)], np.uint32), _head(n), _region(region, per_block)])
         for n, region in zip(model.networks, regions(model), strict=True)
     ]
-    bounds = [
-        _bound(network, scale, envelope, own, per_block)
-        for network, own in zip(model.networks, centers, strict=True)
-    ]
-    parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
-    if len(model.networks) > 1:
-        axes = _axes(envelope, np.concatenate(heads), per_block)
-        parts["hand-over"] = handover_error_dph(model, "f32", axes, share_step=0.0, share_error=_SHARE)
-        parts["blend"] = _blend(model, scale, envelope)
+    parts = _bound_parts(model, scale, envelope, centers, np.concatenate(heads))
     return Table(
         numeric="f32",
         **shared(model),
@@ -74,6 +67,27 @@ def table_of(model: Model) -> Table:
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
     )
+
+
+def _bound_parts(
+    model: Model,
+    scale: Words,
+    envelope: Words,
+    centers: Sequence[NDArray[np.float32]],
+    heads: Words,
+) -> dict[str, float]:
+    """The error bound part by part, deg/h: of a bank the largest of its networks, and what the hand-over adds."""
+    per_block = model.block_s / 60.0
+    bounds = [
+        _bound(network, scale, envelope, own, per_block)
+        for network, own in zip(model.networks, centers, strict=True)
+    ]
+    parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
+    if len(model.networks) > 1:
+        axes = _axes(envelope, heads, per_block)
+        parts["hand-over"] = handover_error_dph(model, "f32", axes, share_step=0.0, share_error=_SHARE)
+        parts["blend"] = _blend(model, scale, envelope)
+    return parts
 
 
 def _word(value: float) -> int:

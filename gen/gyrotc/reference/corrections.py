@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import status as status_bits
 from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream
 from ..frontend.numbers import Numbers
 from ..terms.recursion import Outcome
@@ -19,8 +20,6 @@ from .operations import recursions
 from .table import Table, Words
 
 __all__ = ["arithmetic_of", "corrections", "settings_of"]
-
-_HELD, _FALLBACK = 8, 16  # as in gtc.h
 
 
 def settings_of(table: Table, samples_per_block: int) -> Settings:
@@ -51,7 +50,7 @@ def corrections(
         steps: The corrections of the history.
         stream: Its samples.
         channels: Bits of every row's channels, shape (n, n_channels).
-        samples_per_block: As given to `gtc_<n>_init`.
+        samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     made = np.flatnonzero(steps.kind == MAP)
     outcome = _outcome(table, steps, stream, table.numbers(channels), samples_per_block)
@@ -63,11 +62,11 @@ def corrections(
     status[made] |= outcome.remarks[made]
     source = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
     status, bits = status[source], bits[source]
-    status[steps.kind == KEEP] |= _HELD
+    status[steps.kind == KEEP] |= status_bits.HELD
     fallen = steps.kind == FALLBACK
-    status[fallen] = _HELD | _FALLBACK
+    status[fallen] = status_bits.HELD | status_bits.FALLBACK
     bits[fallen] = table.fallback
-    return np.concatenate([[np.int32(_HELD)], status]).astype(np.int32), np.concatenate(
+    return np.concatenate([[np.int32(status_bits.HELD)], status]).astype(np.int32), np.concatenate(
         [[np.uint32(0)], bits]
     ).astype(np.uint32)
 

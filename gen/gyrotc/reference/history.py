@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frontend import Settings, Steps, Stream, follow
+from ..status import HELD
 from .corrections import arithmetic_of, corrections, settings_of
 from .maps import evaluate_map
 from .table import Table, Words
 
 __all__ = ["Replay", "answers", "replay"]
-
-_HELD = 8  # GTC_HELD
 
 
 class Calls(Protocol):
@@ -57,7 +56,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         table: The table.
         channels: Bits of every row's channels, shape (n, n_channels).
         missed: Samples that did not arrive before each row, shape (n,).
-        samples_per_block: As given to `gtc_<n>_init`.
+        samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     settings = settings_of(table, samples_per_block)
     channels, missed = np.asarray(channels), np.asarray(missed, dtype=np.int64)
@@ -69,8 +68,8 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     in_force += 1
     gaps = np.flatnonzero(stream.missed)
     missed_status = np.zeros(position.size, dtype=np.int32)
-    missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | _HELD
-    held = np.where(steps.believed[position], np.int32(0), np.int32(_HELD))
+    missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | HELD
+    held = np.where(steps.believed[position], np.int32(0), np.int32(HELD))
     at_rows = status[in_force]
     return Replay(
         sample_status=at_rows | held,
@@ -120,6 +119,6 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
         was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]
     )
     k = steps.in_force(last) + 1
-    held = np.where(was_missed | ~steps.believed[last], _HELD, 0)
+    held = np.where(was_missed | ~steps.believed[last], HELD, 0)
     call = status[k] | held
     return np.stack([(call + 256 * status[k]).astype(np.uint32), bits[k]], axis=1)

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..status import CLAMPED, E_ARG, UNCOVERED
 from . import f32, q31
 from .table import MISSING_Q31, Table, Words
 
-__all__ = ["CLAMPED", "E_ARG", "UNCOVERED", "evaluate_map"]
-
-CLAMPED, UNCOVERED, E_ARG = 2, 4, -1  # as in gtc.h
+__all__ = ["evaluate_map"]
 
 
 def evaluate_map(

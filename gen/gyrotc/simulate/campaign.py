@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator
 from datetime import timedelta
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..dataset.text import dataset_toml
 from ..errors import InputError
-from ..outputs import result_folder
+from ..outputs import json_text, result_folder
 from .biasmap import BiasMap, draw
 from .instrument import Record, record
 from .noise import CELL_S
@@ -74,7 +73,7 @@ def simulate(
         row_s: Length of a row, s: a whole number, or one that divides a second.
         raw_hz: Rows a second instead of `row_s`.
         pulses: Integer pulses instead of rates.
-        format: Of the run files.
+        format: The run files are written in it: "csv" or "parquet".
         noise: Levels where the scenario gives none: the paper's, or typical ones of the class.
         progress: Called with the share that is done, 0 ... 1.
 
@@ -217,7 +216,7 @@ def _write_texts(
         "plan": plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
         "runs": truths,
     }
-    (folder / TRUTH_FILE).write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    (folder / TRUTH_FILE).write_text(json_text(truth), "ascii")
 
 
 def _serial(plan: Scenario, seed: int) -> str:

@@ -41,7 +41,7 @@ class Parameter:
     """A parameter of a cause.
 
     Attributes:
-        name: As in docs/FORMAT.md and in scenario files.
+        name: What docs/FORMAT.md and scenario files call it.
         unit: Its unit.
         low, high: Plausible range (prior), of the magnitude where `signed`.
         linear: The effect is proportional to it; `features` does not take it.

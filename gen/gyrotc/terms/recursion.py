@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..status import HELD
 from .arithmetic import Operations
 from .operators import play
 
 __all__ = ["Course", "Outcome", "Recursion", "TableKind", "recursion_of"]
 
 Numbers = NDArray[Any]
-
-_HELD = 8  # GTC_HELD
 
 
 class TableKind(IntEnum):
@@ -47,7 +46,7 @@ class Course:
         closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
         elapsed: Blocks since power-on, shape (n,).
         taken: How many samples of the channels had come, shape (n,).
-        samples_per_block: As in the table's front end.
+        samples_per_block: Temperature samples in a block of the front end.
     """
 
     temperature: Numbers
@@ -139,7 +138,7 @@ class _Auxiliary(Recursion):
         added = self.do.scaled_difference(mean, reference, slope)
         zero = added.dtype.type(0)
         outcome.added = outcome.added + np.where(self.do.is_missing(mean), zero, added)
-        outcome.remarks = outcome.remarks | np.where(here, 0, _HELD).astype(np.int32)
+        outcome.remarks = outcome.remarks | np.where(here, 0, HELD).astype(np.int32)
 
     def _means(self, course: Course, channel: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
         """Mean in force for every correction, and whether its block had enough samples.

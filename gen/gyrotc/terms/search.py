@@ -35,7 +35,7 @@ class SingleCycle:
     """How a memory is looked for in a single chamber cycle.
 
     Attributes:
-        points: Of the grid over its parameter.
+        points: How many the grid over its parameter has.
         usual: Every package has such a memory: it is preferred to one that does as well and that few have.
     """
 
@@ -58,7 +58,7 @@ class Search:
         imitates: Whether a cause that is found is compared with it: from which d the two can be told apart.
         planned: Whether a profile without rates says anything of it.
         shown: Values of `over` at which it stands for itself in a plan.
-        rival_every: Of its grid, one point in this many is looked at as a rival in a plan.
+        rival_every: A plan looks at one point in this many of its grid as a rival.
         cycle: How it is looked for in a single chamber cycle; None: it is not.
     """
 

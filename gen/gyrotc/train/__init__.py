@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..metrics import LEAST_SPAN_C
 from .bank import fit_bank
-from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, cleaned, scaling_of
+from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
 from .linear import fit_mlr, fit_poly
 from .mrbf import fit_mrbf, fit_mrbf_t
@@ -64,7 +65,7 @@ def fit(
         data: Samples; exact duplicates by run and time count once.
         method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: the ladder chooses, unless a number
             of centers or ρ is asked for.
-        seed: Of everything random.
+        seed: Whatever is drawn at random (start of the Kohonen network, random centers) follows from it.
         centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
         rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
@@ -82,7 +83,7 @@ def fit(
     findings: list[dict[str, object]] = []
     rows: list[dict[str, object]] = []
     reason = ""
-    if np.ptp(samples.temperature_c) < MIN_TEMPERATURE_SPAN_C:
+    if np.ptp(samples.temperature_c) < LEAST_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
         method = "constant" if method == AUTO else method
@@ -153,7 +154,7 @@ def _no_information(samples: TrainingData) -> dict[str, object]:
     return {
         "id": "no_temperature_information",
         "text": f"Temperature spans only {span:.2f} C: nothing can be learnt about it; the model is the mean bias.",
-        "evidence": {"span_c": span, "required_c": MIN_TEMPERATURE_SPAN_C},
+        "evidence": {"span_c": span, "required_c": LEAST_SPAN_C},
     }
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData
+from ..metrics import LEAST_SPAN_C
+from .data import Scaling, TrainingData
 from .mrbf import fit_mrbf
 from .result import Outcome
 
@@ -51,4 +52,4 @@ def _part(data: TrainingData, region: tuple[float, float]) -> TrainingData:
 
 
 def _enough(part: TrainingData) -> bool:
-    return len(part) >= _MIN_SAMPLES and float(np.ptp(part.temperature_c)) >= MIN_TEMPERATURE_SPAN_C
+    return len(part) >= _MIN_SAMPLES and float(np.ptp(part.temperature_c)) >= LEAST_SPAN_C

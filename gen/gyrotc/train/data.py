@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "scaling_of"]
+__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "joined", "scaling_of"]
 
 Floats = NDArray[np.float64]
 
-MIN_TEMPERATURE_SPAN_C = 2.0
+# Floors of the scale, so that a constant input is not divided by 0.
 _MIN_HALF_RANGE_C = 1.0
 _MIN_HALF_RANGE_C_PER_MIN = 0.05
 _BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
@@ -78,6 +79,12 @@ class Bins:
     samples: float
 
 
+def joined(parts: Sequence[TrainingData]) -> TrainingData:
+    """Samples of several parts as one, in their order."""
+    names = TrainingData.__slots__
+    return TrainingData(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
 def cleaned(data: TrainingData) -> TrainingData:
     """Checks, sorts by run and time, drops exact duplicates; slopes and temperatures keep their values.
 
@@ -85,6 +92,21 @@ def cleaned(data: TrainingData) -> TrainingData:
         InputError: Lengths differ, nothing is there, a value is not finite, a weight or duration is not
             positive.
     """
+    columns = _checked(data)
+    run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
+    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
+        run_of = columns.pop("run").astype(np.int64)
+        return TrainingData(run=run_of, **columns)
+    keys = ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph")  # the first counts most
+    order = np.lexsort([columns[name] for name in reversed(keys)])
+    same = np.all([np.diff(columns[name][order]) == 0 for name in keys], axis=0)
+    first = np.r_[True, ~same]
+    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
+    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
+
+
+def _checked(data: TrainingData) -> dict[str, Floats]:
+    """Columns by name, after the checks of `cleaned`."""
     columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
         raise InputError(
@@ -100,26 +122,7 @@ def cleaned(data: TrainingData) -> TrainingData:
     for name in ("weight", "duration_s"):
         if columns[name].min() <= 0.0:
             raise InputError(f"training data, {name}", repr(float(columns[name].min())), "a number above 0")
-    run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
-    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
-        run_of = columns.pop("run").astype(np.int64)
-        return TrainingData(run=run_of, **columns)
-    order = np.lexsort(
-        (
-            columns["bias_dph"],
-            columns["slope_c_per_min"],
-            columns["temperature_c"],
-            columns["time_s"],
-            columns["run"],
-        )
-    )
-    first = np.ones(len(order), dtype=bool)
-    same = np.ones(len(order) - 1, dtype=bool)
-    for name in ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph"):
-        same &= np.diff(columns[name][order]) == 0
-    first[1:] = ~same
-    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
-    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
+    return columns
 
 
 def scaling_of(data: TrainingData) -> Scaling:
@@ -139,7 +142,7 @@ def average(data: TrainingData, length_s: float) -> TrainingData:
     """Weighted means over `length_s` within each run, in cells of the run's clock; samples that long stay.
 
     Args:
-        data: As `cleaned` returns it.
+        data: Samples as `cleaned` returns them.
         length_s: Length of a mean, s.
 
     Returns:

@@ -2,7 +2,7 @@
 
 Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train`, any
 other number of inputs by orthogonal least squares: samples as centers, one width, size by BIC. Needs
-scikit-learn 1.6 or later.
+scikit-learn 1.6 or later (`pip install gyrotc[sklearn]`).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class RBFNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         n_centers: Largest number of Gaussians; None: chosen from the data.
-        random_state: Of the candidate centers: an integer, a RandomState or None.
+        random_state: Draws the candidate centers: an integer, a RandomState or None.
 
     Attributes (after `fit`):
         centers_: Centers, shape (M, n_features), in the units of X.

@@ -31,6 +31,7 @@ from . import (
     predict,
     uncertainty,
 )
+from .data import joined
 from .noisefloor import noise_terms, sensitivities, stretches
 from .spans import Span, training_spans
 
@@ -47,14 +48,14 @@ __all__ = [
 ]
 
 Progress = Callable[[str], None]
-_SLOPE_WINDOW_S = 100.0
+_SLOPE_WINDOW_S = 100.0  # as long as the paper's means
 _HOLD_S = 300.0
 _MAX_RATE_C_PER_MIN = 30.0
 _MAX_STEP_C = 1.0
-_COVERAGE_CELLS = (32, 12)
-_UNCERTAINTY_CELLS = (6, 4)
+_COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
+_UNCERTAINTY_CELLS = (6, 4)  # of T and of dT/dt: 24 words in a table
 _MIN_SAMPLES = 8
-_CENTER_GRID = 2.0**20
+_CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 
@@ -130,11 +131,6 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
-def _joined(parts: Sequence[TrainingData]) -> TrainingData:
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
-
-
 def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
     """Fits a model to the training runs of a data set.
 
@@ -157,7 +153,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
         for run in stretch:
             say(f"reading {run.file}")
             parts.append(samples_of(front.blocks(run), front.block_s, k))
-    data = _joined(parts)
+    data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
             str(dataset.folder),
@@ -245,7 +241,7 @@ def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: floa
     return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
 
 
-def model_of(
+def model_of(  # long: one line for each field of model.json
     dataset: Dataset,
     runs: Sequence[Run],
     data: TrainingData,

@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from .data import MIN_TEMPERATURE_SPAN_C, Scaling, TrainingData, average
+from ..metrics import LEAST_SPAN_C
+from .data import Scaling, TrainingData, average
 from .noise import difference_sigma
 from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .simple import SIMPLE, design, solve
@@ -227,7 +228,7 @@ def _squares(
     rest, held = means.select(~fold.near), means.select(fold.held)
     limits = [(float(x.min()), float(x.max())) for x in (rest.temperature_c, rest.slope_c_per_min)]
     at = scaling.normalise(np.clip(held.temperature_c, *limits[0]), np.clip(held.slope_c_per_min, *limits[1]))
-    flat = limits[0][1] - limits[0][0] < MIN_TEMPERATURE_SPAN_C
+    flat = limits[0][1] - limits[0][0] < LEAST_SPAN_C
     known = kept[~fold.near]
     squares = []
     for name in RUNGS:

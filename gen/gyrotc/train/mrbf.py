@@ -28,12 +28,12 @@ __all__ = ["fit_mrbf", "fit_mrbf_t"]
 Floats = NDArray[np.float64]
 
 MAX_CENTERS = 24
-_DEPARTURE = 0.1
+_DEPARTURE = 0.1  # of the expected squared error: docs/training.md, section 1, step 5
 _SETTLED = 0.01
-_RIDGE = 0.01
-_KOHONEN_NODES = 40
-_GAP_GRID = (17, 9)
-_GAP_WEIGHT = 0.02
+_RIDGE = 0.01  # of the noise variance: it bounds the weights (docs/training.md, section 1)
+_KOHONEN_NODES = 40  # candidates: docs/training.md, section 1, step 3
+_GAP_GRID = (17, 9)  # points of T and of dT/dt over the envelope
+_GAP_WEIGHT = 0.02  # of all samples together: the network follows the process between the ramps, too (step 4)
 
 
 def fit_mrbf(
@@ -50,7 +50,7 @@ def fit_mrbf(
     Args:
         data: Cleaned samples.
         scaling: Normalisation of the inputs.
-        seed: Of the Kohonen network.
+        seed: Draws the start of the Kohonen network.
         centers: Number of centers asked for; None: chosen from the data.
         average_s: Averaging of RMS figures, s.
         process: The evidence process of these samples, where it is known already.
@@ -72,16 +72,8 @@ def fit_mrbf(
         ],
         "chosen": chosen,
         "expected_error": float(expected),
-        "evidence": {
-            "log_parameters": [float(p) for p in model.log_parameters],
-            "value": float(model.value),
-            "evaluations": int(model.evaluations),
-            "freedom": float(model.freedom),
-        },
+        **_facts(process),
         "samples": len(data),
-        "means": len(process.y),
-        "bins": len(process.bins.t),
-        "trimmed": int(np.sum(~process.kept)),
         "seconds": {"evidence": evidence_s, "compression": time.process_time() - began - evidence_s},
     }
     kept = process.kept
@@ -113,6 +105,22 @@ def fit_mrbf_t(
         for one in outcome.networks
     ]
     return replace(outcome, networks=flat, process=None)
+
+
+def _facts(process: Process) -> dict[str, Any]:
+    """What was trained on, and how the maximum of the evidence was found."""
+    model = process.model
+    return {
+        "evidence": {
+            "log_parameters": [float(p) for p in model.log_parameters],
+            "value": float(model.value),
+            "evaluations": int(model.evaluations),
+            "freedom": float(model.freedom),
+        },
+        "means": len(process.y),
+        "bins": len(process.bins.t),
+        "trimmed": int(np.sum(~process.kept)),
+    }
 
 
 def _compress(

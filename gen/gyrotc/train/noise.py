@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from ..metrics import MAD_TO_SIGMA
 from .data import TrainingData, average
 
 __all__ = ["difference_sigma", "floor_dph", "not_white"]
 
 Floats = NDArray[np.float64]
-_MAD_TO_SIGMA = 1.4826
-_CLIP = 4.5
-_SIGNIFICANCE = 1e-3
-_LAGS = 10
+_CLIP = 4.5  # robust σ, as outliers are dropped in training (process.py)
+_SIGNIFICANCE = 1e-3  # of each test: docs/training.md, section 1, step 5
+_LAGS = 10  # of the autocorrelation, Ljung and Box 1978
 _LEAST_DIFFERENCES = 6
 
 
@@ -24,7 +24,7 @@ def robust_sigma(x: Floats) -> float:
     """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
     if len(x) == 0:
         return 0.0
-    limit = _CLIP * _MAD_TO_SIGMA * float(np.median(np.abs(x)))
+    limit = _CLIP * MAD_TO_SIGMA * float(np.median(np.abs(x)))
     inside = x[np.abs(x) <= limit]
     return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
 

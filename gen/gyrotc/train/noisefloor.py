@@ -13,18 +13,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import allantools
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+
+from ..metrics import LEAST_SPAN_C
 
 __all__ = ["AllanPoint", "allan_variance", "noise_terms", "sensitivities", "stretches"]
 
 Floats = NDArray[np.float64]
 
-_FLICKER = 2.0 * np.log(2.0) / np.pi
-_LEAST_PAIRS = 8
-_LEAST_SPAN_C = 2.0
+_FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
+_LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
 _LEAST_SPAN_C_PER_MIN = 0.1
 _S_PER_H = 3600.0
 
@@ -45,29 +45,30 @@ def stretches(values: Floats, time_s: Floats, run: NDArray[np.int64], step_s: fl
 
 
 def allan_variance(residuals: Sequence[Floats], step_s: float) -> list[AllanPoint]:
-    """Overlapping Allan deviation at octaves of the step, pooled over gap-free stretches.
+    """Overlapping Allan deviation at octaves of the step, pooled over gap-free stretches (NIST SP 1065, eq. 11).
 
     Args:
         residuals: Mean rates over `step_s`, one array for each stretch, deg/h.
         step_s: Length of a mean, s.
     """
-    total: dict[int, tuple[float, float]] = {}
+    total: dict[int, tuple[float, int]] = {}
     for stretch in residuals:
         factors = [2**k for k in range(32) if 2 ** (k + 1) <= len(stretch) // 2]
-        if not factors:
-            continue
-        taus, deviation, _, pairs = allantools.oadev(
-            stretch, rate=1.0 / step_s, data_type="freq", taus=[f * step_s for f in factors]
-        )
-        for tau, value, n in zip(taus, deviation, pairs, strict=True):
-            factor = round(tau / step_s)
-            square, count = total.get(factor, (0.0, 0.0))
-            total[factor] = (square + n * value**2, count + n)
+        for factor in factors:
+            differences = _differences(stretch, factor)
+            square, count = total.get(factor, (0.0, 0))
+            total[factor] = (square + 0.5 * float(differences @ differences), count + len(differences))
     return [
         AllanPoint(factor * step_s, float(np.sqrt(square / count)), count / factor)
         for factor, (square, count) in sorted(total.items())
         if count / factor >= _LEAST_PAIRS
     ]
+
+
+def _differences(rates: Floats, factor: int) -> Floats:
+    """Every difference of two means over `factor` rates that follow one another: two of sums of sums."""
+    angle = np.concatenate([[0.0], np.cumsum(rates - rates.mean())])
+    return np.asarray(angle[2 * factor :] - 2.0 * angle[factor:-factor] + angle[: -2 * factor]) / factor
 
 
 def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
@@ -77,7 +78,7 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
     not show is 0; all are None where the record is too short.
 
     Args:
-        residuals: As for `allan_variance`.
+        residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
         step_s: Length of a mean, s.
     """
     points = allan_variance(residuals, step_s)
@@ -114,7 +115,7 @@ def sensitivities(
     """
     root = np.sqrt(weight)
     inputs = {"bias_dph_per_c": temperature_c, "bias_dph_per_c_per_min": slope_c_per_min}
-    least = {"bias_dph_per_c": _LEAST_SPAN_C, "bias_dph_per_c_per_min": _LEAST_SPAN_C_PER_MIN}
+    least = {"bias_dph_per_c": LEAST_SPAN_C, "bias_dph_per_c_per_min": _LEAST_SPAN_C_PER_MIN}
     used = [name for name, values in inputs.items() if len(values) and np.ptp(values) >= least[name]]
     columns = [np.ones(len(bias_dph)), *(inputs[name] - inputs[name].mean() for name in used)]
     design = np.stack(columns, axis=1)

@@ -37,7 +37,7 @@ _MAX_CENTERS = 30
 _FOLDS = 5
 _BLOCKS = 20
 _GUARD_S = 300.0
-_RIDGE = 1e-8
+_RIDGE = 1e-8  # times all weight: slight, for candidates that nearly coincide (docs/training.md, section 2)
 _TOLERANCE = 1e-3  # a smaller model whose criterion is worse by this share is preferred
 _EXCESS = 1.02  # of the noise floor: what the default ρ asks for
 
@@ -89,7 +89,7 @@ def fit_ols(
         method: Name of the method.
         data: Cleaned samples.
         scaling: Normalisation of the inputs.
-        seed: Of the random samples or the Kohonen network.
+        seed: Draws the random samples, or the start of the Kohonen network.
         centers: Number of centers (the rule then only chooses the width); None: by the rule.
         rho: Threshold of eq. (16); None: where the residual reaches the noise that the samples show.
         size_rule: One of `SIZE_RULES`; None: the method's own, or `rho` where `rho` is given.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..errors import GyrotcError
+from ..metrics import MAD_TO_SIGMA
 from .data import Bins, Scaling, TrainingData, average, gather
 from .noise import difference_sigma
 
@@ -25,8 +26,8 @@ __all__ = ["MEAN_S", "Process", "TrainingFailed", "conditioned", "fit_process"]
 Floats = NDArray[np.float64]
 
 MEAN_S = 50.0
-_TRIM_SIGMA = 4.5
-_TRIMS = 3
+_TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
+_TRIMS = 3  # rounds of dropping and fitting again
 _TRIM_SHARE = (
     0.1  # more than this share cannot be outliers: then the process does not fit, and nothing more is dropped
 )
@@ -110,7 +111,8 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
         bins = gather(t[kept], r[kept], y[kept], weight[kept])
         model = _optimised(bins, least, start)
         residual = np.abs(y - model.mean(t, r)) * np.sqrt(weight)
-        inside = residual <= _TRIM_SIGMA * max(1.4826 * float(np.median(residual[kept])), _TRIM_NOISE * scale)
+        robust = MAD_TO_SIGMA * float(np.median(residual[kept]))
+        inside = residual <= _TRIM_SIGMA * max(robust, _TRIM_NOISE * scale)
         settled = round_ == _TRIMS or np.array_equal(inside, kept)
         if settled or np.count_nonzero(~inside) > _TRIM_SHARE * len(inside):
             break

@@ -23,7 +23,7 @@ class Outcome:
     """What a method hands to `fit`.
 
     Attributes:
-        networks: As in `model.json` (docs/FORMAT.md): w0, linear, centers, widths, weights, region.
+        networks: The networks as `model.json` has them (docs/FORMAT.md): w0, linear, centers, widths, weights, region.
         curves: For `training.json`.
         predicted_rms_ratio: Predicted RMS over noise floor, None if withheld.
         withheld: Why, empty if it is not.

@@ -25,9 +25,9 @@ __all__ = ["Fold", "Span", "history_folds", "training_spans"]
 
 Floats = NDArray[np.float64]
 
-_ENOUGH_RUNS = 3
+_ENOUGH_RUNS = 3  # docs/recordings.md: fewer are cut into spans
 _EQUAL_PARTS = 5
-_SHORTEST_BRANCH_S = 300.0
+_SHORTEST_BRANCH_S = 300.0  # docs/recordings.md: branches of at least five minutes
 _SMOOTHING_S = 60.0
 _GUARD_S = 100.0
 _SMALLEST_TURN_C = 1.0  # a smaller swing of temperature is noise or control, not a branch

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.special import chdtri
 
 from .data import TrainingData, cleaned
 from .process import Process, fit_process
@@ -29,7 +30,7 @@ _POINTS = 3  # in each direction of a cell
 _SPANS = 5  # a single run is cut into so many
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
 _ROUNDS = 5
-_SIGNIFICANT = 5.99  # of chi-square with two degrees of freedom
+_SIGNIFICANT = float(chdtri(2, 0.05))  # κ² and τ² are two parameters: chi-square with two degrees of freedom
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:

@@ -38,7 +38,7 @@ Entry = dict[str, Any]
 Progress = Callable[[str], None]
 
 
-def verify(
+def verify(  # long: the order of the checks, then one line for each field of the result
     folder: Path,
     *,
     targets: Sequence[str] = (),

@@ -167,15 +167,11 @@ def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tup
         raise CheckFailed(
             f"line {number} is damaged, or the board test did not run to its end: {text[:80]!r}"
         )
-    octets = bytes.fromhex("".join(line for _, line in lines[start + 1 : stop]))
-    words = (
-        np.frombuffer(octets, dtype=">u4").astype(np.uint32).reshape(-1, 2 if head["mode"] == "all" else 1)
-    )
     n_results = int(end[1], 16)
     expected = n_results if head["mode"] == "all" else -(-n_results // _GROUP)
-    if len(words) != expected:
+    if stop - start - 1 != expected:
         raise CheckFailed(
-            f"the output holds {len(words)} lines of results, its end in line {number} says {expected}"
+            f"the output holds {stop - start - 1} lines of results, its end in line {number} says {expected}"
         )
     costs, after = _costs(lines, stop + 1)
     part = BoardOutput(
@@ -185,11 +181,16 @@ def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tup
         random=int(head["random"], 16),
         board=board,
         n_results=n_results,
-        words=words if head["mode"] == "all" else words[:, 0],
+        words=_words(lines[start + 1 : stop], pairs=head["mode"] == "all"),
         costs=costs,
         line=lines[start][0],
     )
     return part, after
+
+
+def _words(results: list[Line], *, pairs: bool) -> NDArray[np.uint32]:
+    words = np.frombuffer(bytes.fromhex("".join(text for _, text in results)), dtype=">u4").astype(np.uint32)
+    return words.reshape(-1, 2) if pairs else words
 
 
 def _costs(lines: list[Line], position: int) -> tuple[dict[str, Cost], int]:

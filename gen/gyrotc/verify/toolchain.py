@@ -10,7 +10,6 @@ import functools
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,12 +19,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import CheckFailed, InputError
+from ..inputs import read_toml
 from .confined import Run, run_to_end
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 __all__ = [
     "C_FLAGS",
@@ -103,8 +98,8 @@ def load_target(path: Path) -> Target:
         InputError: The file cannot be read, or a field is wrong.
     """
     try:
-        return Target.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValidationError) as error:
+        return Target.model_validate(read_toml(path, "a target file"))
+    except ValidationError as error:
         raise InputError(str(path), str(error), "a target file") from error
 
 

@@ -3,7 +3,7 @@
 A bank is kept as the SHA-256 of its bytes and then the bytes. What protects whom: the folder is the user's own (made
 with mode 0700; one that belongs to somebody else, or that others may write, is not used), the checksum finds damage,
 and reading makes nothing but the classes of a bank, plain values and arrays. Whatever does not fit is thrown away and
-computed again.
+computed again. `joblib.Memory` keeps results on disk as well, but has neither: it unpickles whatever lies there.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...errors import GyrotcError
 from ...inputs import read_json
-from ...outputs import faults, write_atomically
+from ...outputs import faults, json_text, write_atomically
 
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
@@ -50,7 +49,7 @@ class _Stored(BaseModel):
 
 def write_entry(folder: Path, entry: Entry) -> Entry:
     """Writes `entry.json` into a unit's result, whose marker will hold its hash; returns it."""
-    write_atomically(folder / ENTRY, json.dumps(entry, indent=1, allow_nan=False) + "\n")
+    write_atomically(folder / ENTRY, json_text(entry))
     return entry
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
 import os
 import stat
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import __version__, _core
-from ...outputs import sha256
+from ...outputs import canonical_json, sha256
 from ...reference.runtime import runtime_folders
 
 __all__ = ["digest_of", "inputs_of", "program_of"]
@@ -23,7 +22,7 @@ _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures c
 
 def digest_of(value: Any) -> str:
     """SHA-256 of a JSON value, hexadecimal."""
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
 @functools.cache

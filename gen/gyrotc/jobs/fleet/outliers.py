@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...metrics import MAD_TO_SIGMA
+
 __all__ = ["FIGURES", "Outlier", "outliers", "spread"]
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
@@ -22,7 +24,6 @@ FIGURES = {
 }
 _LEAST = 8  # fewer serials do not say what a usual one is
 _SIGMAS = 5.0
-_MAD_TO_SIGMA = 1.4826
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
 
@@ -55,7 +56,7 @@ def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
         values = np.array([entry[figure] for entry in known])
         scaled = np.log(values) if by_ratio else values
         apart = np.abs(scaled - np.median(scaled))
-        sigma = max(_MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
+        sigma = max(MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
         if sigma == 0.0:
             continue
         found += [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -16,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ... import __version__
-from ...outputs import result_folder, write_atomically
+from ...outputs import json_text, result_folder, write_atomically
 from ...pages.plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from ...pages.report import page_environment
 from ...texts import csv_cell
@@ -62,7 +61,7 @@ def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any
     picture = _picture([e for e in entries if e.get("after_rms_dph")], names)
     template = page_environment().get_template("fleet.html.j2")
     page = template.render(summary=summary, apart=names, picture=picture)
-    texts = (json.dumps(summary, indent=1, allow_nan=False) + "\n", _table(entries), page)
+    texts = (json_text(summary), _table(entries), page)
     with result_folder(out, "fleet", entries=SUMMARY) as stage:
         for name, text in zip(SUMMARY, texts, strict=True):
             write_atomically(stage.folder / name, text)

@@ -105,7 +105,7 @@ def on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[tuple[int, Entry]
         from distributed import Client
         from distributed import as_completed as completed
     except ImportError as error:
-        raise InputError("--scheduler", "Dask is not installed here", "pip install distributed") from error
+        raise InputError("--scheduler", "Dask is not installed here", "pip install gyrotc[dask]") from error
     try:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from ...dataset import Dataset, load
-from ...emit import emit
+from ...dataset import load
 from ...errors import CheckFailed, GyrotcError, InputError
-from ...judge.evaluate import evaluate
-from ...judge.limits import held_against
-from ...model import Model, load_model
-from ...outputs import KINDS, result_folder, write_atomically
-from ...train.fitting import fit_dataset
-from ...verify import verify
+from ...model import Model
+from ...outputs import KINDS, result_folder
 from ..build import build_into
 from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
@@ -94,56 +87,22 @@ def _built(task: Task) -> Entry:
     aside = set_aside(task.out)
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
-        model, evaluation, verification, held = (_whole if task.full else _quick)(
-            task.fleet, dataset, stage.folder
+        fleet = task.fleet
+        built = build_into(
+            stage.folder,
+            dataset,
+            fleet.options,
+            numerics=fleet.numerics,
+            limits=fleet.limits,
+            compiled=task.full,
         )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        faults = _faults(evaluation, verification, held)
-        status = {"status": "failed", "reason": "; ".join(faults)} if faults else {"status": "done"}
-        figures = {"serial": model.serial} | _figures(model, evaluation, verification)
+        failed_checks = "; ".join(built.failures)
+        status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
+        figures = {"serial": dataset.serial} | _figures(built.model, built.evaluation, built.verification)
         entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
     return entry | {"aside": aside} if aside else entry
-
-
-def _faults(evaluation: Entry, verification: Entry, held: Entry | None) -> list[str]:
-    found = [f"{verification['failed']} checks failed"] if verification["failed"] else []
-    if evaluation["mismatches"]:
-        found.append(f"{evaluation['mismatches']} steps differ from the reference")
-    for check in held["limits"] if held else ():
-        if not check["met"]:
-            found.append(f"{check['limit']} {check['bound']} is not met: {check['measured']}")
-    return found
-
-
-_Made = tuple[Model, Entry, Entry, "Entry | None"]
-
-
-def _whole(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
-    result = build_into(work, dataset, fleet.options, numerics=fleet.numerics, limits=fleet.limits)
-    return load_model(work), result.evaluation, result.verification, result.limits
-
-
-def _quick(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
-    """Without a compiler: what the C code gives is taken from the reference."""
-    fitted = fit_dataset(dataset, fleet.options)
-    fitted.model.save(work / "model.json")
-    _write(work / "training.json", fitted.training)
-    emit(fitted.model, work, numerics=fleet.numerics)
-    verification = verify(work, compiled=False)
-    _write(work / "verify.json", verification)
-    evaluation = evaluate(
-        work, dataset, average_s=fleet.options.average_s, training=fitted.training, compiled=False
-    )
-    _write(work / "evaluate.json", evaluation)
-    held = held_against(fleet.limits, fitted.model, evaluation, verification) if fleet.limits else None
-    if held:
-        _write(work / "limits.json", held)
-    return fitted.model, evaluation, verification, held
-
-
-def _write(path: Path, result: dict[str, Any]) -> None:
-    write_atomically(path, json.dumps(result, allow_nan=False) + "\n")
 
 
 def _figures(model: Model, evaluation: Entry, verification: Entry) -> Entry:

@@ -1,0 +1,29 @@
+"""Status bits of the runtime, as `include/gtc.h` has them; `tests/py/test_status.py` holds the two together."""
+
+from __future__ import annotations
+
+__all__ = [
+    "CLAMPED",
+    "E_ARG",
+    "E_ID",
+    "E_IMAGE",
+    "E_LAYOUT",
+    "E_SELF_TEST",
+    "FALLBACK",
+    "HELD",
+    "OK",
+    "UNCOVERED",
+    "WARMING",
+]
+
+OK = 0
+WARMING = 1
+CLAMPED = 2
+UNCOVERED = 4
+HELD = 8
+FALLBACK = 16
+E_ARG = -1
+E_LAYOUT = -2
+E_SELF_TEST = -3
+E_IMAGE = -4
+E_ID = -5

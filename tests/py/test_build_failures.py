@@ -1,0 +1,16 @@
+"""A check that failed is never kept quiet by a build."""
+
+from __future__ import annotations
+
+from gyrotc.jobs.build import _failures
+
+
+def test_a_proven_bound_that_is_exceeded_fails_a_build() -> None:
+    """`verify` counted it as failed, `build` went on with exit status 0."""
+    verification = {
+        "targets": [],
+        "emitted": [],
+        "errors": [{"numeric": "q31", "status": "fail", "bound_dph": 1e-7, "worst_dph": 2e-7}],
+    }
+    [failure] = _failures({"mismatches": 0}, verification, None)
+    assert "q31" in failure and "2e-07" in failure and "1e-07" in failure
