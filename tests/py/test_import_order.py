@@ -14,6 +14,7 @@ ORDER = [
     "errors",
     "outputs",
     "inputs",
+    "results",
     "texts",
     "_core",
     "terms",

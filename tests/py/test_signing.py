@@ -10,7 +10,7 @@ import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, spoil
 from gyrotc.emit.files import emit
-from gyrotc.emit.files.record import RECORD, SIGNATURE
+from gyrotc.emit.record import RECORD, SIGNATURE
 from gyrotc.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.verify import verify

@@ -14,6 +14,8 @@ from ...judge.evaluate import evaluate
 from ...judge.limits import held_against
 from ...model import Model, load_model
 from ...outputs import KINDS, result_folder, write_atomically
+from ...results.evaluation import Evaluation
+from ...results.limits import HeldLimits
 from ...train.fitting import fit_dataset
 from ...verify import verify
 from ..build import build_into
@@ -106,17 +108,14 @@ def _built(task: Task) -> Entry:
     return entry | {"aside": aside} if aside else entry
 
 
-def _faults(evaluation: Entry, verification: Entry, held: Entry | None) -> list[str]:
+def _faults(evaluation: Evaluation, verification: Entry, held: HeldLimits | None) -> list[str]:
     found = [f"{verification['failed']} checks failed"] if verification["failed"] else []
-    if evaluation["mismatches"]:
-        found.append(f"{evaluation['mismatches']} steps differ from the reference")
-    for check in held["limits"] if held else ():
-        if not check["met"]:
-            found.append(f"{check['limit']} {check['bound']} is not met: {check['measured']}")
-    return found
+    if evaluation.mismatches:
+        found.append(f"{evaluation.mismatches} steps differ from the reference")
+    return found + [check.failure() for check in (held.limits if held else ()) if not check.met]
 
 
-_Made = tuple[Model, Entry, Entry, "Entry | None"]
+_Made = tuple[Model, Evaluation, Entry, "HeldLimits | None"]
 
 
 def _whole(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
@@ -135,10 +134,10 @@ def _quick(fleet: Fleet, dataset: Dataset, work: Path) -> _Made:
     evaluation = evaluate(
         work, dataset, average_s=fleet.options.average_s, training=fitted.training, compiled=False
     )
-    _write(work / "evaluate.json", evaluation)
+    _write(work / "evaluate.json", evaluation.content())
     held = held_against(fleet.limits, fitted.model, evaluation, verification) if fleet.limits else None
     if held:
-        _write(work / "limits.json", held)
+        _write(work / "limits.json", held.content())
     return fitted.model, evaluation, verification, held
 
 
@@ -146,24 +145,23 @@ def _write(path: Path, result: dict[str, Any]) -> None:
     write_atomically(path, json.dumps(result, allow_nan=False) + "\n")
 
 
-def _figures(model: Model, evaluation: Entry, verification: Entry) -> Entry:
+def _figures(model: Model, evaluation: Evaluation, verification: Entry) -> Entry:
     """What the summary shows and outliers are sought in."""
-    role = next((r for r in ("exam", "left_out", "train") if evaluation.get(r)), None)
-    judged = evaluation[role] if role else None
-    floor = evaluation["noise_floor_dph"]
-    after = judged["after"]["rms_dph"] if judged else None
+    role, judged = evaluation.judged() or (None, None)
+    floor = evaluation.noise_floor_dph
+    after = judged.after.rms_dph if judged else None
     return {
         "judged_on": role,
-        "before_rms_dph": judged["before"]["rms_dph"] if judged else None,
+        "before_rms_dph": judged.before.rms_dph if judged else None,
         "after_rms_dph": after,
-        "after_mean_dph": judged["after"]["mean_dph"] if judged else None,
+        "after_mean_dph": judged.after.mean_dph if judged else None,
         "rms_over_floor": after / floor if floor and after is not None else None,
         "noise_floor_dph": floor,
         "bias_dph": model.fallback_dph,
         "centers": model.n_centers,
-        "table_bytes": evaluation["model"]["table_bytes"],
-        "sum_abs_weights_dph": evaluation["model"]["sum_abs_weights_dph"],
+        "table_bytes": evaluation.model.table_bytes,
+        "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
         "error_bound_dph": verification["error_bound_dph"],
-        "findings": [finding["id"] for finding in evaluation["findings"]],
+        "findings": [finding.id for finding in evaluation.findings],
         "model_hash": model.hash,
     }
