@@ -132,8 +132,8 @@ def make_seeds(folder: Path) -> None:
     (folder / "limits.toml").write_text(text.replace('targets = ["cortex-m4f"]', "targets = []"), "utf-8")
     held = held_against(load_limits(folder / "limits.toml"), fitted.model, evaluation, verification)
     manifest = Manifest(
-        gyrotc_version="0.1.0", serial="A", axis=None, model_hash="00", refused={"q31": "x"}, meta={}, units={}, sources=(),
-        versions={"numpy": "2"}, files={"c/gtc.h": "00"},
+        gyrotc_version="0.1.0", serial="A", axis=None, model_hash="00", refused={"q31": "x"}, meta={},
+        units={}, sources=(), versions={"numpy": "2"}, files={"c/gtc.h": "00"},
     )  # fmt: skip
     changes = changes_since(Earlier(out), fitted.model, evaluation, manifest)
     for name, content in (
