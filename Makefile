@@ -34,6 +34,10 @@ else
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
 endif
 
+## docs/FORMAT.md's tables of fields and the JSON Schemas, from the classes of the results
+formats:
+	@.venv/bin/python tools/formats.py
+
 ## all tests (CTest for the C library, pytest for the generator); installs its own tools
 test:
 	@tools/setup.sh test
@@ -139,4 +143,4 @@ odd: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd clean

@@ -144,7 +144,7 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         fitted.model.save(out / "model.json")
         emit(fitted.model, out, numerics=("f32",))
         trace = out / "trace" if case.pictured else None
-        result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training)
+        result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()
         said = tuple(finding["id"] for finding in result["findings"])
         yield Result(case, axis, fitted.model.method, said, result, _of_others(dataset), out)
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .inputs import need_memory
+from .results.evaluation import Pooled, Statistics
 
 __all__ = ["LEAST_SPAN_C", "MAD_TO_SIGMA", "Averages", "average", "pooled", "statistics", "time_statistics"]
 
@@ -128,12 +128,10 @@ def _rms_of_windows(a: Averages, window_s: float, average_s: float) -> float | N
     return float(np.sqrt(np.mean(full**2))) if full.size else None
 
 
-def pooled(runs: list[Averages]) -> dict[str, Any]:
+def pooled(runs: list[Averages]) -> Pooled:
     """`before` and `after` over all samples of several runs, and the improvement (RMS ÷ RMS)."""
     before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
     after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
-    result: dict[str, Any] = {"before": statistics(before), "after": statistics(after)}
-    rms = result["after"]["rms_dph"]
-    result["improvement"] = result["before"]["rms_dph"] / rms if rms else None
-    result["samples"] = int(after.size)
-    return result
+    was, remains = Statistics(**statistics(before)), Statistics(**statistics(after))
+    improvement = was.rms_dph / remains.rms_dph if was.rms_dph is not None and remains.rms_dph else None
+    return Pooled(before=was, after=remains, improvement=improvement, samples=int(after.size))

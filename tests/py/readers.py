@@ -20,9 +20,8 @@ from gyrotc.emit.files import emit
 from gyrotc.emit.record import RECORD, read_options
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
-from gyrotc.inputs.stored import read_result
 from gyrotc.jobs.fleet import load_manifest
-from gyrotc.judge.changes import Earlier
+from gyrotc.judge.changes import Earlier, changes_since
 from gyrotc.judge.check import check
 from gyrotc.judge.evaluate import evaluate
 from gyrotc.judge.limits import held_against, load_limits
@@ -32,6 +31,10 @@ from gyrotc.pages.diagnosis_page import write_diagnosis_page
 from gyrotc.pages.plan_page import write_plan_page
 from gyrotc.plan import plan
 from gyrotc.quantise import quantise
+from gyrotc.results.base import read_result
+from gyrotc.results.evaluation import Evaluation
+from gyrotc.results.manifest import Manifest
+from gyrotc.results.planned import Plan
 from gyrotc.simulate import read as read_scenario
 from gyrotc.simulate import simulate
 from gyrotc.simulate.truth import simulated_floor
@@ -128,20 +131,17 @@ def make_seeds(folder: Path) -> None:
     text = limits.read_text("utf-8").split("```toml")[1].split("```")[0]
     (folder / "limits.toml").write_text(text.replace('targets = ["cortex-m4f"]', "targets = []"), "utf-8")
     held = held_against(load_limits(folder / "limits.toml"), fitted.model, evaluation, verification)
-    manifest: dict[str, Any] = {
-        "schema": "gyrotc.manifest/1",
-        "gyrotc_version": "0.1.0",
-        "refused": {"q31": "x"},
-    }
-    manifest |= {"versions": {"numpy": "2"}, "files": {"c/gtc.h": "00"}}
-    changes: dict[str, Any] = {"schema": "gyrotc.changes/1", "same_model": False, "map": None, "figures": {}}
-    changes |= {"versions": {}} | {k: {"new": [], "gone": ["a"]} for k in ("recordings", "findings", "files")}
+    manifest = Manifest(
+        gyrotc_version="0.1.0", serial="A", axis=None, model_hash="00", refused={"q31": "x"}, meta={},
+        units={}, sources=(), versions={"numpy": "2"}, files={"c/gtc.h": "00"},
+    )  # fmt: skip
+    changes = changes_since(Earlier(out), fitted.model, evaluation, manifest)
     for name, content in (
-        ("verify", verification), ("evaluate", evaluation), ("limits", held), ("manifest", manifest),
-        ("changes", changes),
+        ("verify", verification), ("evaluate", evaluation.content()), ("limits", held.content()),
+        ("manifest", manifest.content()), ("changes", changes.content()),
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))
-    (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min")))
+    (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min").content()))
     found = diagnose(dataset).result | {"pictures": ["pictures/a.svg"]}
     (folder / "diagnose.json").write_text(json.dumps(found))
 
@@ -228,7 +228,7 @@ def _example() -> bytes:
 def _used(folder: Path, axis: str | None = None) -> None:
     """A data set as `check`, `fit` and `diagnose` begin with it."""
     found = check(folder, axis=axis)
-    json.dumps(found.to_dict(), allow_nan=False)
+    json.dumps(found.result().content(), allow_nan=False)
     "\n".join(found.lines()).encode("utf-8")
     if found.problems:
         raise found.problems[0]
@@ -334,7 +334,7 @@ def _page(folder: Path, name: str, write: Callable[[Path], Any]) -> Callable[[by
         work = _fresh(folder, "page")
         (work / name).write_bytes(data)
         if name == "plan.json" and number % PICTURES_EVERY:
-            read_result(work / name, "plan")
+            read_result(work / name, Plan)
         else:
             write(work)
 
@@ -362,7 +362,7 @@ def _truth(seeds: Path, folder: Path, name: str, form: Form) -> Reader:
 
 
 def _trace(result: Path, folder: Path) -> Callable[[bytes], None]:
-    run = json.loads((result / "evaluate.json").read_text())["runs"][0]
+    run = read_result(result / "evaluate.json", Evaluation).runs[0]
 
     def read(data: bytes) -> None:
         work = _fresh(folder, "trace")

@@ -58,8 +58,8 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -
     scenario.write_text(SCENARIO)
     simulate(scenario, seed=5, out=tmp_path / "data")
     planned = plan(scenario, seed=5)
-    assert made_up.id in [entry["id"] for entry in planned["limits"]]
-    assert made_up.id in [row["id"] for row in planned["separability"]]
+    assert made_up.id in [entry.id for entry in planned.limits]
+    assert made_up.id in [row.id for row in planned.separability]
     assert list(plan_parts(planned))
     assert "slow rate" in write_plan(tmp_path / "plan", planned).read_text()
 
@@ -75,7 +75,7 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -
 
     (term,) = load_model(out / "model.json").terms
     assert term.id == made_up.id
-    assert built.evaluation["mismatches"] == 0, "the compiled code is what the reference says"
+    assert built.evaluation.mismatches == 0, "the compiled code is what the reference says"
     assert built.verification["passed"] > 0 and built.verification["failed"] == 0
     assert "/* slow_rate */" in next((out / "c").glob("gtc_sim_*.c")).read_text()
     assert "slow rate" in (out / "report.html").read_text()

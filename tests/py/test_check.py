@@ -106,7 +106,7 @@ def test_the_computed_earth_term_is_printed_with_its_uncertainty(tmp_path: Path)
     )
     result = check(tmp_path / "R")
     assert any("Earth's rate 7.5205 +- 0.0228 deg/h off" in line for line in result.lines())
-    assert result.to_dict()["runs"][0]["earth_rate_dph"] == pytest.approx(7.5205, abs=1e-4)
+    assert result.result().runs[0].earth_rate_dph == pytest.approx(7.5205, abs=1e-4)
 
 
 def test_the_same_bytes_under_two_names(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_all_axes_tell_a_common_doubt_once(tmp_path: Path) -> None:
 
 
 def test_the_result_is_json(tmp_path: Path) -> None:
-    result = checked(tmp_path / "RLG-1", long()).to_dict()
+    result = checked(tmp_path / "RLG-1", long()).result().content()
     assert json.loads(json.dumps(result, allow_nan=False))["schema"] == "gyrotc.check/1"
     assert result["serial"] == "RLG-0042"
     assert result["runs"][0]["rows"] == 600

@@ -28,7 +28,7 @@ def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: 
     model = fit_dataset(recordings, FitOptions()).model
     model.save(out / "model.json")
     emit(model, out, numerics=["f32"])
-    evaluation = evaluate(out, recordings, compiled=False)
+    evaluation = evaluate(out, recordings, compiled=False).content()
     # compare judges the map in float64, evaluate the bits of the C code: the same within rounding.
     difference = by_id["mrbf"]["exam_rms_dph"] - evaluation["exam"]["after"]["rms_dph"]
     assert abs(difference) < 1e-6 * evaluation["exam"]["after"]["rms_dph"]

@@ -25,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_method_is_judged_on_every_environment(folder: Path) -> None:
     dataset = load(folder)
-    result = compare(dataset)
+    result = compare(dataset).content()
     assert [m["id"] for m in result["methods"]] == list(METHODS)
     names = ["20 C", "-40 C", "60 C", "1 C/min", "3 C/min", "5 C/min"]
     for method in result["methods"]:
@@ -41,7 +41,7 @@ def test_every_method_is_judged_on_every_environment(folder: Path) -> None:
 
 def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_makes(folder: Path) -> None:
     dataset = load(folder)
-    result = compare(dataset)
+    result = compare(dataset).content()
     rms = {m["id"]: m["exam_rms_dph"] for m in result["methods"]}
     assert rms["mrbf"] < min(rms["mlr"], rms["poly"], rms["rbf_random"], rms["mrbf_paper"])
     row = next(m for m in result["methods"] if m["id"] == "mrbf")
@@ -67,7 +67,7 @@ def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
     for path in folder.glob("run-0[1-6].csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     dataset = load(tmp_path)
-    result = compare(dataset, CompareOptions(methods=("mlr", "mrbf")))
+    result = compare(dataset, CompareOptions(methods=("mlr", "mrbf"))).content()
     assert result["judged_on"] == "left_out"
     front = front_end(dataset.runs, 10.0)
     parts = [samples_of(front.blocks(run), 10.0, k) for k, run in enumerate(dataset.runs)]

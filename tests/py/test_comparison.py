@@ -4,34 +4,37 @@ from __future__ import annotations
 
 import io
 import re
-from typing import Any
 
 import pytest
 from gyrotc.pages.comparison import comparison_picture, comparison_tables, with_published
 from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
+from gyrotc.results.comparison import Comparison, Group, Method
 from rich.console import Console
 
 
-def result(environments: tuple[str, ...], after: float = 7e-4) -> dict[str, Any]:
+def result(environments: tuple[str, ...], after: float = 7e-4) -> Comparison:
     """A result of `compare` with two methods."""
-    groups = [
-        {"environment": name, "samples": 288, "before_rms_dph": 10.0 * after, "before_std_dph": 1.2 * after,
-         "after_rms_dph": after, "after_std_dph": 0.99 * after, "improvement": 10.0}
+    groups = tuple(
+        Group(environment=name, samples=288, before_rms_dph=10.0 * after, before_std_dph=1.2 * after,
+              after_rms_dph=after, after_std_dph=0.99 * after, improvement=10.0)
         for name in environments
-    ]  # fmt: skip
-    whole = {"exam_rms_dph": after, "exam_std_dph": after, "improvement": 10.0, "table_bytes": 104}
-    return {
-        "serial": "A-1",
-        "judged_on": "exam",
-        "noise_floor_dph": after,
-        "methods": [
-            {"id": "mlr", "groups": groups, "centers": 0, "train_s": 0.001, **whole},
-            {"id": "mrbf_paper", "groups": groups, "centers": 7, "train_s": 0.05, **whole},
-        ],
-    }
+    )  # fmt: skip
+
+    def method(id: str, centers: int, seconds: float) -> Method:
+        return Method(
+            id=id, groups=groups, centers=centers, train_s=seconds, exam_rms_dph=after, exam_std_dph=after,
+            before_rms_dph=10.0 * after, improvement=10.0, table_bytes=104, sum_abs_weights_dph=0.0,
+            noise_floor_dph=after,
+        )  # fmt: skip
+
+    return Comparison(
+        gyrotc_version="0.1.0", serial="A-1", axis=None, block_s=10.0, average_s=100.0, seed=0, judged_on="exam",
+        noise_floor_dph=after, noise_floor_source="estimated",
+        methods=(method("mlr", 0, 0.001), method("mrbf_paper", 7, 0.05)),
+    )  # fmt: skip
 
 
-def printed(shown: dict[str, Any]) -> str:
+def printed(shown: Comparison) -> str:
     out = io.StringIO()
     for table in comparison_tables(shown):
         Console(file=out, width=160).print(table)
@@ -44,13 +47,13 @@ def texts(svg: str) -> set[str]:
 
 def test_the_paper_s_environments_have_the_paper_s_figures_beside_ours() -> None:
     shown = with_published(result(ENVIRONMENTS))
-    for method in shown["methods"]:
-        for group in method["groups"]:
-            name, paper = group["environment"], group["published"]
-            assert paper["before_rms_dph"] == BEFORE_DPH[name]
-            assert paper["after_rms_dph"] == AFTER_DPH[method["id"]][name]
-            assert paper["improvement"] == pytest.approx(BEFORE_DPH[name] / AFTER_DPH[method["id"]][name])
-    assert shown["methods"][1]["published_train_s"] == [79.5, 82.6]
+    for method in shown.methods:
+        for group in method.groups:
+            name, paper = group.environment, group.published
+            assert paper is not None and paper.before_rms_dph == BEFORE_DPH[name]
+            assert paper.after_rms_dph == AFTER_DPH[method.id][name]
+            assert paper.improvement == pytest.approx(BEFORE_DPH[name] / AFTER_DPH[method.id][name])
+    assert shown.methods[1].published_train_s == (79.5, 82.6)
     assert "13.95" in printed(shown)
     assert "80-83" in printed(shown)
     assert {"here", "in the paper"} <= texts(comparison_picture(shown))

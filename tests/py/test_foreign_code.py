@@ -172,4 +172,4 @@ def test_evaluate_refuses_it_too(whole: Path, tmp_path: Path) -> None:
     with pytest.raises(CheckFailed, match=r"gtc_rlg_0042\.c holds, in line \d+, what gyrotc does not write"):
         evaluate(folder, dataset)
     assert not (tmp_path / "shown").exists()
-    assert evaluate(whole, dataset)["mismatches"] == 0
+    assert evaluate(whole, dataset).mismatches == 0

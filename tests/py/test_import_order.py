@@ -15,6 +15,7 @@ ORDER = [
     "status",
     "outputs",
     "inputs",
+    "results",
     "texts",
     "metrics",
     "_core",

@@ -26,6 +26,7 @@ from gyrotc.jobs.fleet import load_manifest
 from gyrotc.judge.limits import load_limits
 from gyrotc.model import load_model
 from gyrotc.pages import report
+from gyrotc.results.evaluation import EvaluatedRun
 from gyrotc.simulate import read, simulate
 from gyrotc.simulate.truth import simulated_floor
 from gyrotc.verify.logs import log_parts
@@ -178,14 +179,17 @@ def test_every_ceiling_is_documented() -> None:
         assert f"| `{name}` | {ceiling.default:g} |" in text, name
 
 
-TRUTH = {"schema": "gyrotc.truth/1", "runs": [{"file": "a.csv", "noise": "a.npy", "noise_step_s": 1.0}]}
+TRUTH = {
+    "schema": "gyrotc.truth/1", "scenario": "a", "seed": 1, "noise": {}, "map": {}, "causes": [], "plan": {},
+    "runs": [{"file": "a.csv", "noise": "a.npy", "noise_step_s": 1.0, "bias_dph": [0.0, 1.0]}],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("change", "told"),
     [
         ({"runs": [{}]}, "field runs.0.file: is missing"),
-        ({"runs": [{"file": "b.csv", "noise": "a.npy", "noise_step_s": 1.0}]}, "no run a.csv"),
+        ({"runs": [TRUTH["runs"][0] | {"file": "b.csv"}]}, "no run a.csv"),  # type: ignore[index,operator]
         ({"runs": "all"}, "field runs: 'all'"),
         ({"runs": [TRUTH["runs"][0] | {"noise_step_s": 0.0}]}, "noise_step_s"),  # type: ignore[index,operator]
         ({"runs": [TRUTH["runs"][0] | {"noise": "../../etc/passwd"}]}, "a file in the folder"),  # type: ignore[index,operator]
@@ -359,4 +363,5 @@ def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(
         "\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n"
     )
-    assert "times that do not increase" in refused(lambda: report._trace(tmp_path, {"file": "a.csv"}, 100.0))
+    run = EvaluatedRun.model_construct(file="a.csv")
+    assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))

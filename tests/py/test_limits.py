@@ -2,41 +2,68 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from conftest import Command
 from gyrotc.errors import InputError
 from gyrotc.judge.limits import AtLeast, AtMost, held_against, load_limits
 from gyrotc.model import Model
+from gyrotc.results.evaluation import (
+    EvaluatedRun,
+    Evaluation,
+    FoundIn,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+    Statistics,
+)
 from recordings import columns, described, write_csv
 
-EVALUATION = {
-    "noise_floor_dph": 0.001,
-    "runs": [
-        {
-            "role": "exam",
-            "after": {"rms_30min_dph": 0.0002, "angle_1h_arcsec": 0.5, "first_10min_rms_dph": 0.001},
-        },
-        {
-            "role": "exam",
-            "after": {"rms_30min_dph": 0.0003, "angle_1h_arcsec": None, "first_10min_rms_dph": 0.002},
-        },
-        {
-            "role": "train",
-            "after": {"rms_30min_dph": 9.0, "angle_1h_arcsec": 9.0, "first_10min_rms_dph": 9.0},
-        },
-    ],
-    "exam": {
-        "after": {"rms_dph": 0.0011, "std_dph": 0.001, "mean_dph": -0.0004, "max_abs_dph": 0.004},
-        "improvement": 10.0,
-    },
-    "findings": [{"id": "run_outlier"}],
-    "model": {"centers": 4, "table_bytes": 104, "rom_bytes": 4000, "ram_bytes": 236},
-}
+_NOTHING = dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
+
+
+def run_of(
+    role: Literal["train", "exam"], half_hour: float, angle: float | None, first: float
+) -> EvaluatedRun:
+    after = RunStatistics(
+        **_NOTHING, rms_30min_dph=half_hour, angle_1h_arcsec=angle, first_10min_rms_dph=first
+    )
+    return EvaluatedRun(
+        file="a.csv", role=role, environment=None, samples=1, before=Statistics(**_NOTHING), after=after
+    )
+
+
+EVALUATION = Evaluation(
+    gyrotc_version="0.1.0",
+    serial="RLG-0042",
+    axis=None,
+    numeric="f32",
+    block_s=10.0,
+    average_s=100.0,
+    noise_floor_dph=0.001,
+    noise_floor_source="estimated",
+    mismatches=0,
+    runs=(
+        run_of("exam", 0.0002, 0.5, 0.001),
+        run_of("exam", 0.0003, None, 0.002),
+        run_of("train", 9.0, 9.0, 9.0),
+    ),
+    train=None,
+    exam=Pooled(
+        before=Statistics(**_NOTHING),
+        after=Statistics(rms_dph=0.0011, std_dph=0.001, mean_dph=-0.0004, max_abs_dph=0.004),
+        improvement=10.0,
+        samples=2,
+    ),
+    findings=(FoundIn(id="run_outlier", text="", evidence={}),),
+    model=ModelSizes(
+        method="mrbf", centers=4, table_bytes=104, rom_bytes=4000, ram_bytes=236, sizes_on="cortex-m4f",
+        sum_abs_weights_dph=0.02,
+    ),
+)  # fmt: skip
 VERIFICATION = {
     "targets": [
         {"name": "host-gcc-O2", "status": "pass"},
@@ -62,8 +89,8 @@ def model(model_dict: dict[str, Any]) -> Model:
 def met(folder: Path, model: Model, text: str, evaluation: Any = EVALUATION) -> list[bool]:
     (folder / "product.toml").write_text("schema = 1\n" + text)
     result = held_against(load_limits(folder / "product.toml"), model, evaluation, VERIFICATION)
-    assert result["met"] == all(check["met"] for check in result["limits"])
-    return [check["met"] for check in result["limits"]]
+    assert result.met == all(check.met for check in result.limits)
+    return [check.met for check in result.limits]
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -79,8 +106,8 @@ def test_no_limit_is_left_out_of_the_test_above() -> None:
 
 
 def test_what_was_not_measured_does_not_keep_a_limit(tmp_path: Path, model: Model) -> None:
-    unknown = copy.deepcopy(EVALUATION)
-    unknown["model"]["rom_bytes"], unknown["noise_floor_dph"] = None, None  # type: ignore[index]
+    sizes = EVALUATION.model.model_copy(update={"rom_bytes": None})
+    unknown = EVALUATION.model_copy(update={"model": sizes, "noise_floor_dph": None})
     assert met(tmp_path, model, "[at_most]\nrms_over_floor = 1e9\nrom_bytes = 1e9", unknown) == [False, False]
 
 
@@ -138,9 +165,13 @@ def test_a_product_can_ask_for_a_correction_that_generalises(
     """A constant that was emitted because nothing holds, and a method that nobody judged, do not keep it."""
     (tmp_path / "product.toml").write_text("schema = 1\n[needs]\ngeneralises = true\n")
     result = held_against(
-        load_limits(tmp_path / "product.toml"), model, EVALUATION | {"generalises": shown}, VERIFICATION
+        load_limits(tmp_path / "product.toml"),
+        model,
+        EVALUATION.model_copy(update={"generalises": shown}),
+        VERIFICATION,
     )
-    assert result["limits"] == [{"limit": "needs.generalises", "measured": shown, "bound": True, "met": met}]
+    (check,) = result.content()["limits"]
+    assert check == {"limit": "needs.generalises", "measured": shown, "bound": True, "met": met}
 
 
 def recording(folder: Path, serial: str, shift: float = 0.0) -> None:

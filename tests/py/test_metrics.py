@@ -40,9 +40,9 @@ def test_bins_less_than_half_full_are_left_out() -> None:
 def test_pooled_figures_weigh_every_sample_alike() -> None:
     runs = [_averages(np.full(1000, 1.0)), _averages(np.full(3000, 3.0))]
     result = pooled(runs)
-    assert result["samples"] == 400
-    assert result["after"]["rms_dph"] == pytest.approx(np.sqrt((100 * 1 + 300 * 9) / 400))
-    assert result["improvement"] == pytest.approx(1.0)
+    assert result.samples == 400
+    assert result.after.rms_dph == pytest.approx(np.sqrt((100 * 1 + 300 * 9) / 400))
+    assert result.improvement == pytest.approx(1.0)
 
 
 def test_statistics_of_nothing_are_null() -> None:

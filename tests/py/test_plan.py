@@ -24,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def planned(folder: Path) -> dict[str, Any]:
-    return plan(scenario(folder), seed=4, required={"hysteresis": 1.5e-4})
+    return plan(scenario(folder), seed=4, required={"hysteresis": 1.5e-4}).content()
 
 
 @pytest.fixture(scope="module")

@@ -107,9 +107,7 @@ def test_the_papers_programme_is_in_the_temperatures(paper: Path) -> None:
 def test_the_bias_is_as_large_as_the_papers_and_ten_times_the_noise(paper: Path) -> None:
     truth = read_truth(paper)
     assert truth is not None
-    assert all(
-        low >= 5.8e-3 and high <= 8.5e-3 for low, high in (run["bias_dph"] for run in truth.content["runs"])
-    )
+    assert all(low >= 5.8e-3 and high <= 8.5e-3 for low, high in (run.bias_dph for run in truth.content.runs))
     files = [run.file for run in load(paper).runs]
     floor = simulated_floor(paper, files, 100.0)
     assert floor == pytest.approx(7e-4, rel=0.05)

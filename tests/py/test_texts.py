@@ -240,13 +240,17 @@ _RAN = {
     "replayed": {"rows": 1, "mismatches": 1, "first_mismatches": ["row 0"], "error": "text"},
 }
 _CHANGES = {
+    "model_hash": {"before": "1", "after": "2"},
+    "envelope": {
+        n: dict.fromkeys(("before", "after"), (0.0, 1.0)) for n in ("temperature_c", "slope_c_per_min")
+    },
     "same_model": False,
     "map": None,
     "figures": {"?name": {"before": 1.0, "after": "text"}},
     "versions": {"?numpy": {"before": "1", "after": "2"}},
-    "recordings": {"gone": ["a.csv"]},
-    "findings": {"new": ["text"]},
-    "files": {"changed": ["text"]},
+    "recordings": {"new": [], "gone": ["a.csv"], "other_bytes": []},
+    "findings": {"new": ["text"], "gone": []},
+    "files": {"new": [], "gone": [], "other_bytes": ["text"]},
 }
 _LIMITS = {
     "product": "text",
@@ -256,8 +260,24 @@ _LIMITS = {
 _MANIFEST = {"gyrotc_version": "1", "versions": {"?numpy": "1"}, "refused": {"?q31": "text"}}
 
 
-def _unchecked(path: Path, _kind: str, *, optional: bool = False) -> dict[str, Any]:
-    return {} if optional and not path.exists() else json.loads(path.read_text("utf-8"))
+class _Loose(dict[str, Any]):
+    """An object of a result whose fields are not checked; one that is absent is None, as in the classes."""
+
+    def __getattr__(self, name: str) -> Any:
+        return self.get(name)
+
+    def judged(self) -> tuple[str, _Loose]:
+        return "train", self["train"]
+
+
+def _unchecked(path: Path, _kind: object, *, optional: bool = False) -> Any:
+    if optional and not path.exists():
+        return {}
+    return json.loads(path.read_text("utf-8"), object_hook=_Loose)
+
+
+def _optional(path: Path, kind: object) -> Any:
+    return _unchecked(path, kind, optional=True)
 
 
 def test_the_report_of_a_build(
@@ -265,8 +285,10 @@ def test_the_report_of_a_build(
 ) -> None:
     monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(("bias", "map", "curve", "allan")))
     monkeypatch.setattr(report, "read_result", _unchecked)  # which would refuse some of the texts
+    monkeypatch.setattr(report, "read_stored", _unchecked)
+    monkeypatch.setattr(report, "read_optional", _optional)
     finding = {"id": "text", "text": "text", "evidence": {}}
-    evaluation = result["evaluation"] | {"findings": [finding]}
+    evaluation = result["evaluation"].content() | {"findings": [finding]}
     evaluation["runs"] = [run | {"environment": "text"} for run in evaluation["runs"]]
     verification = result["verification"] | {
         "targets": [_RAN],
@@ -399,12 +421,12 @@ def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str
         return (tmp_path / "fleet.html").read_text("utf-8")
 
     def axes(text: Callable[[], str]) -> str:
-        found = result["evaluation"] | {"findings": [{"id": "text"}]}
+        found = result["evaluation"].content() | {"findings": [{"id": "text"}]}
         models = [_with({"serial": "s"}, text)]
         return (
             report.page_environment()
             .get_template("axes.html.j2")
-            .render(models=models, results=[_with(found, text)])
+            .render(models=models, results=[_Loose(_with(found, text))])
         )
 
     _same_page(fleet)
@@ -633,10 +655,10 @@ def test_terminals_show_every_text_and_obey_none(
     for text in HOSTILE:
         base.tell(text)
     evaluation = result["evaluation"]
-    evaluation = evaluation | {
-        "runs": [evaluation["runs"][0] | {"environment": t, "file": t} for t in HOSTILE[:400]]
-    }
-    console.print(evaluation_table(evaluation | {"serial": "[/x] " + "".join(HOSTILE)}))
+    runs = tuple(evaluation.runs[0].model_copy(update={"environment": t, "file": t}) for t in HOSTILE[:400])
+    console.print(
+        evaluation_table(evaluation.model_copy(update={"runs": runs, "serial": "[/x] " + "".join(HOSTILE)}))
+    )
     console.print(verify_table({"targets": [_RAN | {"name": t} for t in HOSTILE]}))
     said = re.sub(r"\x1b\[\d*(;\d+)*m", "", stream.getvalue())  # rich's own, bold and plain
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u202e]", said)

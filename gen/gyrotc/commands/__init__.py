@@ -1,6 +1,6 @@
 """The subcommands of `gyrotc`, a module for each group; importing a module registers its commands."""
 
-from . import fleet, importing, jobs, plans, recordings, release, steps
+from . import fleet, importing, jobs, plans, recordings, release, schemas, steps
 from .base import app
 
-__all__ = ["app", "fleet", "importing", "jobs", "plans", "recordings", "release", "steps"]
+__all__ = ["app", "fleet", "importing", "jobs", "plans", "recordings", "release", "schemas", "steps"]

@@ -98,9 +98,9 @@ def build(
             progress=say,
         )
     if len(results) == 1:
-        write_json(json_file, results[0].evaluation)
+        write_json(json_file, results[0].evaluation.content())
     else:
-        write_json(json_file, {r.evaluation["axis"]: r.evaluation for r in results})
+        write_json(json_file, {str(r.evaluation.axis): r.evaluation.content() for r in results})
     for result in results:
         _print_built(result)
     tell(f"report: {out / 'report.html'}")
@@ -122,8 +122,8 @@ def _print_built(result: Built) -> None:
         tell(line)
     for line in change_lines(result.changes) if result.changes else ():
         tell(line)
-    for finding in result.evaluation["findings"]:
-        tell(f"finding {finding['id']}: {finding['text']}")
+    for finding in result.evaluation.findings:
+        tell(f"finding {finding.id}: {finding.text}")
     tell(summary(result.evaluation))
 
 
@@ -162,9 +162,9 @@ def compare(
             stage.of(recordings.serial, axis)
         result = with_published(run(recordings, options, progress=say))
         if stage:
-            write_atomically(stage.folder / "compare.json", json_text(result))
+            write_atomically(stage.folder / "compare.json", json_text(result.content()))
             write_atomically(stage.folder / "compare.svg", comparison_picture(result))
-    write_json(json_file, result)
+    write_json(json_file, result.content())
     for table in comparison_tables(result):
         OUT.print(table)
 

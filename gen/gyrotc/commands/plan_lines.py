@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..errors import InputError
+from ..results.planned import Additions, DetectionLimit, Plan, Shortest
 from ..terms import CATALOGUE
 
 __all__ = ["limits_of", "pair_of", "plan_parts"]
@@ -49,26 +49,26 @@ def pair_of(text: str | None) -> tuple[str, str] | None:
     return names[0], names[1]
 
 
-def plan_parts(result: dict[str, Any]) -> Iterator[str | Table]:
+def plan_parts(result: Plan) -> Iterator[str | Table]:
     """What the command prints, from top to bottom."""
-    low, high = result["bias_range_dph"]
+    low, high = result.bias_range_dph
     yield (
-        f"{result['scenario']}: {len(result['runs'])} runs, {result['hours']:g} h; "
-        f"noise {result['noise']['arw_deg_per_sqrt_h']:.3g} deg/sqrt(h); simulated bias {low:.3g} ... {high:.3g} deg/h"
+        f"{result.scenario}: {len(result.runs)} runs, {result.hours:g} h; "
+        f"noise {result.noise.arw_deg_per_sqrt_h:.3g} deg/sqrt(h); simulated bias {low:.3g} ... {high:.3g} deg/h"
     )
     yield _limits(result)
-    for id, why in result["not_testable"].items():
+    for id, why in result.not_testable.items():
         yield f"{id} cannot be tested: {why}"
     yield _separability(result)
-    for hard in result["hard_to_separate"]:
-        a, b = hard["pair"]
-        never = " or never" if hard["d"] > _NEVER else ""
-        yield f"{a} and {b} are told apart only from d = {hard['d']:.0f}{never}; add {hard['add']}"
+    for hard in result.hard_to_separate:
+        a, b = hard.pair
+        never = " or never" if hard.d > _NEVER else ""
+        yield f"{a} and {b} are told apart only from d = {hard.d:.0f}{never}; add {hard.add}"
     yield _accuracy(result)
-    if result["shortest"]:
-        yield from _shortest(result["shortest"])
-    if result["additions"]:
-        yield from _additions(result["additions"])
+    if result.shortest:
+        yield from _shortest(result.shortest)
+    if result.additions:
+        yield from _additions(result.additions)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -78,70 +78,70 @@ def _table(title: str, *columns: str) -> Table:
     return table
 
 
-def _limits(result: dict[str, Any]) -> Table:
+def _limits(result: Plan) -> Table:
     table = _table(
         "What these runs will find (95 % of cases)", "cause", "limit", "unit", "over its parameter"
     )
-    for entry in result["limits"]:
-        limit = entry["detection_limit"]
-        value = "never" if limit["value"] is None else f"{limit['value']:.3g}"
-        table.add_row(entry["id"], value, limit["unit"], _over(entry["id"], limit))
+    for entry in result.limits:
+        limit = entry.detection_limit
+        value = "never" if limit.value is None else f"{limit.value:.3g}"
+        table.add_row(entry.id, value, limit.unit, _over(entry.id, limit))
     return table
 
 
-def _over(id: str, limit: dict[str, Any]) -> str:
-    points = limit["over"]
+def _over(id: str, limit: DetectionLimit) -> str:
+    points = limit.over
     if CATALOGUE[id].kind == "input":
         return "shortest that shows in this gyro"
     if not points:
         return ""
     shown = (points[0], points[len(points) // 2], points[-1])
-    return f"{limit['parameter']}: " + ", ".join(f"{v:.2g} at {p:.4g}" for p, v in shown)
+    return f"{limit.parameter}: " + ", ".join(f"{v:.2g} at {p:.4g}" for p, v in shown)
 
 
-def _separability(result: dict[str, Any]) -> Table:
-    rows = result["separability"]
-    others = [i for i in CATALOGUE if any(i in row["d"] for row in rows)]
+def _separability(result: Plan) -> Table:
+    rows = result.separability
+    others = [i for i in CATALOGUE if any(i in row.d for row in rows)]
     title = "d at which a cause (row) is told from another (column); detection itself takes d = 6"
     table = _table(title, "cause", *(CATALOGUE[o].words.short for o in others))
     for row in rows:
-        at = "" if row["value"] is None else f" {row['value']:.4g}"
+        at = "" if row.value is None else f" {row.value:.4g}"
         cells = []
         for o in others:
-            d = row["d"].get(o)
+            d = row.d.get(o)
             cells.append("" if d is None else "." if d < _ALONE else ">30" if d > 30.0 else f"{d:.1f}")
-        table.add_row(CATALOGUE[row["id"]].words.short + at, *cells)
+        table.add_row(CATALOGUE[row.id].words.short + at, *cells)
     table.caption = ".: the other cannot mimic it"
     table.caption_justify = "left"
     return table
 
 
-def _accuracy(result: dict[str, Any]) -> Table:
+def _accuracy(result: Plan) -> Table:
     title = "Predicted accuracy of the compensated bias over the whole programme"
     table = _table(
         title, "after run", "hours", "error of the map, deg/h", "RMS of 100 s means", "over the floor"
     )
-    for entry, run in zip(result["accuracy"], result["runs"], strict=True):
+    for entry, run in zip(result.accuracy, result.runs, strict=True):
         table.add_row(
-            run["profile"], f"{entry['hours']:g}", f"{entry['map_error_dph']:.1e}", f"{entry['rms_dph']:.2e}",
-            f"{entry['rms_over_floor']:.3f}",
+            run.profile, f"{entry.hours:g}", f"{entry.map_error_dph:.1e}", f"{entry.rms_dph:.2e}",
+            f"{entry.rms_over_floor:.3f}",
         )  # fmt: skip
     return table
 
 
-def _shortest(found: dict[str, Any]) -> Iterator[str]:
-    wanted = ", ".join(f"{i} {v:g}" for i, v in found["required"].items())
-    if found["runs"] is None:
+def _shortest(found: Shortest) -> Iterator[str]:
+    wanted = ", ".join(f"{i} {v:g}" for i, v in found.required.items())
+    if found.runs is None:
         yield f"{wanted}: not reached by any number of these runs"
         return
-    counted = {name: found["runs"].count(name) for name in found["runs"]}
+    counted = {name: found.runs.count(name) for name in found.runs}
     runs = ", ".join(f"{n} x {name}" if n > 1 else name for name, n in counted.items())
-    reached = ", ".join(f"{i} {v:.2g}" for i, v in found["reached"].items())
-    yield f"shortest profile for {wanted}: {found['hours']:g} h: {runs} (reaches {reached})"
+    reached = ", ".join(f"{i} {v:.2g}" for i, v in found.reached.items())
+    yield f"shortest profile for {wanted}: {found.hours:g} h: {runs} (reaches {reached})"
 
 
-def _additions(found: dict[str, Any]) -> Iterator[str]:
-    first, *further = found["runs"]
-    yield f"{' and '.join(found['pair'])}: told apart from d = {first['d']:.1f} as it is; with one run more:"
+def _additions(found: Additions) -> Iterator[str]:
+    first, *further = found.runs
+    yield f"{' and '.join(found.pair)}: told apart from d = {first.d:.1f} as it is; with one run more:"
     for run in further[:3]:
-        yield f"  {run['profile']} ({run['hours']:g} h): from d = {run['d']:.1f}"
+        yield f"  {run.profile} ({run.hours:g} h): from d = {run.d:.1f}"

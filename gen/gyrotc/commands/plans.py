@@ -54,7 +54,7 @@ def plan(
         )
         if stage:
             write_plan(stage.folder, result)
-    write_json(json_file, result)
+    write_json(json_file, result.content())
     for part in plan_parts(result):
         if isinstance(part, str):
             tell(part)

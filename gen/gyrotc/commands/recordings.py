@@ -82,7 +82,7 @@ def check(
         applied=applied_of(applied) if applied else None,
         trust_units=trust_units,
     )
-    write_json(json_file, result.to_dict())
+    write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line)
     if result.problems:

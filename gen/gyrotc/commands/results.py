@@ -9,33 +9,35 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
 from ..pages.published import ENVIRONMENTS
+from ..results.changes import Changes
+from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
+from ..results.limits import HeldLimits
 
 
 def _e(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}e}"
 
 
-def evaluation_table(result: dict[str, Any]) -> RichTable:
-    title = f"{result['serial']}: means over {result['average_s']:g} s, deg/h"
+def evaluation_table(result: Evaluation) -> RichTable:
+    title = f"{result.serial}: means over {result.average_s:g} s, deg/h"
     table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("run", "role", "environment"):
         table.add_column(name, no_wrap=True)
     for name in ("before", "after", "std after", "samples"):
         table.add_column(name, justify="right", no_wrap=True)
-    for run in result["runs"]:
+    for run in result.runs:
         table.add_row(
-            run["file"] + (f"@{run['from_s']:g}" if run.get("from_s") is not None else ""),
-            run["role"], run["environment"] or "", _e(run["before"]["rms_dph"]), _e(run["after"]["rms_dph"]),
-            _e(run["after"]["std_dph"]), str(run["samples"]),
+            run.file + (f"@{run.from_s:g}" if run.from_s is not None else ""), run.role, run.environment or "",
+            *_figures(run), str(run.samples),
         )  # fmt: skip
-    for role in ("train", "exam", "left_out"):
-        part = result.get(role)
+    for role, part in (("train", result.train), ("exam", result.exam), ("left_out", result.left_out)):
         if part:
-            table.add_row(
-                "all", role, "", _e(part["before"]["rms_dph"]), _e(part["after"]["rms_dph"]),
-                _e(part["after"]["std_dph"]), str(part["samples"]), style="bold",
-            )  # fmt: skip
+            table.add_row("all", role, "", *_figures(part), str(part.samples), style="bold")
     return table
+
+
+def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
+    return _e(part.before.rms_dph), _e(part.after.rms_dph), _e(part.after.std_dph)
 
 
 def span_lines(training: dict[str, Any]) -> Iterator[str]:
@@ -148,56 +150,58 @@ def _difference_text(file: dict[str, Any]) -> str:
     )
 
 
-def summary(result: dict[str, Any]) -> str:
+def summary(result: Evaluation) -> str:
     """One line that says what was gained; the paper's own figure beside it for the paper's scenario."""
-    part = result.get("exam") or result.get("left_out") or result.get("train")
-    if not part or not part["improvement"]:
+    found = result.judged()
+    if found is None or not found[1].improvement:
         return "no sample to judge by"
-    if result.get("exam"):
-        published = {run["environment"] for run in result["runs"]} == set(ENVIRONMENTS)
-        text = f"improvement {part['improvement']:.2f}" + (" (paper: 9.8-10.4)" if published else "")
+    part = found[1]
+    if result.exam:
+        published = {run.environment for run in result.runs} == set(ENVIRONMENTS)
+        text = f"improvement {part.improvement:.2f}" + (" (paper: 9.8-10.4)" if published else "")
     else:
-        text = f"improvement on spans left out {part['improvement']:.2f}"
-    floor, rms = result["noise_floor_dph"], part["after"]["rms_dph"]
-    if floor:
-        text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result['noise_floor_source']})"
-    return f"{text}; {result['model']['centers']} centers, {result['model']['table_bytes']} bytes of table"
+        text = f"improvement on spans left out {part.improvement:.2f}"
+    floor, rms = result.noise_floor_dph, part.after.rms_dph
+    if floor and rms is not None:
+        text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
+    return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 
-def limit_lines(limits: dict[str, Any]) -> Iterator[str]:
+def limit_lines(limits: HeldLimits) -> Iterator[str]:
     """Every limit with what was measured."""
-    product = f" of {limits['product']}" if limits["product"] else ""
-    yield f"limits{product}: {'met' if limits['met'] else 'NOT met'}"
-    for check in limits["limits"]:
-        mark = "" if check["met"] else ", NOT MET"
-        yield f"  {check['limit']} {_plain(check['bound'])}: {_plain(check['measured'])}{mark}"
+    product = f" of {limits.product}" if limits.product else ""
+    yield f"limits{product}: {'met' if limits.met else 'NOT met'}"
+    for check in limits.limits:
+        mark = "" if check.met else ", NOT MET"
+        yield f"  {check.limit} {_plain(check.bound)}: {_plain(check.measured)}{mark}"
 
 
-def change_lines(changes: dict[str, Any]) -> Iterator[str]:
+def change_lines(changes: Changes) -> Iterator[str]:
     """What is different from an earlier result."""
-    if changes["same_model"]:
+    if changes.same_model:
         yield "against the earlier result: the same model"
-    elif changes["map"] is None:
+    elif changes.map is None:
         yield "against the earlier result: no temperatures and rates in common"
     else:
-        apart, at = changes["map"], changes["map"]["at"]
-        share = f" = {apart['rms_over_floor']:.2g} x noise floor" if apart["rms_over_floor"] else ""
+        apart, at = changes.map, changes.map.at
+        share = f" = {apart.rms_over_floor:.2g} x noise floor" if apart.rms_over_floor else ""
         yield (
-            f"against the earlier result: maps {apart['rms_dph']:.3e} deg/h RMS apart{share}, at most "
-            f"{apart['max_abs_dph']:.3e} at {at['temperature_c']:.1f} C, {at['slope_c_per_min']:+.2f} C/min"
+            f"against the earlier result: maps {apart.rms_dph:.3e} deg/h RMS apart{share}, at most "
+            f"{apart.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
-    for name, figure in changes["figures"].items():
-        before, after = (
-            (_plain(figure[k]) for k in ("before", "after")) if isinstance(figure, dict) else ("", "")
-        )
-        if before != after:
-            yield f"  {name}: {before} -> {after}"
-    for kind in ("recordings", "findings", "files"):
-        for what, names in changes[kind].items():
+    for name, figure in changes.figures.items():
+        if not isinstance(figure, str) and _plain(figure.before) != _plain(figure.after):
+            yield f"  {name}: {_plain(figure.before)} -> {_plain(figure.after)}"
+    for kind, part in (
+        ("recordings", changes.recordings),
+        ("findings", changes.findings),
+        ("files", changes.files),
+    ):
+        for what, names in part:
             if names:
                 yield f"  {kind}, {what.replace('_', ' ')}: {', '.join(names)}"
-    for name, version in changes["versions"].items():
-        yield f"  {name}: {version['before']} -> {version['after']}"
+    for name, version in changes.versions.items():
+        yield f"  {name}: {version.before} -> {version.after}"
 
 
 def _plain(value: Any) -> str:
@@ -206,6 +210,6 @@ def _plain(value: Any) -> str:
         return "not measured"
     if isinstance(value, float):
         return f"{value:.4g}"
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return " ... ".join(_plain(v) for v in value) if value else "none"
     return str(value)

@@ -103,6 +103,7 @@ def emit(
     """
     from ..emit import emit as run
     from ..model import load_model
+    from ..results.emission import Emitted, EmittedTable
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
@@ -114,19 +115,18 @@ def emit(
         emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at)
         if apart:
             loaded.save(stage.folder / "model.json")
-    result = {
-        "schema": "gyrotc.emit/1",
-        "gyrotc_version": __version__,
-        "serial": loaded.serial,
-        "axis": loaded.axis,
-        "id": loaded.id,
-        "tables": [
-            {"numeric": n, "table_bytes": t.table_bytes, "error_bound_dph": t.error_bound_dph}
-            for n, t in emission.tables.items()
-        ],
-        "refused": emission.refused,
-    }
-    write_json(json_file, result)
+    result = Emitted(
+        gyrotc_version=__version__,
+        serial=loaded.serial,
+        axis=loaded.axis,
+        id=loaded.id,
+        tables=tuple(
+            EmittedTable(numeric=t.numeric, table_bytes=t.table_bytes, error_bound_dph=t.error_bound_dph)
+            for t in emission.tables.values()
+        ),
+        refused=emission.refused,
+    )
+    write_json(json_file, result.content())
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
@@ -241,11 +241,11 @@ def evaluate(
             trust_code=trust_code,
             progress=say,
         )
-        write_atomically(stage / "evaluate.json", json_text(result))
-    write_json(json_file, result)
+        write_atomically(stage / "evaluate.json", json_text(result.content()))
+    write_json(json_file, result.content())
     OUT.print(evaluation_table(result))
-    if result["mismatches"]:
-        raise CheckFailed(f"{result['mismatches']} steps differ from the reference")
+    if result.mismatches:
+        raise CheckFailed(f"{result.mismatches} steps differ from the reference")
 
 
 @app.command()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -18,14 +18,16 @@ from ..inputs import read_input
 from ..model import Model
 from ..outputs import json_text
 from ..reference.table import Numeric
+from ..results.base import Axis, Numbered
 
-__all__ = ["BESIDES", "RECORD", "SIGNATURE", "Options", "joint_record_text", "read_options", "record_text"]
+__all__ = [
+    "BESIDES", "RECORD", "SIGNATURE", "EmissionRecord", "Options", "joint_record_text", "read_options", "record_text",
+]  # fmt: skip
 
 RECORD = "emission.json"
 SIGNATURE = "emission.json.sig"
 #: Names in `c/` that gyrotc writes but does not make from the model: a signature, and the marker of a result.
 BESIDES = frozenset({SIGNATURE, ".gyrotc-result.json"})
-_SCHEMA = "gyrotc.emission/1"
 
 
 class Options(BaseModel):
@@ -47,30 +49,55 @@ class Options(BaseModel):
         return model if self.zero_at_c is None else model.zeroed_at(self.zero_at_c)
 
 
-class _Record(Options):
-    schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")]
+class EmissionRecord(Numbered):
+    """What `emit` wrote into `c/`, a pure function of the model and the options."""
+
+    schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")] = "gyrotc.emission/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where there is one axis, and where several stand in one folder")
+    model_hash: str | None = Field(default=None, description="hash of the model, where it is one")
+    numeric: tuple[Numeric, ...] | None = Field(
+        default=None, description="arithmetics asked for by `--numeric`, in their order, or null"
+    )
+    zero_at_c: float | None = Field(default=None, description="`--zero-at`, C, or null")
+    axes: dict[str, str] = Field(
+        default={}, description="where several axes stand in one folder: hash of each axis's model"
+    )
+    files: dict[str, str] = Field(description="SHA-256 of every other file, by name")
 
 
 def record_text(model: Model, options: Options, files: Mapping[str, bytes]) -> bytes:
     """`c/emission.json` of one table."""
-    return _text(model, files, model.axis, model_hash=model.hash, **options.model_dump(mode="json"))
+    record = EmissionRecord(
+        serial=model.serial,
+        axis=model.axis,
+        model_hash=model.hash,
+        numeric=options.numeric,
+        zero_at_c=options.zero_at_c,
+        files=_hashes(files),
+    )
+    return _text(record)
 
 
 def joint_record_text(models: Mapping[str, Model], files: Mapping[str, bytes]) -> bytes:
     """`c/emission.json` where the tables of several axes stand beside one runtime."""
     first = next(iter(models.values()))
-    return _text(first, files, None, axes={axis: model.hash for axis, model in models.items()})
+    axes = {axis: model.hash for axis, model in models.items()}
+    return _text(EmissionRecord(serial=first.serial, axis=None, axes=axes, files=_hashes(files)))
 
 
-def _text(model: Model, files: Mapping[str, bytes], axis: str | None, **facts: Any) -> bytes:
-    content = {
-        "schema": _SCHEMA,
-        "serial": model.serial,
-        "axis": axis,
-        **facts,
-        "files": {name: hashlib.sha256(files[name]).hexdigest() for name in sorted(files)},
-    }
-    return json_text(content).encode("ascii")
+def _hashes(files: Mapping[str, bytes]) -> dict[str, str]:
+    return {name: hashlib.sha256(files[name]).hexdigest() for name in sorted(files)}
+
+
+def _text(record: EmissionRecord) -> bytes:
+    return json_text(record.content()).encode("ascii")
+
+
+class _Stored(Options):
+    """What of a record is believed before `verify` has made it again: the options."""
+
+    schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")]
 
 
 def read_options(c_folder: Path) -> Options:
@@ -82,7 +109,7 @@ def read_options(c_folder: Path) -> Options:
     path = c_folder / RECORD
     data = read_input(path, "result_mib", "a folder that emit wrote")
     try:
-        found = _Record.model_validate_json(data)
+        found = _Stored.model_validate_json(data)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])

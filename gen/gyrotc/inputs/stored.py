@@ -18,7 +18,6 @@ __all__ = ["KINDS", "Kind", "checked_result", "read_result"]
 
 Figure = Annotated[float, Field(ge=-1e300, le=1e300)] | None
 Count = Annotated[int, Field(ge=0)]
-Texts = dict[str, str]
 
 
 class _Stored(BaseModel):
@@ -32,20 +31,6 @@ class _Statistics(_Stored):
     max_abs_dph: Figure
 
 
-class _After(_Statistics):
-    angle_1h_arcsec: Figure
-
-
-class _Run(_Stored):
-    file: str
-    role: Literal["train", "exam"]
-    environment: str | None = None
-    from_s: Figure = None
-    samples: Count
-    before: _Statistics
-    after: _After
-
-
 class _Pooled(_Stored):
     samples: Count
     before: _Statistics
@@ -56,28 +41,6 @@ class _Pooled(_Stored):
 class _Finding(_Stored):
     id: str
     text: str
-
-
-class _Sizes(_Stored):
-    centers: Count
-    table_bytes: Count
-    rom_bytes: Count | None = None
-    ram_bytes: Count | None = None
-    sum_abs_weights_dph: float
-
-
-class _Evaluation(_Stored):
-    average_s: Annotated[float, Field(gt=0.0, le=1e9)]
-    noise_floor_dph: Annotated[float, Field(ge=0.0, le=1e300)] | None
-    noise_floor_source: str | None
-    mismatches: Count | None
-    runs: list[_Run]
-    train: _Pooled | None
-    exam: _Pooled | None
-    left_out: _Pooled | None = None
-    findings: list[_Finding]
-    generalises: bool | None = None
-    model: _Sizes
 
 
 class _AllanPoint(_Stored):
@@ -145,46 +108,6 @@ class _Verification(_Stored):
     errors: list[_ErrorOf]
 
 
-class _Manifest(_Stored):
-    gyrotc_version: str
-    versions: Texts
-    refused: Texts
-    files: Texts
-
-
-class _Limit(_Stored):
-    limit: str
-    met: bool
-    bound: Any
-    measured: Any
-
-
-class _Limits(_Stored):
-    product: str
-    met: bool
-    limits: list[_Limit]
-
-
-class _Changes(_Stored):
-    same_model: bool
-    map: dict[str, Any] | None
-    figures: dict[str, Any]
-    versions: dict[str, dict[str, str | None]]
-    recordings: dict[str, list[str]]
-    findings: dict[str, list[str]]
-    files: dict[str, list[str]]
-
-
-class _TrueRun(_Stored):
-    file: str
-    noise: str
-    noise_step_s: Annotated[float, Field(ge=1e-6, le=1e6)]
-
-
-class _Truth(_Stored):
-    runs: list[_TrueRun]
-
-
 class _Diagnosis(_Stored):
     verdict: str
     text: str
@@ -194,23 +117,12 @@ class _Diagnosis(_Stored):
     pictures: list[str] = []
 
 
-class _Plan(_Stored):
-    runs: list[dict[str, Any]]
-    limits: list[dict[str, Any]]
-
-
-Kind = Literal["evaluate", "training", "verify", "manifest", "limits", "changes", "truth", "diagnose", "plan"]
+Kind = Literal["training", "verify", "diagnose"]
 
 KINDS: dict[Kind, tuple[type[BaseModel], str | None]] = {
-    "evaluate": (_Evaluation, "gyrotc.evaluate/1"),
     "training": (_Training, "gyrotc.fit/1"),
     "verify": (_Verification, "gyrotc.verify/1"),
-    "manifest": (_Manifest, "gyrotc.manifest/1"),
-    "limits": (_Limits, "gyrotc.limits/1"),
-    "changes": (_Changes, "gyrotc.changes/1"),
-    "truth": (_Truth, "gyrotc.truth/1"),
     "diagnose": (_Diagnosis, "gyrotc.diagnose/1"),
-    "plan": (_Plan, "gyrotc.plan/1"),
 }
 """Fields and schema of every kind."""
 

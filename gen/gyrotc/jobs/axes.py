@@ -11,11 +11,12 @@ from ..emit import emitted_tables
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
-from ..inputs.stored import read_result
 from ..model import Model, load_model
 from ..outputs import write_atomically
 from ..pages.report import page_environment
 from ..reference.runtime import runtime_folders
+from ..results.base import read_result
+from ..results.evaluation import Evaluation
 from ..texts import c_environment
 from ..verify import file_entries
 from ..verify.signature import check_signature, load_public_key
@@ -43,7 +44,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         (c / name).write_bytes(data)
     _run_together(c, [m.id for m in models.values()])
-    results = [read_result(folder / axis / "evaluate.json", "evaluate") for axis in axes]
+    results = [read_result(folder / axis / "evaluate.json", Evaluation) for axis in axes]
     text = (
         page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
     )

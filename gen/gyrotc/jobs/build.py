@@ -20,6 +20,10 @@ from ..model import Model
 from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
 from ..pages.report import write_report
 from ..quantise.applied import applied_of
+from ..results.changes import Changes
+from ..results.evaluation import Evaluation
+from ..results.limits import HeldLimits
+from ..results.manifest import Manifest
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
 from .axes import join_axes
@@ -41,13 +45,13 @@ class Built:
 
     model: Model
     training: dict[str, Any]
-    evaluation: dict[str, Any]
+    evaluation: Evaluation
     verification: dict[str, Any]
     refused: dict[str, str]
     failures: tuple[str, ...]
     diagnosis: dict[str, Any] | None = None
-    limits: dict[str, Any] | None = None
-    changes: dict[str, Any] | None = None
+    limits: HeldLimits | None = None
+    changes: Changes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,15 +165,15 @@ def _build_axis(
         compiled=order.compiled,
         progress=lambda file: say(f"replaying {file}"),
     )
-    _write(work / "evaluate.json", evaluation)
+    _write(work / "evaluate.json", evaluation.content())
     held = held_against(order.limits, fitted.model, evaluation, verification) if order.limits else None
     if held:
-        _write(work / "limits.json", held)
+        _write(work / "limits.json", held.content())
     manifest = _manifest(work, dataset, fitted.model, emission.refused)
-    _write(work / "manifest.json", manifest)
+    _write(work / "manifest.json", manifest.content())
     changes = changes_since(earlier, fitted.model, evaluation, manifest) if earlier else None
     if changes:
-        _write(work / "changes.json", changes)
+        _write(work / "changes.json", changes.content())
     if order.compiled:
         say("drawing the report")
         write_report(work)
@@ -202,9 +206,7 @@ def _of_axis(axis: str, say: Progress) -> Progress:
     return lambda text: say(f"{axis}: {text}")
 
 
-def _failures(
-    evaluation: dict[str, Any], verification: dict[str, Any], held: dict[str, Any] | None
-) -> Iterator[str]:
+def _failures(evaluation: Evaluation, verification: dict[str, Any], held: HeldLimits | None) -> Iterator[str]:
     for entry in verification["targets"]:
         if entry["status"] == "fail":
             reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
@@ -218,30 +220,29 @@ def _failures(
                 f"{error['numeric']}: {error['worst_dph']:.3g} deg/h from the model, above the proven bound of "
                 f"{error['bound_dph']:.3g}"
             )
-    if evaluation["mismatches"]:
-        yield f"{evaluation['mismatches']} steps of the recordings differ from the reference"
-    for check in held["limits"] if held else ():
-        if not check["met"]:
-            yield f"limit {check['limit']} = {check['bound']} is not met: {check['measured']}"
+    if evaluation.mismatches:
+        yield f"{evaluation.mismatches} steps of the recordings differ from the reference"
+    for check in held.limits if held else ():
+        if not check.met:
+            yield f"limit {check.failure()}"
 
 
 def _write(path: Path, result: dict[str, Any]) -> None:
     write_atomically(path, json_text(result))
 
 
-def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> dict[str, Any]:
+def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
-    return {
-        "schema": "gyrotc.manifest/1",
-        "gyrotc_version": __version__,
-        "serial": model.serial,
-        "axis": model.axis,
-        "model_hash": model.hash,
-        "refused": refused,
-        "versions": {"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
-        "meta": dict(dataset.meta),
-        "units": units_of(dataset),
-        "sources": list(dataset.sources),
-        "files": {p.relative_to(folder).as_posix(): sha256(p) for p in files},
-    }
+    return Manifest(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        model_hash=model.hash,
+        refused=refused,
+        versions={"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
+        meta=dict(dataset.meta),
+        units=units_of(dataset),
+        sources=tuple(dataset.sources),
+        files={p.relative_to(folder).as_posix(): sha256(p) for p in files},
+    )

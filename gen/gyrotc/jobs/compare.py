@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from .. import __version__
 from ..dataset import Dataset
 from ..errors import InputError
 from ..metrics import Averages, average, pooled
+from ..results.comparison import Comparison, Group, Method
+from ..results.evaluation import Pooled
 from ..train import METHODS, Fit, TrainingData, fit, predict
 from ..train.data import joined
 from ..train.fitting import front_end, samples_of
@@ -26,6 +28,7 @@ from ..train.spans import training_spans
 __all__ = ["CompareOptions", "compare"]
 
 Progress = Callable[[str], None]
+_JudgedOn = Literal["exam", "left_out"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,7 @@ class _Held:
 
 def compare(
     dataset: Dataset, options: CompareOptions | None = None, *, progress: Progress | None = None
-) -> dict[str, Any]:
+) -> Comparison:
     """Trains and judges every method.
 
     Args:
@@ -58,7 +61,7 @@ def compare(
         progress: Called with what is being done.
 
     Returns:
-        The JSON object `gyrotc.compare/1`.
+        What `compare.json` holds.
 
     Raises:
         InputError: No training run, or no usable sample.
@@ -72,23 +75,22 @@ def compare(
     for method in options.methods:
         say(method)
         methods.append(_judged(method, data, held, options))
-    reference = next((m for m in methods if m["id"] == "mrbf"), methods[0])
-    return {
-        "schema": "gyrotc.compare/1",
-        "gyrotc_version": __version__,
-        "serial": dataset.serial,
-        "axis": dataset.axis,
-        "block_s": options.block_s,
-        "average_s": options.average_s,
-        "seed": options.seed,
-        "judged_on": judged_on,
-        "noise_floor_dph": reference["noise_floor_dph"],
-        "noise_floor_source": "estimated",
-        "methods": methods,
-    }
+    reference = next((m for m in methods if m.id == "mrbf"), methods[0])
+    return Comparison(
+        gyrotc_version=__version__,
+        serial=dataset.serial,
+        axis=dataset.axis,
+        block_s=options.block_s,
+        average_s=options.average_s,
+        seed=options.seed,
+        judged_on=judged_on,
+        noise_floor_dph=reference.noise_floor_dph,
+        noise_floor_source="estimated",
+        methods=tuple(methods),
+    )
 
 
-def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, list[_Held], str]:
+def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, list[_Held], _JudgedOn]:
     """All training samples, what is judged, and on what."""
     training = [run for run in dataset.runs if run.role == "train"]
     if not training:
@@ -121,9 +123,7 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     return data, [h for h in held if h.seen.any()], "left_out"
 
 
-def _judged(
-    method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions
-) -> dict[str, Any]:
+def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions) -> Method:
     began = time.process_time()
     whole = _fit(method, data, options)
     seconds = time.process_time() - began
@@ -131,21 +131,20 @@ def _judged(
         (h.environment, _averages(h, fitted, options)) for h, fitted in _fits(whole, data, held, options)
     ]
     environments = list(dict.fromkeys(name for name, _ in judged))
-    groups = [_group(name, pooled([a for n, a in judged if n == name])) for name in environments]
     total = pooled([a for _, a in judged])
-    return {
-        "id": method,
-        "groups": groups,
-        "exam_rms_dph": total["after"]["rms_dph"],
-        "exam_std_dph": total["after"]["std_dph"],
-        "before_rms_dph": total["before"]["rms_dph"],
-        "improvement": total["improvement"],
-        "centers": whole.n_centers,
-        "table_bytes": whole.table_bytes,
-        "sum_abs_weights_dph": whole.sum_abs_weights,
-        "noise_floor_dph": whole.noise_floor_dph,
-        "train_s": seconds,
-    }
+    return Method(
+        id=method,
+        groups=tuple(_group(name, pooled([a for n, a in judged if n == name])) for name in environments),
+        exam_rms_dph=total.after.rms_dph,
+        exam_std_dph=total.after.std_dph,
+        before_rms_dph=total.before.rms_dph,
+        improvement=total.improvement,
+        centers=whole.n_centers,
+        table_bytes=whole.table_bytes,
+        sum_abs_weights_dph=whole.sum_abs_weights,
+        noise_floor_dph=whole.noise_floor_dph,
+        train_s=seconds,
+    )
 
 
 def _fit(method: str, data: TrainingData, options: CompareOptions) -> Fit:
@@ -167,13 +166,13 @@ def _averages(held: _Held, fitted: Fit, options: CompareOptions) -> Averages:
     return average(s.time_s, s.temperature_c, s.bias_dph, after, scored=scored, average_s=options.average_s)
 
 
-def _group(environment: str, part: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "environment": environment,
-        "samples": part["samples"],
-        "before_rms_dph": part["before"]["rms_dph"],
-        "before_std_dph": part["before"]["std_dph"],
-        "after_rms_dph": part["after"]["rms_dph"],
-        "after_std_dph": part["after"]["std_dph"],
-        "improvement": part["improvement"],
-    }
+def _group(environment: str, part: Pooled) -> Group:
+    return Group(
+        environment=environment,
+        samples=part.samples,
+        before_rms_dph=part.before.rms_dph,
+        before_std_dph=part.before.std_dph,
+        after_rms_dph=part.after.rms_dph,
+        after_std_dph=part.after.std_dph,
+        improvement=part.improvement,
+    )

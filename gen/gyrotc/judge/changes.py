@@ -6,30 +6,40 @@ envelope is the drift of the gyro, of its thermometer or of the procedure, and b
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..inputs.stored import read_result
 from ..model import Model, load_model
+from ..results.base import read_optional
+from ..results.changes import (
+    Apart,
+    At,
+    Changes,
+    Envelopes,
+    FigureChange,
+    FileChanges,
+    NameChanges,
+    TextChange,
+)
+from ..results.evaluation import Evaluation
+from ..results.manifest import Manifest
 
 __all__ = ["Earlier", "changes_since", "load_earlier"]
 
 _GRID = (61, 25)  # points of T and of dT/dt over the common envelope
-_FIGURES = ("rms_dph", "std_dph", "max_abs_dph")
 
 
 class Earlier:
-    """An earlier result: its model and the JSON objects beside it (empty where a file is not there)."""
+    """An earlier result: its model and the results beside it (None where a file is not there)."""
 
     def __init__(self, folder: Path) -> None:
         self.model = load_model(folder / "model.json")
-        self.evaluation = read_result(folder / "evaluate.json", "evaluate", optional=True)
-        self.manifest = read_result(folder / "manifest.json", "manifest", optional=True)
+        self.evaluation = read_optional(folder / "evaluate.json", Evaluation)
+        self.manifest = read_optional(folder / "manifest.json", Manifest)
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
@@ -49,47 +59,53 @@ def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
     return earlier
 
 
-def changes_since(
-    earlier: Earlier, model: Model, evaluation: dict[str, Any], manifest: dict[str, Any]
-) -> dict[str, Any]:
-    """The JSON object of `changes.json`."""
+def changes_since(earlier: Earlier, model: Model, evaluation: Evaluation, manifest: Manifest) -> Changes:
+    """What is different from an earlier result."""
     old = earlier.model
-    return {
-        "schema": "gyrotc.changes/1",
-        "gyrotc_version": __version__,
-        "serial": model.serial,
-        "axis": model.axis,
-        "same_model": old.hash == model.hash,
-        "model_hash": {"before": old.hash, "after": model.hash},
-        "recordings": _recordings(old, model),
-        "map": _map(old, model),
-        "envelope": {
-            name: {"before": list(getattr(old.envelope, name)), "after": list(getattr(model.envelope, name))}
-            for name in ("temperature_c", "slope_c_per_min")
-        },
-        "figures": dict(_figures(earlier, model, evaluation)),
-        "findings": _sets(_ids(earlier.evaluation), _ids(evaluation)),
-        "versions": dict(_versions(earlier.manifest, manifest)),
-        "files": _files(earlier.manifest, manifest),
-    }
+    before, after = _ids(earlier.evaluation), _ids(evaluation)
+    return Changes(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        same_model=old.hash == model.hash,
+        model_hash=TextChange(before=old.hash, after=model.hash),
+        recordings=_recordings(old, model),
+        map=_map(old, model),
+        envelope=Envelopes.of(
+            temperature_c=(old.envelope.temperature_c, model.envelope.temperature_c),
+            slope_c_per_min=(old.envelope.slope_c_per_min, model.envelope.slope_c_per_min),
+        ),
+        figures=dict(_figures(earlier, model, evaluation)),
+        findings=NameChanges(new=_only(after, before), gone=_only(before, after)),
+        versions=dict(_versions(earlier.manifest, manifest)),
+        files=_files(earlier.manifest, manifest),
+    )
 
 
 def _name(serial: str, axis: str | None) -> str:
     return f"gyro {serial}" + (f", axis {axis}" if axis else "")
 
 
-def _sets(before: set[str], after: set[str]) -> dict[str, list[str]]:
-    return {"new": sorted(after - before), "gone": sorted(before - after)}
+def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:
+    return tuple(sorted(names - others))
 
 
-def _recordings(old: Model, new: Model) -> dict[str, list[str]]:
-    """Names of recordings that came, went, or have other bytes."""
-    before, after = ({d.file: d.sha256 for d in m.data} for m in (old, new))
+def _hashes_apart(before: dict[str, str], after: dict[str, str]) -> FileChanges:
+    """Of files by name, with their hashes: which came, went, or have other bytes."""
     other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
-    return _sets(set(before), set(after)) | {"other_bytes": other}
+    return FileChanges(
+        new=_only(after.keys(), before.keys()),
+        gone=_only(before.keys(), after.keys()),
+        other_bytes=tuple(other),
+    )
 
 
-def _map(old: Model, new: Model) -> dict[str, Any] | None:
+def _recordings(old: Model, new: Model) -> FileChanges:
+    before, after = ({d.file: d.sha256 for d in m.data} for m in (old, new))
+    return _hashes_apart(before, after)
+
+
+def _map(old: Model, new: Model) -> Apart | None:
     """How far the maps lie apart where both were calibrated, deg/h; None where nothing is common."""
     limits = []
     for name in ("temperature_c", "slope_c_per_min"):
@@ -101,49 +117,49 @@ def _map(old: Model, new: Model) -> dict[str, Any] | None:
     apart = new.map_dph(t, slope) - old.map_dph(t, slope)
     worst = np.unravel_index(int(np.argmax(np.abs(apart))), apart.shape)
     floor = new.noise_floor_dph
-    return {
-        "rms_dph": float(np.sqrt(np.mean(apart**2))),
-        "mean_dph": float(np.mean(apart)),
-        "max_abs_dph": float(np.abs(apart[worst])),
-        "at": {"temperature_c": float(t[worst]), "slope_c_per_min": float(slope[worst])},
-        "rms_over_floor": float(np.sqrt(np.mean(apart**2))) / floor if floor else None,
-    }
+    rms = float(np.sqrt(np.mean(apart**2)))
+    return Apart(
+        rms_dph=rms,
+        mean_dph=float(np.mean(apart)),
+        max_abs_dph=float(np.abs(apart[worst])),
+        at=At(temperature_c=float(t[worst]), slope_c_per_min=float(slope[worst])),
+        rms_over_floor=rms / floor if floor else None,
+    )
 
 
-def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any]] | None:
-    for name in ("exam", "left_out", "train"):
-        if evaluation.get(name):
-            return name, evaluation[name]
-    return None
-
-
-def _figures(earlier: Earlier, model: Model, evaluation: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def _figures(
+    earlier: Earlier, model: Model, evaluation: Evaluation
+) -> Iterator[tuple[str, FigureChange | str]]:
     """Figures before and after; those of recordings only where both were judged on the same kind."""
-    yield "centers", {"before": earlier.model.n_centers, "after": model.n_centers}
-    yield "noise_floor_dph", {"before": earlier.model.noise_floor_dph, "after": model.noise_floor_dph}
-    old, new = _judged(earlier.evaluation), _judged(evaluation)
+    yield "centers", FigureChange(before=earlier.model.n_centers, after=model.n_centers)
+    yield "noise_floor_dph", FigureChange(before=earlier.model.noise_floor_dph, after=model.noise_floor_dph)
+    old = earlier.evaluation.judged() if earlier.evaluation else None
+    new = evaluation.judged()
     if old is None or new is None or old[0] != new[0]:
         return
     yield "judged_on", new[0]
-    for name in _FIGURES:
-        yield name, {"before": old[1]["after"].get(name), "after": new[1]["after"].get(name)}
+    before, after = old[1].after, new[1].after
+    yield "rms_dph", FigureChange(before=before.rms_dph, after=after.rms_dph)
+    yield "std_dph", FigureChange(before=before.std_dph, after=after.std_dph)
+    yield "max_abs_dph", FigureChange(before=before.max_abs_dph, after=after.max_abs_dph)
 
 
-def _ids(evaluation: dict[str, Any]) -> set[str]:
-    return {finding["id"] for finding in evaluation.get("findings", ())}
+def _ids(evaluation: Evaluation | None) -> set[str]:
+    return {finding.id for finding in evaluation.findings} if evaluation else set()
 
 
-def _versions(old: dict[str, Any], new: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def _versions(old: Manifest | None, new: Manifest) -> Iterator[tuple[str, TextChange]]:
     """Programs whose version is another."""
-    before = old.get("versions", {}) | {"gyrotc": old.get("gyrotc_version")}
-    after = new.get("versions", {}) | {"gyrotc": new.get("gyrotc_version")}
+    before = old.versions | {"gyrotc": old.gyrotc_version} if old else {}
+    after = new.versions | {"gyrotc": new.gyrotc_version}
     for name in sorted(before.keys() | after.keys()):
         if before.get(name) != after.get(name):
-            yield name, {"before": before.get(name), "after": after.get(name)}
+            yield name, TextChange(before=before.get(name), after=after.get(name))
 
 
-def _files(old: dict[str, Any], new: dict[str, Any]) -> dict[str, list[str]]:
-    """Emitted files that came, went, or have other bytes."""
-    before, after = ({k: v for k, v in m.get("files", {}).items() if k.startswith("c/")} for m in (old, new))
-    other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
-    return _sets(set(before), set(after)) | {"other_bytes": other}
+def _files(old: Manifest | None, new: Manifest) -> FileChanges:
+    """Emitted files."""
+    before, after = (
+        {k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new)
+    )
+    return _hashes_apart(before, after)

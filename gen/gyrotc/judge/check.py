@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from .. import __version__
 from ..dataset import Applied, Dataset, RunFacts, axes_of, facts_of, survey
 from ..dataset.problems import Problems
 from ..errors import InputError
+from ..results.check import Checked, CheckedRun, Doubted, Problem
 from .findings import (
     contradiction_findings,
     counter_findings,
@@ -83,17 +83,16 @@ class CheckResult:
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
         yield f"{len(self.problems)} problems, {len(self.doubts)} doubts: {verdict}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON object of `gyrotc check`."""
-        return {
-            "schema": "gyrotc.check/1",
-            "gyrotc_version": __version__,
-            "serial": self.serial,
-            "axis": self.axis,
-            "problems": [{"where": p.where, "found": p.found, "expected": p.expected} for p in self.problems],
-            "doubts": [{"id": d.id, "where": d.where, "text": d.text} for d in self.doubts],
-            "runs": [{"axis": axis} | _run_entry(f) for axis, f in self.facts],
-        }
+    def result(self) -> Checked:
+        """What `gyrotc check --json` writes."""
+        return Checked(
+            gyrotc_version=__version__,
+            serial=self.serial,
+            axis=self.axis,
+            problems=tuple(Problem(where=p.where, found=p.found, expected=p.expected) for p in self.problems),
+            doubts=tuple(Doubted(id=d.id, where=d.where, text=d.text) for d in self.doubts),
+            runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
+        )
 
 
 def envelope_of(text: str) -> Envelope:
@@ -275,22 +274,23 @@ def _run_line(axis: str | None, f: RunFacts) -> str:
     )
 
 
-def _run_entry(f: RunFacts) -> dict[str, Any]:
-    return {
-        "file": f.file,
-        "from_s": f.from_s,
-        "role": f.role,
-        "environment": f.environment,
-        "rows": f.rows,
-        "first_s": f.first_s,
-        "last_s": f.last_s,
-        "row_period_s": f.row_period_s,
-        "gaps": f.gaps,
-        "missing_rows": f.missing_rows,
-        "temperature_c": list(f.temperature_c),
-        "mean_dph": f.mean_dph,
-        "noise_dph": f.noise_dph,
-        "hold_share": f.hold_share,
-        "earth_rate_dph": f.earth.rate_dph if f.earth else None,
-        "earth_rate_sigma_dph": f.earth.sigma_dph if f.earth else None,
-    }
+def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
+    return CheckedRun(
+        axis=axis,
+        file=f.file,
+        from_s=f.from_s,
+        role=f.role,
+        environment=f.environment,
+        rows=f.rows,
+        first_s=f.first_s,
+        last_s=f.last_s,
+        row_period_s=f.row_period_s,
+        gaps=f.gaps,
+        missing_rows=f.missing_rows,
+        temperature_c=f.temperature_c,
+        mean_dph=f.mean_dph,
+        noise_dph=f.noise_dph,
+        hold_share=f.hold_share,
+        earth_rate_dph=f.earth.rate_dph if f.earth else None,
+        earth_rate_sigma_dph=f.earth.sigma_dph if f.earth else None,
+    )

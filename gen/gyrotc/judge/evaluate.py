@@ -25,6 +25,15 @@ from ..inputs.stored import read_result
 from ..metrics import Averages, average, pooled, statistics, time_statistics
 from ..model import Model, load_model
 from ..quantise import Table
+from ..results.evaluation import (
+    EvaluatedRun,
+    Evaluation,
+    FoundIn,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+    Statistics,
+)
 from ..simulate.truth import simulated_floor
 from ..texts import file_stem
 from ..verify.footprint import Footprint, footprint
@@ -75,8 +84,8 @@ def evaluate(
     compiled: bool = True,
     trust_code: bool = False,
     progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Evaluates `folder` (model and C) on a data set; the JSON object of `gyrotc evaluate`.
+) -> Evaluation:
+    """Evaluates `folder` (model and C) on a data set; what `evaluate.json` holds.
 
     Args:
         numeric: Arithmetic to run; default the first emitted one.
@@ -110,11 +119,13 @@ def evaluate(
     sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
-    if result["exam"] is None and training:
-        result["left_out"] = training.get("left_out")
-    result["generalises"] = training.get("generalises") if training else None
-    result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
-    return result
+    if result.exam is None and training:
+        left_out = training.get("left_out")
+        result = result.model_copy(update={"left_out": Pooled.model_validate(left_out) if left_out else None})
+    generalises = training.get("generalises") if training else None
+    result = result.model_copy(update={"generalises": generalises})
+    found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
+    return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 
 
 def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, Any] | None:
@@ -207,16 +218,19 @@ def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArr
     part.replace(path)
 
 
-def _run_entry(part: _Part, average_s: float) -> dict[str, Any]:
+def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
     run, a = part.run, part.averages
-    entry: dict[str, Any] = {"file": run.file, "role": run.role, "environment": run.environment}
-    if run.from_s is not None or run.to_s is not None:
-        entry |= {"from_s": run.from_s, "to_s": run.to_s}
-    return entry | {
-        "samples": int(a.after_dph.size),
-        "before": statistics(a.before_dph),
-        "after": statistics(a.after_dph) | time_statistics(a, average_s),
-    }
+    entry = EvaluatedRun(
+        file=run.file,
+        role=run.role,
+        environment=run.environment,
+        samples=int(a.after_dph.size),
+        before=Statistics(**statistics(a.before_dph)),
+        after=RunStatistics(**statistics(a.after_dph), **time_statistics(a, average_s)),
+    )
+    if run.from_s is None and run.to_s is None:
+        return entry
+    return entry.model_copy(update={"from_s": run.from_s, "to_s": run.to_s})
 
 
 def _result(  # long: one line for each field of the result
@@ -227,35 +241,33 @@ def _result(  # long: one line for each field of the result
     sizes: Footprint | None,
     *,
     average_s: float,
-) -> dict[str, Any]:
+) -> Evaluation:
     exam = [p.averages for p in parts if p.run.role == "exam"]
     train = [p.averages for p in parts if p.run.role == "train"]
     floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
     source = "simulated" if floor is not None else model.noise_floor_source
-    return {
-        "schema": "gyrotc.evaluate/1",
-        "gyrotc_version": __version__,
-        "serial": model.serial,
-        "axis": model.axis,
-        "numeric": table.numeric,
-        "block_s": model.block_s,
-        "average_s": average_s,
-        "noise_floor_dph": floor if floor is not None else model.noise_floor_dph,
-        "noise_floor_source": source,
-        "mismatches": None
-        if any(p.mismatches is None for p in parts)
-        else sum(p.mismatches or 0 for p in parts),
-        "runs": [_run_entry(p, average_s) for p in parts],
-        "train": pooled(train) if train else None,
-        "exam": pooled(exam) if exam else None,
-        "findings": [],
-        "model": {
-            "method": model.method,
-            "centers": model.n_centers,
-            "table_bytes": table.table_bytes,
-            "rom_bytes": sizes.rom_bytes if sizes else None,
-            "ram_bytes": sizes.ram_bytes if sizes else None,
-            "sizes_on": sizes.target if sizes else None,
-            "sum_abs_weights_dph": model.sum_abs_weights_dph,
-        },
-    }
+    compared = [p.mismatches for p in parts if p.mismatches is not None]
+    return Evaluation(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        numeric=table.numeric,
+        block_s=model.block_s,
+        average_s=average_s,
+        noise_floor_dph=floor if floor is not None else model.noise_floor_dph,
+        noise_floor_source=source,
+        mismatches=sum(compared) if len(compared) == len(parts) else None,
+        runs=tuple(_evaluated(p, average_s) for p in parts),
+        train=pooled(train) if train else None,
+        exam=pooled(exam) if exam else None,
+        findings=(),
+        model=ModelSizes(
+            method=model.method,
+            centers=model.n_centers,
+            table_bytes=table.table_bytes,
+            rom_bytes=sizes.rom_bytes if sizes else None,
+            ram_bytes=sizes.ram_bytes if sizes else None,
+            sizes_on=sizes.target if sizes else None,
+            sum_abs_weights_dph=model.sum_abs_weights_dph,
+        ),
+    )

@@ -7,8 +7,7 @@ keep a limit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +17,8 @@ from .. import __version__
 from ..errors import InputError
 from ..inputs import parse_toml, read_input
 from ..model import Model
+from ..results.evaluation import Evaluation
+from ..results.limits import HeldLimits, Limit, Value
 from ..verify.toolchain import all_targets
 
 __all__ = ["Limits", "held_against", "load_limits"]
@@ -107,17 +108,6 @@ class Limits(_Part):
     sha256: str = ""  # of the file
 
 
-@dataclass(frozen=True, slots=True)
-class _Check:
-    limit: str
-    measured: Any
-    bound: Any
-    met: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"limit": self.limit, "measured": self.measured, "bound": self.bound, "met": self.met}
-
-
 def load_limits(path: Path) -> Limits:
     """Reads and checks a limits file.
 
@@ -147,83 +137,89 @@ def load_limits(path: Path) -> Limits:
 
 
 def held_against(
-    limits: Limits, model: Model, evaluation: dict[str, Any], verification: dict[str, Any] | None
-) -> dict[str, Any]:
-    """The JSON object of `limits.json`: every limit with what was measured, and whether all are met."""
-    checks = [
+    limits: Limits, model: Model, evaluation: Evaluation, verification: dict[str, Any] | None
+) -> HeldLimits:
+    """Every limit with what was measured, and whether all are met."""
+    checks = (
         *_amounts(limits, _measured(model, evaluation, verification)),
         *_ranges(limits.covers, model),
         *_needs(limits.needs, evaluation, verification),
-    ]
-    return {
-        "schema": "gyrotc.limits/1",
-        "gyrotc_version": __version__,
-        "serial": model.serial,
-        "axis": model.axis,
-        "product": limits.product,
-        "sha256": limits.sha256,
-        "met": all(check.met for check in checks),
-        "limits": [check.to_dict() for check in checks],
-    }
+    )
+    return HeldLimits(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        product=limits.product,
+        sha256=limits.sha256,
+        met=all(check.met for check in checks),
+        limits=checks,
+    )
 
 
-def _measured(
-    model: Model, evaluation: dict[str, Any], verification: dict[str, Any] | None
-) -> dict[str, Any]:
+def _measured(model: Model, evaluation: Evaluation, verification: dict[str, Any] | None) -> dict[str, Any]:
     """Figures by the names of limits; None: not measured."""
-    judged = evaluation.get("exam") or evaluation.get("left_out") or evaluation.get("train") or {}
-    role = "exam" if evaluation.get("exam") else "train"
-    runs = [run["after"] for run in evaluation["runs"] if run["role"] == role]
-    after = judged.get("after", {})
-    floor, rms = evaluation["noise_floor_dph"], after.get("rms_dph")
-    mean = after.get("mean_dph")
+    found = evaluation.judged()
+    judged = found[1] if found else None
+    role = "exam" if evaluation.exam else "train"
+    runs = [run.after for run in evaluation.runs if run.role == role]
+    after = judged.after if judged else None
+    floor, rms = evaluation.noise_floor_dph, after.rms_dph if after else None
     cells = "".join(model.coverage.rows) if model.coverage else ""
     sigma = model.uncertainty_dph
 
-    def worst(name: str) -> float | None:
-        values = [run[name] for run in runs if run.get(name) is not None]
-        return max(values) if values else None
+    def worst(values: Iterable[float | None]) -> float | None:
+        return max((value for value in values if value is not None), default=None)
 
     return {
-        **{name: after.get(name) for name in ("rms_dph", "std_dph", "max_abs_dph")},
-        "mean_dph": None if mean is None else abs(mean),
+        "rms_dph": rms,
+        "std_dph": after.std_dph if after else None,
+        "max_abs_dph": after.max_abs_dph if after else None,
+        "mean_dph": abs(after.mean_dph) if after and after.mean_dph is not None else None,
         "rms_over_floor": rms / floor if floor and rms is not None else None,
-        **{name: worst(name) for name in ("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph")},
+        "rms_30min_dph": worst(run.rms_30min_dph for run in runs),
+        "angle_1h_arcsec": worst(run.angle_1h_arcsec for run in runs),
+        "first_10min_rms_dph": worst(run.first_10min_rms_dph for run in runs),
         "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
         "error_bound_dph": verification["error_bound_dph"] if verification else None,
-        **{name: evaluation["model"][name] for name in ("centers", "table_bytes", "rom_bytes", "ram_bytes")},
-        "improvement": judged.get("improvement"),
+        "centers": evaluation.model.centers,
+        "table_bytes": evaluation.model.table_bytes,
+        "rom_bytes": evaluation.model.rom_bytes,
+        "ram_bytes": evaluation.model.ram_bytes,
+        "improvement": judged.improvement if judged else None,
         "covered": cells.count("1") / len(cells) if cells else None,
     }
 
 
-def _amounts(limits: Limits, measured: dict[str, Any]) -> Iterator[_Check]:
+def _limit(name: str, measured: Value, bound: Value, met: bool) -> Limit:
+    return Limit(limit=name, measured=measured, bound=bound, met=met)
+
+
+def _amounts(limits: Limits, measured: dict[str, Any]) -> Iterator[Limit]:
     for name, bound in limits.at_most.model_dump(exclude_none=True).items():
         value = measured[name]
-        yield _Check(f"at_most.{name}", value, bound, value is not None and value <= bound)
+        yield _limit(f"at_most.{name}", value, bound, value is not None and value <= bound)
     for name, bound in limits.at_least.model_dump(exclude_none=True).items():
         value = measured[name]
-        yield _Check(f"at_least.{name}", value, bound, value is not None and value >= bound)
+        yield _limit(f"at_least.{name}", value, bound, value is not None and value >= bound)
 
 
-def _ranges(covers: Covers, model: Model) -> Iterator[_Check]:
+def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
     for name, (low, high) in covers.model_dump(exclude_none=True).items():
-        has = list(getattr(model.envelope, name))
-        yield _Check(f"covers.{name}", has, [low, high], has[0] <= low and high <= has[1])
+        has = getattr(model.envelope, name)
+        yield _limit(f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1])
 
 
-def _needs(needs: Needs, evaluation: dict[str, Any], verification: dict[str, Any] | None) -> Iterator[_Check]:
+def _needs(needs: Needs, evaluation: Evaluation, verification: dict[str, Any] | None) -> Iterator[Limit]:
     entries = verification["targets"] if verification else []
     bounds = [error["numeric"] for error in verification["errors"]] if verification else []
     for numeric in needs.arithmetics:
-        yield _Check("needs.arithmetics", sorted(bounds), numeric, numeric in bounds)
+        yield _limit("needs.arithmetics", tuple(sorted(bounds)), numeric, numeric in bounds)
     for target in needs.targets:
-        status = sorted({entry["status"] for entry in entries if entry["name"] == target})
-        yield _Check("needs.targets", status, target, status == ["pass"])
+        status = tuple(sorted({entry["status"] for entry in entries if entry["name"] == target}))
+        yield _limit("needs.targets", status, target, status == ("pass",))
     if needs.generalises:
-        shown = evaluation.get("generalises")
-        yield _Check("needs.generalises", shown, True, shown is True)
-    found = [finding["id"] for finding in evaluation["findings"]]
+        yield _limit("needs.generalises", evaluation.generalises, True, evaluation.generalises is True)
+    found = tuple(finding.id for finding in evaluation.findings)
     for name in needs.no_findings:
-        there = found if name == "any" else [f for f in found if f == name]
-        yield _Check("needs.no_findings", there, name, not there)
+        there = found if name == "any" else tuple(f for f in found if f == name)
+        yield _limit("needs.no_findings", there, name, not there)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from ..results.comparison import Comparison, Group, Method, Published
 from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 from .published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
@@ -23,7 +24,7 @@ _PANELS = 6  # in a row
 _DEFAULT = "mrbf"
 
 
-def with_published(result: dict[str, Any]) -> dict[str, Any]:
+def with_published(result: Comparison) -> Comparison:
     """The result of `compare` with the paper's figures beside ours, if these are the paper's environments.
 
     Groups get `published` (`before_rms_dph`, `after_rms_dph`, `improvement`), methods `published_train_s` (least
@@ -32,87 +33,104 @@ def with_published(result: dict[str, Any]) -> dict[str, Any]:
     if set(ENVIRONMENTS) - set(_environments(result)):
         return result
     methods = []
-    for method in result["methods"]:
-        after = AFTER_DPH.get(method["id"], {})
-        groups = [group | _published(group["environment"], after) for group in method["groups"]]
-        seconds = RUNNING_S.get(method["id"], {}).values()
-        cost = {"published_train_s": [min(seconds), max(seconds)]} if seconds else {}
-        methods.append(method | cost | {"groups": groups})
-    return result | {"methods": methods}
+    for method in result.methods:
+        after = AFTER_DPH.get(method.id, {})
+        groups = tuple(_with_paper(group, after) for group in method.groups)
+        seconds = RUNNING_S.get(method.id, {}).values()
+        with_groups = method.model_copy(update={"groups": groups})
+        methods.append(
+            with_groups.model_copy(update={"published_train_s": (min(seconds), max(seconds))})
+            if seconds
+            else with_groups
+        )
+    return result.model_copy(update={"methods": tuple(methods)})
 
 
-def _published(environment: str, after: dict[str, float]) -> dict[str, Any]:
-    if environment not in after:
-        return {}
-    before = BEFORE_DPH[environment]
-    return {
-        "published": {
-            "before_rms_dph": before,
-            "after_rms_dph": after[environment],
-            "improvement": before / after[environment],
-        }
-    }
+def _with_paper(group: Group, after: dict[str, float]) -> Group:
+    if group.environment not in after:
+        return group
+    before, then = BEFORE_DPH[group.environment], after[group.environment]
+    published = Published(before_rms_dph=before, after_rms_dph=then, improvement=before / then)
+    return group.model_copy(update={"published": published})
 
 
-def _environments(result: dict[str, Any]) -> list[str]:
-    return [group["environment"] for group in result["methods"][0]["groups"]]
+def _environments(result: Comparison) -> list[str]:
+    return [group.environment for group in result.methods[0].groups]
 
 
-def _of_paper(method: dict[str, Any], key: str) -> list[float | None]:
-    return [group.get("published", {}).get(key) for group in method["groups"]]
+def _of_paper(method: Method, figure: Callable[[Published | Group], float | None]) -> list[float | None]:
+    return [figure(group.published) if group.published else None for group in method.groups]
 
 
-def _exponent(result: dict[str, Any]) -> int:
+def _exponent(result: Comparison) -> int:
     """Power of ten in which rates are shown."""
-    after = [g["after_rms_dph"] for m in result["methods"] for g in m["groups"] if g["after_rms_dph"] > 0.0]
+    after = [g.after_rms_dph for m in result.methods for g in m.groups if g.after_rms_dph]
     return math.floor(math.log10(min(after))) if after else 0
 
 
-def comparison_tables(result: dict[str, Any]) -> Iterator[Table]:
+def comparison_tables(result: Comparison) -> Iterator[Table]:
     """Environment by environment, as in the paper's Table 1; then all environments together, with the costs."""
     exponent = _exponent(result)
-    title = f"{result['serial']}: judged on {result['judged_on']}, rates in 1e{exponent} deg/h"
+    title = f"{result.serial}: judged on {result.judged_on}, rates in 1e{exponent} deg/h"
     yield _table_1(result, title, 10.0**exponent)
     yield _costs(result, 10.0**exponent)
 
 
-def _table_1(result: dict[str, Any], title: str, unit: float) -> Table:
-    environments, methods = _environments(result), result["methods"]
+def _table_1(result: Comparison, title: str, unit: float) -> Table:
+    environments, methods = _environments(result), result.methods
     table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column(no_wrap=True, min_width=len("improvement"))
     table.add_column("method", no_wrap=True, min_width=len("  in the paper"))
     for name in environments:
         table.add_column(name, justify="right", overflow="fold")
-    for label, key in (("RMS before", "before_rms_dph"), ("std before", "before_std_dph")):
-        table.add_row(label, "", *_numbers((g[key] for g in methods[0]["groups"]), unit))
+    first = methods[0].groups
+    table.add_row("RMS before", "", *_numbers((g.before_rms_dph for g in first), unit))
+    table.add_row("std before", "", *_numbers((g.before_std_dph for g in first), unit))
     table.add_section()
-    for label, key, scale in (
-        ("RMS after", "after_rms_dph", unit),
-        ("std after", "after_std_dph", unit),
-        ("improvement", "improvement", 1.0),
-    ):
-        for m in methods:
-            table.add_row(label, m["id"], *_numbers((g[key] for g in m["groups"]), scale))
-            paper = _of_paper(m, key)
-            if any(paper):
-                table.add_row("", "  in the paper", *_numbers(paper, scale), style="dim")
-        table.add_section()
+    _rows_after(table, "RMS after", methods, _rms, _rms, unit)
+    _rows_after(table, "std after", methods, lambda g: g.after_std_dph, None, unit)
+    _rows_after(table, "improvement", methods, _improvement, _improvement, 1.0)
     return table
 
 
-def _costs(result: dict[str, Any], unit: float) -> Table:
+def _rms(figures: Published | Group) -> float | None:
+    return figures.after_rms_dph
+
+
+def _improvement(figures: Published | Group) -> float | None:
+    return figures.improvement
+
+
+def _rows_after(
+    table: Table,
+    label: str,
+    methods: Sequence[Method],
+    ours: Callable[[Group], float | None],
+    paper: Callable[[Published | Group], float | None] | None,
+    scale: float,
+) -> None:
+    """A row for each method, and one for the paper's own figures where it has some."""
+    for m in methods:
+        table.add_row(label, m.id, *_numbers(map(ours, m.groups), scale))
+        theirs = _of_paper(m, paper) if paper else []
+        if any(theirs):
+            table.add_row("", "  in the paper", *_numbers(theirs, scale), style="dim")
+    table.add_section()
+
+
+def _costs(result: Comparison, unit: float) -> Table:
     table = Table(title="All environments", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     names = ["method", "RMS", "std", "improvement", "centers", "bytes", "training, s"]
-    paper = any("published_train_s" in m for m in result["methods"])
+    paper = any(m.published_train_s for m in result.methods)
     for name in [*names, "paper's, s"] if paper else names:
         table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
-    for m in result["methods"]:
+    for m in result.methods:
         row = [
-            m["id"], *_numbers((m["exam_rms_dph"], m["exam_std_dph"]), unit), f"{m['improvement']:.2f}",
-            str(m["centers"]), str(m["table_bytes"]), f"{m['train_s']:.3f}",
+            m.id, *_numbers((m.exam_rms_dph, m.exam_std_dph), unit), *_numbers((m.improvement,), 1.0),
+            str(m.centers), str(m.table_bytes), f"{m.train_s:.3f}",
         ]  # fmt: skip
         if paper:
-            row.append("-".join(f"{s:.0f}" for s in m.get("published_train_s", ())))
+            row.append("-".join(f"{s:.0f}" for s in m.published_train_s or ()))
         table.add_row(*row)
     return table
 
@@ -121,9 +139,9 @@ def _numbers(values: Iterable[float | None], unit: float) -> list[str]:
     return ["" if v is None else f"{v / unit:.2f}" for v in values]
 
 
-def comparison_picture(result: dict[str, Any]) -> str:
+def comparison_picture(result: Comparison) -> str:
     """One panel for each environment, a row for each method: RMS after, beside the noise; below, all together."""
-    exponent, methods = _exponent(result), result["methods"]
+    exponent, methods = _exponent(result), result.methods
     groups = len(_environments(result))
     lines, columns = -(-groups // _PANELS), min(groups, _PANELS)
     height = 0.5 + 0.21 * len(methods)
@@ -144,37 +162,37 @@ def comparison_picture(result: dict[str, Any]) -> str:
         return svg(figure)
 
 
-def _rows(ax: Axes, methods: Sequence[dict[str, Any]]) -> None:
+def _rows(ax: Axes, methods: Sequence[Method]) -> None:
     """Names of the methods, the first one uppermost."""
-    ax.set_yticks(range(len(methods)), [m["id"] for m in methods])
+    ax.set_yticks(range(len(methods)), [m.id for m in methods])
     ax.set_ylim(len(methods) - 0.4, -0.6)
 
 
-def _color(method: dict[str, Any]) -> str:
-    return AFTER if method["id"] == _DEFAULT else COVERED
+def _color(method: Method) -> str:
+    return AFTER if method.id == _DEFAULT else COVERED
 
 
-def _environment(ax: Axes, methods: Sequence[dict[str, Any]], k: int, unit: float) -> None:
+def _environment(ax: Axes, methods: Sequence[Method], k: int, unit: float) -> None:
     place = np.arange(len(methods))
-    ours = np.array([m["groups"][k]["after_rms_dph"] for m in methods]) / unit
-    ax.axvline(methods[0]["groups"][k]["before_std_dph"] / unit, color=ACCENT, linewidth=0.8, linestyle=":",
+    ours = np.array([m.groups[k].after_rms_dph for m in methods], dtype=np.float64) / unit
+    ax.axvline((methods[0].groups[k].before_std_dph or 0.0) / unit, color=ACCENT, linewidth=0.8, linestyle=":",
                label="σ before: what the mean alone leaves")  # fmt: skip
     ax.scatter(ours, place, s=22, color=[_color(m) for m in methods], zorder=3, label="here")
-    paper = [_of_paper(m, "after_rms_dph")[k] for m in methods]
+    paper = [_of_paper(m, _rms)[k] for m in methods]
     if any(paper):
         values = np.array([np.nan if p is None else p / unit for p in paper])
         ax.scatter(values, place, s=22, facecolor="none", edgecolor=BEFORE, zorder=2, label="in the paper")
-    ax.set_title(picture_text(methods[0]["groups"][k]["environment"]), fontsize=8.5, loc="left")
+    ax.set_title(picture_text(methods[0].groups[k].environment), fontsize=8.5, loc="left")
 
 
-def _together(ax: Axes, methods: Sequence[dict[str, Any]]) -> None:
+def _together(ax: Axes, methods: Sequence[Method]) -> None:
     """How far every method is from the best one, and what it costs."""
-    rms = np.array([m["exam_rms_dph"] for m in methods])
+    rms = np.array([m.exam_rms_dph for m in methods], dtype=np.float64)
     excess = 100.0 * (rms / rms.min() - 1.0) if rms.min() > 0.0 else np.zeros(len(rms))
     ax.barh(np.arange(len(methods)), excess, height=0.6, color=[_color(m) for m in methods])
     for k, m in enumerate(methods):
-        size = f"{m['centers']} centers, " if m["centers"] else ""
-        text = f"{size}{m['table_bytes']} bytes, trained in {m['train_s']:.3f} s"
+        size = f"{m.centers} centers, " if m.centers else ""
+        text = f"{size}{m.table_bytes} bytes, trained in {m.train_s:.3f} s"
         ax.annotate(text, (excess[k], k), (4, 0), textcoords="offset points", va="center", fontsize=7.5)
     _rows(ax, methods)
     ax.margins(x=0.35)

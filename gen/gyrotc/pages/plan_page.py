@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from ..inputs.stored import read_result
 from ..outputs import json_text, result_folder, write_atomically
+from ..results.base import read_result
+from ..results.planned import Plan
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
 from .report import page_environment, page_from, write_page
 
@@ -18,10 +18,10 @@ def is_plan(folder: Path) -> bool:
     return (folder / "plan.json").is_file() and not (folder / "evaluate.json").exists()
 
 
-def write_plan(folder: Path, result: dict[str, Any]) -> Path:
+def write_plan(folder: Path, result: Plan) -> Path:
     """Writes `folder/plan.json` and `folder/report.html`; returns the page's path."""
     with result_folder(folder, "plan") as stage:
-        write_atomically(stage.folder / "plan.json", json_text(result))
+        write_atomically(stage.folder / "plan.json", json_text(result.content()))
         write_plan_page(stage.folder)
     return folder / "report.html"
 
@@ -32,7 +32,7 @@ def write_plan_page(folder: Path) -> Path:
     Raises:
         InputError: `plan.json` is missing or broken.
     """
-    result = read_result(folder / "plan.json", "plan")
+    result = read_result(folder / "plan.json", Plan)
     with page_from(folder / "plan.json"):
         text = (
             page_environment()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..results.planned import Plan
 from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, STYLE, svg
 
@@ -16,9 +15,9 @@ __all__ = ["accuracy_by_hours", "separability_matrix", "temperatures"]
 _FULL = 30.0  # d from which a pair counts as inseparable
 
 
-def temperatures(result: dict[str, Any]) -> str:
+def temperatures(result: Plan) -> str:
     """Temperature that the sensor will show in every run."""
-    runs = result["runs"]
+    runs = result.runs
     columns = min(3, len(runs))
     rows = -(-len(runs) // columns)
     with mpl.rc_context(STYLE):
@@ -27,20 +26,20 @@ def temperatures(result: dict[str, Any]) -> str:
         for ax in axes.flat[len(runs) :]:
             ax.set_visible(False)
         for ax, run in zip(axes.flat, runs, strict=False):
-            ax.plot(run["temperature"]["time_h"], run["temperature"]["value_c"], color=BEFORE, linewidth=1.1)
-            ax.set_title(picture_text(run["profile"]), fontsize=8.5, loc="left")
+            ax.plot(run.temperature.time_h, run.temperature.value_c, color=BEFORE, linewidth=1.1)
+            ax.set_title(picture_text(run.profile), fontsize=8.5, loc="left")
         figure.supxlabel("h", fontsize=9)
         figure.supylabel("temperature at the sensor, C", fontsize=9)
         return svg(figure)
 
 
-def separability_matrix(result: dict[str, Any]) -> str:
+def separability_matrix(result: Plan) -> str:
     """d from which the row's cause can be told from the column's, on a logarithmic scale of grey."""
-    rows = result["separability"]
-    others = list(dict.fromkeys([*(row["id"] for row in rows), *(o for row in rows for o in row["d"])]))
-    d = np.array([[row["d"].get(o, np.nan) for o in others] for row in rows])
+    rows = result.separability
+    others = list(dict.fromkeys([*(row.id for row in rows), *(o for row in rows for o in row.d)]))
+    d = np.array([[row.d.get(o, np.nan) for o in others] for row in rows])
     names = [
-        picture_text(row["id"].replace("_", " ")) + ("" if row["value"] is None else f" {row['value']:.4g}")
+        picture_text(row.id.replace("_", " ")) + ("" if row.value is None else f" {row.value:.4g}")
         for row in rows
     ]
     with mpl.rc_context(STYLE):
@@ -59,17 +58,15 @@ def separability_matrix(result: dict[str, Any]) -> str:
         return svg(figure)
 
 
-def accuracy_by_hours(result: dict[str, Any]) -> str:
+def accuracy_by_hours(result: Plan) -> str:
     """Predicted RMS over the noise floor, and error of the map, over chamber hours."""
-    hours = [a["hours"] for a in result["accuracy"]]
+    hours = [a.hours for a in result.accuracy]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 2.6), layout="constrained")
         left, right = figure.subplots(1, 2)
-        left.plot(hours, [a["rms_over_floor"] for a in result["accuracy"]], "o-", color=AFTER, markersize=4)
+        left.plot(hours, [a.rms_over_floor for a in result.accuracy], "o-", color=AFTER, markersize=4)
         left.axhline(1.0, color=ACCENT, linewidth=0.7, linestyle="--")
         left.set(xlabel="chamber hours", ylabel="RMS of 100 s means / noise floor")
-        right.semilogy(
-            hours, [a["map_error_dph"] for a in result["accuracy"]], "o-", color=BEFORE, markersize=4
-        )
+        right.semilogy(hours, [a.map_error_dph for a in result.accuracy], "o-", color=BEFORE, markersize=4)
         right.set(xlabel="chamber hours", ylabel="error of the map, deg/h")
         return svg(figure)

@@ -15,16 +15,26 @@ import pyarrow.csv as pacsv
 
 from ..errors import InputError
 from ..inputs import need_memory, open_input, refuse_above
-from ..inputs.stored import read_result
+from ..inputs.stored import read_result as read_stored
 from ..metrics import Averages, average
 from ..model import Model, load_model
 from ..outputs import result_folder, write_atomically
+from ..results.base import read_optional, read_result
+from ..results.changes import Changes
+from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
+from ..results.limits import HeldLimits
+from ..results.manifest import Manifest
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 
 __all__ = ["page_environment", "page_from", "write_page", "write_report"]
 
+_JUDGED_ON = {
+    "exam": "exam runs, never seen in training",
+    "left_out": "spans left out of training in turn",
+    "train": "the training runs themselves",
+}
 _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
@@ -36,14 +46,14 @@ def write_report(folder: Path) -> Path:
         InputError: `model.json` or `evaluate.json` is missing or broken.
     """
     model = load_model(folder / "model.json")
-    evaluation = read_result(folder / "evaluate.json", "evaluate")
-    training = read_result(folder / "training.json", "training", optional=True)
+    evaluation = read_result(folder / "evaluate.json", Evaluation)
+    training = read_stored(folder / "training.json", "training", optional=True)
     beside = {
-        "verification": read_result(folder / "verify.json", "verify", optional=True),
-        "manifest": read_result(folder / "manifest.json", "manifest", optional=True),
-        "diagnosis": read_result(folder / "diagnosis" / "diagnose.json", "diagnose", optional=True),
-        "limits": read_result(folder / "limits.json", "limits", optional=True),
-        "changes": read_result(folder / "changes.json", "changes", optional=True),
+        "verification": read_stored(folder / "verify.json", "verify", optional=True),
+        "manifest": read_optional(folder / "manifest.json", Manifest),
+        "diagnosis": read_stored(folder / "diagnosis" / "diagnose.json", "diagnose", optional=True),
+        "limits": read_optional(folder / "limits.json", HeldLimits),
+        "changes": read_optional(folder / "changes.json", Changes),
     }
     with page_from(folder):
         pictures = _pictures(folder, model, evaluation, training)
@@ -107,26 +117,20 @@ def page_from(source: Path) -> Iterator[None]:
         ) from error
 
 
-def _judged(evaluation: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
-    """What the model is judged by: exam runs, else spans left out, else the training runs themselves."""
-    for key, text in (
-        ("exam", "exam runs, never seen in training"),
-        ("left_out", "spans left out of training in turn"),
-        ("train", "the training runs themselves"),
-    ):
-        if evaluation.get(key):
-            return text, evaluation[key]
-    return "nothing", None
+def _judged(evaluation: Evaluation) -> tuple[str, Pooled | None]:
+    """What the model is judged by, in words, and its figures."""
+    name, figures = evaluation.judged() or ("", None)
+    return _JUDGED_ON.get(name, "nothing"), figures
 
 
 def _pictures(
-    folder: Path, model: Model, evaluation: dict[str, Any], training: dict[str, Any]
+    folder: Path, model: Model, evaluation: Evaluation, training: dict[str, Any]
 ) -> dict[str, str | None]:
     runs = []
-    for run in evaluation["runs"]:
-        averages = _trace(folder / "trace", run, float(evaluation["average_s"]))
+    for run in evaluation.runs:
+        averages = _trace(folder / "trace", run, evaluation.average_s)
         if averages is not None and averages.time_s.size:
-            runs.append((run.get("environment") or run["file"], run["role"], averages))
+            runs.append((run.environment or run.file, run.role, averages))
     return {
         "bias": bias_over_time(runs) if runs else None,
         "map": map_with_centers(model),
@@ -135,9 +139,9 @@ def _pictures(
     }
 
 
-def _trace(folder: Path, run: dict[str, Any], average_s: float) -> Averages | None:
-    start = f"@{run.get('from_s') or 0.0:g}"
-    stems = (file_stem(run["file"].replace("/", "_")), file_stem(Path(run["file"]).stem))
+def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:
+    start = f"@{run.from_s or 0.0:g}"
+    stems = (file_stem(run.file.replace("/", "_")), file_stem(Path(run.file).stem))
     names = [stem + end + ".csv" for stem in stems for end in (start, "")]
     path = next((folder / n for n in names if (folder / n).is_file()), None)
     if path is None:

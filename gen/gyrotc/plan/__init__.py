@@ -8,13 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .. import __version__
+from ..diagnose.detect.detection_limits import Limit
 from ..diagnose.screen.blocks import Record
 from ..diagnose.signatures.candidates import searched
+from ..results.planned import (
+    Accuracy,
+    Additions,
+    DetectionLimit,
+    Hard,
+    NoiseLevels,
+    Plan,
+    PlanLimit,
+    PlannedRun,
+    Separability,
+    Shortest,
+    Temperature,
+    TriedRun,
+)
 from ..simulate.campaign import Noise
 from ..terms import CATALOGUE, separate_by
 from .programme import Programme, programme_of
@@ -37,8 +51,8 @@ def plan(  # long: one line for each field of the result
     required: Mapping[str, float] | None = None,
     pair: tuple[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
-    """The JSON object of `gyrotc plan`.
+) -> Plan:
+    """What `plan.json` holds.
 
     Args:
         scenario: Profiles: a scenario that comes with gyrotc, or a TOML file.
@@ -58,84 +72,76 @@ def plan(  # long: one line for each field of the result
     sensitivity = Sensitivity(programme)
     say("comparing causes")
     rows = separability(sensitivity)
-    result = _head(programme) | {
-        "runs": [
-            {"profile": run.name, "hours": h, "temperature": _temperature(run)}
+    shown = [Separability(id=r.id, parameter=r.parameter, value=r.value, d=r.d) for r in rows]
+    return Plan(
+        gyrotc_version=__version__,
+        serial=None,
+        axis=None,
+        scenario=programme.name,
+        hours=sum(programme.hours),
+        noise=_noise(programme),
+        bias_range_dph=programme.bias_range_dph,
+        runs=tuple(
+            PlannedRun(profile=run.name, hours=h, temperature=_temperature(run))
             for run, h in zip(programme.records.runs, programme.hours, strict=True)
-        ],
-        "limits": _limits(sensitivity),
-        "not_testable": dict(sensitivity.bank.untestable),
-        "separability": [{"id": r.id, "parameter": r.parameter, "value": r.value, "d": r.d} for r in rows],
-        "hard_to_separate": list(_hard(rows)),
-        "accuracy": list(_accuracy(sensitivity)),
-        "shortest": None,
-        "additions": None,
-    }
-    if required:
-        say("looking for the shortest profile")
-        found = shortest(sensitivity, required)
-        result["shortest"] = {
-            "required": dict(required),
-            "runs": None if found.runs is None else list(found.runs),
-            "hours": found.hours,
-            "reached": found.reached,
-        }
-    if pair:
-        say("trying further runs")
-        ranked = additions(scenario, pair, noise=noise, seed=seed)
-        result["additions"] = {
-            "pair": list(pair),
-            "runs": [{"profile": name, "hours": hours, "d": d} for name, hours, d in ranked],
-        }
-    return result
+        ),
+        limits=_limits(sensitivity),
+        not_testable=dict(sensitivity.bank.untestable),
+        separability=tuple(shown),
+        hard_to_separate=_hard(rows),
+        accuracy=tuple(_accuracy(sensitivity)),
+        shortest=_shortest(sensitivity, required, say) if required else None,
+        additions=_additions(scenario, pair, noise, seed, say) if pair else None,
+    )
 
 
-def _head(programme: Programme) -> dict[str, Any]:
+def _shortest(
+    sensitivity: Sensitivity, required: Mapping[str, float], say: Callable[[str], None]
+) -> Shortest:
+    say("looking for the shortest profile")
+    found = shortest(sensitivity, required)
+    return Shortest(required=dict(required), runs=found.runs, hours=found.hours, reached=found.reached)
+
+
+def _additions(
+    scenario: str | Path, pair: tuple[str, str], noise: Noise, seed: int, say: Callable[[str], None]
+) -> Additions:
+    say("trying further runs")
+    ranked = additions(scenario, pair, noise=noise, seed=seed)
+    return Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=hours, d=d) for n, hours, d in ranked))
+
+
+def _noise(programme: Programme) -> NoiseLevels:
     noise = programme.declared
-    return {
-        "schema": "gyrotc.plan/1",
-        "gyrotc_version": __version__,
-        "serial": None,
-        "axis": None,
-        "scenario": programme.name,
-        "hours": sum(programme.hours),
-        "noise": {
-            "arw_deg_per_sqrt_h": noise.arw_deg_per_sqrt_h,
-            "bias_instability_dph": noise.bias_instability_dph,
-            "rate_random_walk_dph_per_sqrt_h": noise.rate_random_walk_dph_per_sqrt_h,
-            "quantum_arcsec": noise.quantum_arcsec,
-        },
-        "bias_range_dph": list(programme.bias_range_dph),
-    }
+    return NoiseLevels(
+        arw_deg_per_sqrt_h=noise.arw_deg_per_sqrt_h,
+        bias_instability_dph=noise.bias_instability_dph,
+        rate_random_walk_dph_per_sqrt_h=noise.rate_random_walk_dph_per_sqrt_h,
+        quantum_arcsec=noise.quantum_arcsec,
+    )
 
 
-def _temperature(run: Record) -> dict[str, list[float]]:
+def _temperature(run: Record) -> Temperature:
     """The run's temperature for a picture."""
     step = max(run.history.time_s.size // _PICTURE_POINTS, 1)
-    return {
-        "time_h": [round(float(t) / 3600.0, 4) for t in run.history.time_s[::step]],
-        "value_c": [round(float(c), 2) for c in run.history.temperature_c[::step]],
-    }
+    return Temperature(
+        time_h=tuple(round(float(t) / 3600.0, 4) for t in run.history.time_s[::step]),
+        value_c=tuple(round(float(c), 2) for c in run.history.temperature_c[::step]),
+    )
 
 
-def _limits(sensitivity: Sensitivity) -> list[dict[str, Any]]:
+def _limits(sensitivity: Sensitivity) -> tuple[PlanLimit, ...]:
+    def shown(limit: Limit) -> DetectionLimit:
+        return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
+
     found = sensitivity.limits()
-    return [
-        {
-            "id": id,
-            "family": CATALOGUE[id].family,
-            "detection_limit": {
-                "value": limit.value,
-                "unit": limit.unit,
-                "parameter": limit.parameter,
-                "over": [list(p) for p in limit.at],
-            },
-        }
+    return tuple(
+        PlanLimit(id=id, family=CATALOGUE[id].family, detection_limit=shown(limit))
         for id, limit in found.items()
-    ]
+    )
 
 
-def _hard(rows: list[Row]) -> list[dict[str, Any]]:
+def _hard(rows: list[Row]) -> tuple[Hard, ...]:
     """Pairs that need more than d = 10 in either direction, the hardest first, and what would part them."""
     worst: dict[frozenset[str], tuple[float, str, str]] = {}
     for row in rows:
@@ -145,10 +151,10 @@ def _hard(rows: list[Row]) -> list[dict[str, Any]]:
             if planned and d > _HARD and d > worst.get(key, (0.0, "", ""))[0]:
                 worst[key] = (d, row.id, other)
     ranked = sorted(worst.values(), reverse=True)
-    return [{"pair": [a, b], "d": d, "add": separate_by(a, b)} for d, a, b in ranked]
+    return tuple(Hard(pair=(a, b), d=d, add=separate_by(a, b)) for d, a, b in ranked)
 
 
-def _accuracy(sensitivity: Sensitivity) -> list[dict[str, Any]]:
+def _accuracy(sensitivity: Sensitivity) -> list[Accuracy]:
     """Predicted accuracy after each run: error of the map over the whole programme, RMS of means over 100 s."""
     programme = sensitivity.programme
     floor = float(
@@ -160,12 +166,12 @@ def _accuracy(sensitivity: Sensitivity) -> list[dict[str, Any]]:
         error = sensitivity.map_error(range(count))
         rms = float(np.hypot(floor, error))
         out.append(
-            {
-                "hours": float(hours[count - 1]),
-                "runs": count,
-                "map_error_dph": error,
-                "rms_dph": rms,
-                "rms_over_floor": rms / floor,
-            }
+            Accuracy(
+                hours=float(hours[count - 1]),
+                runs=count,
+                map_error_dph=error,
+                rms_dph=rms,
+                rms_over_floor=rms / floor,
+            )
         )
     return out

@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dataset.text import dataset_toml
 from ..errors import InputError
 from ..outputs import json_text, result_folder
+from ..results.truth import SimulatedTruth, TrueRun
 from .biasmap import BiasMap, draw
 from .instrument import Record, record
 from .noise import CELL_S
 from .recording import RowLength, rows
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
-from .truth import SCHEMA
 from .write import Format, RunFile
 
 __all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
@@ -163,9 +162,7 @@ def _write_run(
             yield float(chunk.time_s[-1] + length.row_s) / total_s
 
 
-def _truth_of_run(
-    folder: Path, file: str, made: Record, length: RowLength, weight: float | None
-) -> dict[str, Any]:
+def _truth_of_run(folder: Path, file: str, made: Record, length: RowLength, weight: float | None) -> TrueRun:
     """Writes the noise of a run (mean of each row, or of each second where rows are shorter)."""
     step_s = length.cells * CELL_S
     edges = made.angle_arcsec[:: length.cells]
@@ -174,11 +171,8 @@ def _truth_of_run(
     noise = (np.diff(edges) - np.diff(made.true_arcsec[:: length.cells])) / step_s
     path = f"truth/{Path(file).stem}.noise.npy"
     np.save(folder / path, noise.astype(np.float32))
-    return {"file": file, "noise": path, "noise_step_s": step_s, "bias_dph": _extent(made.bias_dph)}
-
-
-def _extent(values: NDArray[np.float64]) -> list[float]:
-    return [float(values.min()), float(values.max())]
+    bias = float(made.bias_dph.min()), float(made.bias_dph.max())
+    return TrueRun(file=file, noise=path, noise_step_s=step_s, bias_dph=bias)
 
 
 def _write_texts(
@@ -188,7 +182,7 @@ def _write_texts(
     seed: int,
     weight: float | None,
     runs: list[dict[str, Any]],
-    truths: list[dict[str, Any]],
+    truths: list[TrueRun],
 ) -> None:
     head: dict[str, Any] = {
         "schema": 1,
@@ -204,19 +198,18 @@ def _write_texts(
         "noise": {key: levels[key] for key in _DECLARED if levels[key]},
     }
     (folder / "dataset.toml").write_text(dataset_toml(head, tables, runs), "utf-8")
-    truth = {
-        "schema": SCHEMA,
-        "scenario": name,
-        "seed": seed,
-        "noise": levels,
-        "map": gyro_map(plan, seed).described(),
-        "causes": [
+    truth = SimulatedTruth(
+        scenario=name,
+        seed=seed,
+        noise=levels,
+        map=gyro_map(plan, seed).described(),
+        causes=tuple(
             {"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause
-        ],
-        "plan": plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
-        "runs": truths,
-    }
-    (folder / TRUTH_FILE).write_text(json_text(truth), "ascii")
+        ),
+        plan=plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
+        runs=tuple(truths),
+    )
+    (folder / TRUTH_FILE).write_text(json_text(truth.content()), "ascii")
 
 
 def _serial(plan: Scenario, seed: int) -> str:

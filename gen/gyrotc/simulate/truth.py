@@ -9,18 +9,17 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..inputs import read_input
-from ..inputs.stored import read_result
+from ..results.base import read_optional
+from ..results.truth import SimulatedTruth
 
-__all__ = ["FILE", "SCHEMA", "Truth", "read_truth", "simulated_floor"]
+__all__ = ["FILE", "Truth", "read_truth", "simulated_floor"]
 
-SCHEMA = "gyrotc.truth/1"
 FILE = "truth.json"
 # What numpy.save writes of one dimension (NEP 1); matched, not evaluated.
 _HEAD = re.compile(
@@ -40,7 +39,7 @@ class Truth:
     """
 
     folder: Path
-    content: dict[str, Any]
+    content: SimulatedTruth
 
     def noise_dph(self, file: str) -> tuple[float, NDArray[np.float64]]:
         """Noise really added to one run.
@@ -52,14 +51,14 @@ class Truth:
         Raises:
             InputError: no such run, or its noise is missing.
         """
-        runs = {run["file"]: run for run in self.content["runs"]}
+        runs = {run.file: run for run in self.content.runs}
         if file not in runs:
             raise InputError(str(self.folder / FILE), f"no run {file}", ", ".join(sorted(runs)))
-        name = Path(runs[file]["noise"])
+        name = Path(runs[file].noise)
         if name.is_absolute() or ".." in name.parts:
             where = f"{self.folder / FILE}, run {file}, field noise"
             raise InputError(where, repr(str(name)), "a file in the folder of the data set")
-        return float(runs[file]["noise_step_s"]), _array(self.folder / name)
+        return runs[file].noise_step_s, _array(self.folder / name)
 
     def mean_noise_dph(self, file: str, average_s: float) -> NDArray[np.float64]:
         """Means over `average_s` (rounded to whole steps, at least one) of the noise of one run, deg/h."""
@@ -92,10 +91,8 @@ def read_truth(folder: Path) -> Truth | None:
     Raises:
         InputError: `truth.json` is there and is not what `simulate` writes.
     """
-    path = folder / FILE
-    if not path.exists() and not path.is_symlink():
-        return None
-    return Truth(folder, read_result(path, "truth"))
+    content = read_optional(folder / FILE, SimulatedTruth)
+    return Truth(folder, content) if content else None
 
 
 def _array(path: Path) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from ...dataset import load
 from ...errors import CheckFailed, GyrotcError, InputError
 from ...model import Model
 from ...outputs import KINDS, result_folder
+from ...results.evaluation import Evaluation
 from ..build import build_into
 from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
@@ -105,24 +106,23 @@ def _built(task: Task) -> Entry:
     return entry | {"aside": aside} if aside else entry
 
 
-def _figures(model: Model, evaluation: Entry, verification: Entry) -> Entry:
+def _figures(model: Model, evaluation: Evaluation, verification: Entry) -> Entry:
     """What the summary shows and outliers are sought in."""
-    role = next((r for r in ("exam", "left_out", "train") if evaluation.get(r)), None)
-    judged = evaluation[role] if role else None
-    floor = evaluation["noise_floor_dph"]
-    after = judged["after"]["rms_dph"] if judged else None
+    role, judged = evaluation.judged() or (None, None)
+    floor = evaluation.noise_floor_dph
+    after = judged.after.rms_dph if judged else None
     return {
         "judged_on": role,
-        "before_rms_dph": judged["before"]["rms_dph"] if judged else None,
+        "before_rms_dph": judged.before.rms_dph if judged else None,
         "after_rms_dph": after,
-        "after_mean_dph": judged["after"]["mean_dph"] if judged else None,
+        "after_mean_dph": judged.after.mean_dph if judged else None,
         "rms_over_floor": after / floor if floor and after is not None else None,
         "noise_floor_dph": floor,
         "bias_dph": model.fallback_dph,
         "centers": model.n_centers,
-        "table_bytes": evaluation["model"]["table_bytes"],
-        "sum_abs_weights_dph": evaluation["model"]["sum_abs_weights_dph"],
+        "table_bytes": evaluation.model.table_bytes,
+        "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
         "error_bound_dph": verification["error_bound_dph"],
-        "findings": [finding["id"] for finding in evaluation["findings"]],
+        "findings": [finding.id for finding in evaluation.findings],
         "model_hash": model.hash,
     }

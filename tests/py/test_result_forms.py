@@ -1,0 +1,95 @@
+"""Results are typed: what is shipped about their forms is made from the classes, and each is read back as written."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from conftest import ROOT, Command
+from gyrotc.errors import InputError
+from gyrotc.results.base import checked_result
+from gyrotc.results.changes import Apart, At
+from gyrotc.results.describe import tables
+from gyrotc.results.limits import HeldLimits, Limit
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("formats", Path(ROOT) / "tools" / "formats.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["formats"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+FORMATS = _tool()
+
+LIMITS = HeldLimits(
+    gyrotc_version="0.1.0", serial="A", axis=None, product="NAV", sha256="00", met=False,
+    limits=(
+        Limit(limit="at_most.rom_bytes", measured=6292, bound=10.0, met=False),
+        Limit(limit="covers.temperature_c", measured=(-40.0, 60.0), bound=(-10.0, 30.0), met=True),
+        Limit(limit="at_most.rms_dph", measured=None, bound=1.0, met=False),
+    ),
+)  # fmt: skip
+
+
+def test_format_and_schemas_are_what_the_classes_give() -> None:
+    assert FORMATS.differing() == [], "run `make formats`"
+
+
+def test_the_comparison_with_the_classes_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changed = tmp_path / "FORMAT.md"
+    changed.write_text(FORMATS.FORMAT.read_text("utf-8").replace("| `met` |", "| `mett` |"), "utf-8")
+    monkeypatch.setattr(FORMATS, "FORMAT", changed)
+    assert FORMATS.differing() == [changed]
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS.RESULTS))
+def test_every_field_says_what_it_means(name: str) -> None:
+    rows = [line for line in tables(FORMATS.RESULTS[name]).splitlines() if line.startswith("| `")]
+    assert rows and all(not row.endswith("|  |") for row in rows if "`schema`" not in row)
+
+
+def test_a_result_is_read_back_as_it_was_written() -> None:
+    content = json.loads(json.dumps(LIMITS.content()))
+    assert list(content) == [
+        "schema", "gyrotc_version", "serial", "axis", "product", "sha256", "met", "limits",
+    ]  # fmt: skip
+    again = checked_result(content, HeldLimits, "limits.json")
+    assert again == LIMITS and json.dumps(again.content()) == json.dumps(content)
+    assert [repr(limit.measured) for limit in again.limits] == ["6292", "(-40.0, 60.0)", "None"]
+
+
+def test_unknown_fields_are_let_through_and_wrong_ones_refused_by_name() -> None:
+    content = json.loads(json.dumps(LIMITS.content()))
+    assert checked_result(content | {"later": 1}, HeldLimits, "limits.json") == LIMITS
+    for change, told in (
+        ({"met": "yes"}, "limits.json, field met: 'yes'"),
+        ({"axis": "w"}, "limits.json, field axis: 'w'"),
+        ({"limits": [{}]}, "limits.json, field limits.0.limit: is missing"),
+        ({"schema": "gyrotc.limits/2"}, "limits.json, field schema: 'gyrotc.limits/2'"),
+    ):
+        with pytest.raises(InputError) as caught:
+            checked_result(content | change, HeldLimits, "limits.json")
+        assert told in str(caught.value)
+
+
+def test_a_result_that_is_no_number_cannot_be_made() -> None:
+    with pytest.raises(ValueError, match="finite number"):
+        Apart(
+            rms_dph=float("nan"), mean_dph=0.0, max_abs_dph=0.0,
+            at=At(temperature_c=0.0, slope_c_per_min=0.0), rms_over_floor=None,
+        )  # fmt: skip
+
+
+def test_the_command_prints_a_schema_or_all(gyrotc: Command) -> None:
+    done = gyrotc("schema", "limits")
+    assert done.returncode == 0 and json.loads(done.stdout) == HeldLimits.model_json_schema()
+    assert set(json.loads(gyrotc("schema").stdout)) == set(FORMATS.KINDS)
+    done = gyrotc("schema", "limit")
+    assert done.returncode == 2 and "changes, check" in done.stderr

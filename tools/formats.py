@@ -1,0 +1,79 @@
+"""Writes what is made from the classes of results: the JSON Schemas of the package, and the tables of docs/FORMAT.md.
+
+`make formats` runs it; tests/py/test_result_forms.py holds what is there against the classes. With `--check` nothing is
+written, and the exit status is 1 where something differs.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+from gyrotc.emit.record import EmissionRecord
+from gyrotc.model import Model
+from gyrotc.results.base import Numbered
+from gyrotc.results.changes import Changes
+from gyrotc.results.check import Checked
+from gyrotc.results.comparison import Comparison
+from gyrotc.results.describe import schema_text, tables
+from gyrotc.results.emission import Emitted
+from gyrotc.results.evaluation import Evaluation
+from gyrotc.results.limits import HeldLimits
+from gyrotc.results.manifest import Manifest
+from gyrotc.results.planned import Plan
+from gyrotc.results.truth import SimulatedTruth
+from pydantic import BaseModel
+
+ROOT = Path(__file__).resolve().parents[1]
+FORMAT = ROOT / "docs" / "FORMAT.md"
+SCHEMAS = ROOT / "gen" / "gyrotc" / "results" / "schemas"
+
+RESULTS: dict[str, type[Numbered]] = {
+    "changes": Changes,
+    "check": Checked,
+    "compare": Comparison,
+    "emission": EmissionRecord,
+    "emit": Emitted,
+    "evaluate": Evaluation,
+    "limits": HeldLimits,
+    "manifest": Manifest,
+    "plan": Plan,
+    "truth": SimulatedTruth,
+}
+"""Results whose tables stand in docs/FORMAT.md."""
+
+KINDS: dict[str, type[BaseModel]] = {**RESULTS, "model": Model}
+"""All that has a schema."""
+
+
+def made() -> dict[Path, str]:
+    """Every file that is made, with its text."""
+    found = {SCHEMAS / f"{name}.json": schema_text(kind) for name, kind in KINDS.items()}
+    text = FORMAT.read_text("utf-8")
+    for name, kind in RESULTS.items():
+        block = f"<!-- fields of {name}: made by `make formats` -->\n\n{tables(kind)}\n<!-- end of {name} -->"
+        pattern = re.compile(rf"<!-- fields of {name}:.*?<!-- end of {name} -->", re.DOTALL)
+        if not pattern.search(text):
+            raise SystemExit(f"{FORMAT} has no place for the fields of {name}")
+        text = pattern.sub(lambda _, block=block: block, text)
+    return found | {FORMAT: text}
+
+
+def differing() -> list[Path]:
+    """Files that are not what the classes give; also schemas of no class."""
+    wrong = [path for path, text in made().items() if not path.is_file() or path.read_text("utf-8") != text]
+    return wrong + [path for path in SCHEMAS.glob("*.json") if path.stem not in KINDS]
+
+
+def main() -> int:
+    if "--check" in sys.argv:
+        return 1 if differing() else 0
+    SCHEMAS.mkdir(exist_ok=True)
+    for path, text in made().items():
+        path.write_text(text, "utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
