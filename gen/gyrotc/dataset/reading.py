@@ -16,6 +16,7 @@ from .parquetfile import ParquetFile
 from .problems import Problems
 from .records import Applied, EarthRate, Floats, Rows
 from .schema import Columns
+from .shared import Fingerprints, fingerprints_of
 from .source import Source
 from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, faults, rate_faults
@@ -34,6 +35,7 @@ class Recording:
         layout: Its columns.
         units: Conversions to gyrotc's units, by column.
         evidence: What its units can be judged by.
+        fingerprints: What its rows can be known again by.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -43,6 +45,7 @@ class Recording:
     layout: Layout
     units: dict[str, Conversion]
     evidence: Evidence
+    fingerprints: Fingerprints
     time_s: Floats
     n_rows: int
     row_period_s: float
@@ -127,7 +130,7 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+        time, evidence, fingerprints = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
@@ -138,7 +141,7 @@ def open_recording(
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, conversions, evidence, time, len(time), period)
+    return Recording(file, layout, conversions, evidence, fingerprints, time, len(time), period)
 
 
 def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
@@ -165,8 +168,8 @@ def _checked(
     units: Mapping[str, Conversion],
     pulse_weight_arcsec: float | None,
     problems: Problems,
-) -> tuple[Floats, Evidence]:
-    """Reads all columns and checks them; the times, and what the units can be judged by."""
+) -> tuple[Floats, Evidence, Fingerprints]:
+    """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
     values = file.read(file.names)
     lines = None
     if values is None:
@@ -188,10 +191,10 @@ def _checked(
         problems.add(_problem(file, fault, place, units.get(fault.column)))
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
-    rates = list(layout.axes.values()) or [layout.value]
+    rates = [values[name] for name in layout.axes.values() or [layout.value]]
     evidence = Evidence(len(rates))
-    evidence.add(time, values[layout.temperature], [values[name] for name in rates])
-    return time, evidence
+    evidence.add(time, values[layout.temperature], rates)
+    return time, evidence, fingerprints_of(time, values[layout.temperature], rates)
 
 
 def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:

@@ -25,6 +25,7 @@ from .findings import (
     outlier_findings,
     temperature_findings,
 )
+from .recorded import shared_rows_findings
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
 
@@ -174,6 +175,8 @@ def _doubts(dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | No
     for finding in (*counter_findings(facts), *outlier_findings(facts), *contradiction_findings(facts)):
         where = _where(finding["evidence"]["file"], finding["evidence"]["from_s"])
         yield Doubt(finding["id"], where, finding["text"])
+    for finding in shared_rows_findings(dataset):
+        yield Doubt(finding["id"], finding["evidence"]["file"], finding["text"])
     for f in facts:
         yield from _doubts_of_temperature(f)
         yield from _doubts_of_rate(f)
