@@ -84,7 +84,7 @@ class Reader:
         columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
         if columns is None:
             columns, _, _ = self.file.scan()
-        columns = _converted(columns, self.units)
+        columns = known_rows(_converted(columns, self.units), layout, self.channels)
         time, rate = columns[layout.time], columns[value]
         if layout.pulses:
             rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
@@ -96,6 +96,18 @@ class Reader:
             rate = rate + self.applied.correction_dph(rows, self.row_period_s)
             rows = Rows(time, rows.temperature_c, rate, channels)
         return rows
+
+
+def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[str]) -> dict[str, Floats]:
+    """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
+
+    A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
+    """
+    known = np.ones(len(columns[layout.time]), dtype=bool)
+    for name in (layout.temperature, *channels):
+        if np.isnan(np.sum(columns[name])):
+            known &= ~np.isnan(columns[name])
+    return columns if known.all() else {name: values[known] for name, values in columns.items()}
 
 
 def _converted(columns: dict[str, Floats], units: Mapping[str, Conversion]) -> dict[str, Floats]:
@@ -176,9 +188,10 @@ def _checked(
         values, lines, unread = file.scan()
         for fault in unread:
             problems.add(_problem(file, fault, fault.row))
-        keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
-        values = {name: column[keep] for name, column in values.items()}
-        lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
+        if unread:
+            keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
+            values = {name: column[keep] for name, column in values.items()}
+            lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
     values = _converted(values, units)
     time = values[layout.time]
     found = list(faults(values, layout))
@@ -191,6 +204,13 @@ def _checked(
         problems.add(_problem(file, fault, place, units.get(fault.column)))
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
+    rows = len(time)
+    values = known_rows(values, layout, layout.channels)
+    time = values[layout.time]
+    measured = min(np.count_nonzero(~np.isnan(values[n])) for n in layout.axes.values() or [layout.value])
+    if measured < MIN_ROWS <= rows:
+        found = f"{measured} rows with a temperature and a rate, the others have NaN"
+        problems.add(InputError(file.name, found, f"at least {MIN_ROWS}"))
     rates = [values[name] for name in layout.axes.values() or [layout.value]]
     evidence = Evidence(len(rates))
     evidence.add(time, values[layout.temperature], rates)

@@ -113,6 +113,7 @@ def evaluate(
     if result["exam"] is None and training:
         result["left_out"] = training.get("left_out")
     result["generalises"] = training.get("generalises") if training else None
+    result["rows_left_out"] = (training or {}).get("outliers", {}).get("rows")
     result["findings"] = findings_of(dataset, [p.facts for p in parts], model, result, training)
     return result
 

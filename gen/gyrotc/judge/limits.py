@@ -26,6 +26,7 @@ Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
+    "shared_rows",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
 
@@ -68,6 +69,7 @@ class AtMost(_Part):
     table_bytes: Amount = None
     rom_bytes: Amount = None
     ram_bytes: Amount = None
+    rows_left_out: Amount = None  # rows of training that were spikes or bursts
 
 
 class AtLeast(_Part):
@@ -192,6 +194,7 @@ def _measured(
         "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
         "error_bound_dph": verification["error_bound_dph"] if verification else None,
         **{name: evaluation["model"][name] for name in ("centers", "table_bytes", "rom_bytes", "ram_bytes")},
+        "rows_left_out": evaluation.get("rows_left_out"),
         "improvement": judged.get("improvement"),
         "covered": cells.count("1") / len(cells) if cells else None,
     }
