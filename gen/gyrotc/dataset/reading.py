@@ -84,10 +84,12 @@ class Reader:
         columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
         if columns is None:
             columns, _, _ = self.file.scan()
-        columns = known_rows(_converted(columns, self.units), layout, self.channels)
-        time, rate = columns[layout.time], columns[value]
+        columns = _converted(columns, self.units)
         if layout.pulses:
-            rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
+            weight = self.pulse_weight_arcsec or 1.0
+            columns |= {value: rate_of_pulses(columns[layout.time], columns[value], weight)}
+        columns = known_rows(columns, layout, self.channels)
+        time, rate = columns[layout.time], columns[value]
         if self.earth is not None:
             rate = rate - self.earth.rate_dph
         channels = {name: columns[name] for name in self.channels}
@@ -209,8 +211,8 @@ def _checked(
     time = values[layout.time]
     measured = min(np.count_nonzero(~np.isnan(values[n])) for n in layout.axes.values() or [layout.value])
     if measured < MIN_ROWS <= rows:
-        found = f"{measured} rows with a temperature and a rate, the others have NaN"
-        problems.add(InputError(file.name, found, f"at least {MIN_ROWS}"))
+        some = f"{measured} rows with a temperature and a rate, the others have NaN"
+        problems.add(InputError(file.name, some, f"at least {MIN_ROWS}"))
     rates = [values[name] for name in layout.axes.values() or [layout.value]]
     evidence = Evidence(len(rates))
     evidence.add(time, values[layout.temperature], rates)

@@ -9,7 +9,7 @@ row can do to a mean is bounded: Hampel's rejection, see Rousseeuw and Croux, J.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -22,6 +22,7 @@ __all__ = ["departing", "departing_rows"]
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+T = TypeVar("T", bound=np.generic)
 
 _SIGMAS = 7.0
 _MAD_TO_SIGMA = 1.4826
@@ -56,7 +57,7 @@ def departing(rate: Floats, rows_per_block: int) -> Mask:
     limit = _SIGMAS * _scale(rate, rest, n) + _spread(slack, n, len(rate))
     wild = rest > limit
     if not wild.any():
-        return wild
+        return np.asarray(wild)
     alone = _beyond_neighbours(rate) > limit
     if n < _FEW:
         return np.asarray(wild & alone)
@@ -82,7 +83,7 @@ def _largest_around(values: Floats) -> Floats:
     return np.asarray(windows.max(axis=1))
 
 
-def _spread(of_blocks: NDArray[np.generic], n: int, rows: int) -> NDArray[np.generic]:
+def _spread(of_blocks: NDArray[T], n: int, rows: int) -> NDArray[T]:
     """A value for each block as one for each row; rows behind the last whole block have its value."""
     each = np.repeat(of_blocks, n)
     return np.concatenate([each, np.repeat(of_blocks[-1:], rows - len(each))]) if rows > len(each) else each
