@@ -27,7 +27,7 @@ from .findings import (
     outlier_findings,
     temperature_findings,
 )
-from .recorded import shared_rows_findings
+from .recorded import copied_channel_findings, shared_rows_findings, sign_findings
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
 
@@ -145,23 +145,26 @@ def check(
         if dataset is not None:
             serial = dataset.serial
             looked = [_look(run) for run in dataset.runs]
-            of_axis = [f for f, _ in looked]
-            offered = dict(text for _, text in looked if text)
-            for doubt in _with_exclusions(_doubts(dataset, of_axis, envelope), offered):
+            of_axis = [f for f, _, _ in looked]
+            offered = dict(text for _, text, _ in looked if text)
+            copied = [doubt for _, _, doubts_of_run in looked for doubt in doubts_of_run]
+            for doubt in (*_with_exclusions(_doubts(dataset, of_axis, envelope), offered), *copied):
                 doubts.setdefault(doubt, []).append(one)
             facts += [(one, f) for f in of_axis]
     named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in doubts.items())
     return CheckResult(serial, axis, tuple(problems.values()), tuple(named), tuple(facts))
 
 
-def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None]:
-    """Facts of a run; where, and with which lines, its spikes and bursts can be left out for good."""
+def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None, list[Doubt]]:
+    """Facts of a run; where, and with which lines, its spikes can be left out for good; channels that are copies."""
     rows = run.rows()
     f = facts_of(run, rows)
+    where = _where(f.file, f.from_s)
+    copied = [Doubt(c["id"], where, c["text"]) for c in copied_channel_findings(run, rows)]
     wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
     stretches = stretches_left_out(run, rows.time_s[wild])
     if not stretches:
-        return f, None
+        return f, None, copied
     shown = ", ".join(
         f'{{from_s = {s["from_s"]!r}, to_s = {s["to_s"]!r}, reason = "outlier"}}' for s in stretches[:_LINES]
     )
@@ -170,7 +173,7 @@ def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None]:
         f"{len(wild)} rows in {len(stretches)} stretches are spikes or bursts and do not reach the fit; to leave them "
         f"out of every figure: exclude = [{shown}]{more}"
     )
-    return f, (_where(f.file, f.from_s), text)
+    return f, (where, text), copied
 
 
 def _with_exclusions(doubts: Iterator[Doubt], offered: dict[str, str]) -> Iterator[Doubt]:
@@ -210,7 +213,7 @@ def _doubts(dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | No
     for finding in (*counter_findings(facts), *outlier_findings(facts), *contradiction_findings(facts)):
         where = _where(finding["evidence"]["file"], finding["evidence"]["from_s"])
         yield Doubt(finding["id"], where, finding["text"])
-    for finding in shared_rows_findings(dataset):
+    for finding in (*shared_rows_findings(dataset), *sign_findings(facts)):
         yield Doubt(finding["id"], finding["evidence"]["file"], finding["text"])
     for f in facts:
         yield from _doubts_of_temperature(f)
