@@ -41,3 +41,20 @@ def test_a_channel_that_is_a_copy_is_told(tmp_path: Path) -> None:
     told = [d.text for d in check(tmp_path / "R").doubts if d.id == "channel_copy"]
     assert len(told) == 1
     assert told[0].startswith("channel case_temperature_c of a.csv is a copy of the temperature, row by row")
+
+
+def test_a_stuck_thermometer_is_told_and_the_line_mends_it(tmp_path: Path) -> None:
+    table = run(1)
+    table["temperature_c"][200:280] = table["temperature_c"][200]
+    write_csv(tmp_path / "R" / "a.csv", table)
+    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "stuck_temperature"]
+    assert "from 2000 to 2790 s (80 rows)" in doubt.text
+    assert 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "thermometer stuck"}]' in doubt.text
+
+
+@pytest.mark.parametrize("step", [0.25, 1.0])
+def test_a_coarse_thermometer_that_holds_is_not_stuck(step: float, tmp_path: Path) -> None:
+    table = run(1)
+    held = np.where(np.arange(600) < 300, table["temperature_c"], table["temperature_c"][300])
+    write_csv(tmp_path / "R" / "a.csv", table | {"temperature_c": np.round(held / step) * step})
+    assert "stuck_temperature" not in {d.id for d in check(tmp_path / "R").doubts}

@@ -27,7 +27,7 @@ from .findings import (
     outlier_findings,
     temperature_findings,
 )
-from .recorded import copied_channel_findings, shared_rows_findings, sign_findings
+from .recorded import copied_channel_findings, shared_rows_findings, sign_findings, stuck_temperature_findings
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
 
@@ -156,11 +156,12 @@ def check(
 
 
 def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None, list[Doubt]]:
-    """Facts of a run; where, and with which lines, its spikes can be left out for good; channels that are copies."""
+    """Facts of a run; where, and with which lines, its spikes can be left out; doubts of its columns."""
     rows = run.rows()
     f = facts_of(run, rows)
     where = _where(f.file, f.from_s)
-    copied = [Doubt(c["id"], where, c["text"]) for c in copied_channel_findings(run, rows)]
+    seen = (*copied_channel_findings(run, rows), *stuck_temperature_findings(run, rows))
+    copied = [Doubt(c["id"], where, c["text"]) for c in seen]
     wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
     stretches = stretches_left_out(run, rows.time_s[wild])
     if not stretches:

@@ -13,7 +13,13 @@ import numpy as np
 
 from ..dataset import Dataset, Rows, Run, RunFacts, SharedRows
 
-__all__ = ["copied_channel_findings", "exclude_line", "shared_rows_findings", "sign_findings"]
+__all__ = [
+    "copied_channel_findings",
+    "exclude_line",
+    "shared_rows_findings",
+    "sign_findings",
+    "stuck_temperature_findings",
+]
 
 Finding = dict[str, Any]
 
@@ -21,6 +27,10 @@ _LEAST_RUNS = 3  # of two runs nobody knows which one is reversed
 _PLACE_C = 1.0
 _LEAST_PLACES = 8
 _ALIKE = 0.9  # correlation of a run's mean curve over temperature with that of the others
+_STUCK_S, _STUCK_ROWS = (
+    60.0,
+    60,
+)  # where half of the rows differ from the one before, 60 alike come once in 2^60
 _FEWEST_VALUES = 10  # a channel of fewer values says nothing
 
 
@@ -103,3 +113,28 @@ def copied_channel_findings(run: Run, rows: Rows) -> Iterator[Finding]:
                     ),
                     "evidence": {"file": run.file, "from_s": run.from_s, "column": name, "copy_of": other},
                 }
+
+
+def stuck_temperature_findings(run: Run, rows: Rows) -> Iterator[Finding]:
+    """The longest stretch of one identical temperature, where most other rows differ from the one before."""
+    inside = run.in_span(rows.time_s)
+    temperature, time = rows.temperature_c[inside], rows.time_s[inside]
+    starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
+    length = np.diff(np.r_[starts, len(temperature)])
+    k = int(np.argmax(length))
+    others = len(temperature) - int(length[k])
+    if length[k] * run.row_period_s <= _STUCK_S or length[k] < _STUCK_ROWS or len(starts) - 1 <= 0.5 * others:
+        return
+    if others < _STUCK_ROWS:
+        return
+    first, last = float(time[starts[k]]), float(time[starts[k] + length[k] - 1])
+    line = exclude_line(first, last + run.row_period_s, "thermometer stuck")
+    yield {
+        "id": "stuck_temperature",
+        "text": (
+            f"the temperature stays at {temperature[starts[k]]:.6g} C from {first:.10g} to {last:.10g} s "
+            f"({length[k]} rows), where it otherwise changes from row to row: the thermometer was stuck. Look at its "
+            f"wiring; to leave the stretch out: {line}"
+        ),
+        "evidence": {"file": run.file, "from_s": run.from_s, "span_s": [first, last], "rows": int(length[k])},
+    }
