@@ -168,7 +168,7 @@ REFUSED: dict[str, Refused] = {
         ("a.csv, line 2, column note", "'ok' (and 119 more lines)", "a number"),
     ),
     "text cell": Refused(line(7, "50.0,20.1,abc"), ("a.csv, line 7, column rate_dph", "'abc'", "number")),
-    "NaN cell": Refused(line(7, "50.0,nan,20.0"), ("a.csv, line 7, column temperature_c", "'nan'")),
+    "NaN time": Refused(line(7, "nan,20.1,20.0"), ("a.csv, line 7, column time_s", "nan", "finite")),
     "infinite cell": Refused(line(7, "50.0,20.1,-inf"), ("a.csv, line 7, column rate_dph", "inf", "finite")),
     "overflowing cell": Refused(line(7, "50.0,20.1,1e400"), ("a.csv, line 7, column rate_dph", "finite")),
     "empty cell": Refused(line(7, "50.0,,20.0"), ("a.csv, line 7, column temperature_c", "an empty cell")),
@@ -241,13 +241,13 @@ REFUSED: dict[str, Refused] = {
     "text in Parquet": Refused(
         parquet(lambda: pa.table(columns() | {"note": ["ok"] * ROWS})), ("a.parquet, column note", "string")
     ),
-    "NaN in Parquet": Refused(
-        parquet(lambda: pa.table(columns() | {"rate_dph": _with_nan(columns()["rate_dph"], 60, np.nan)})),
-        ("a.parquet, row 61, column rate_dph", "nan", "finite"),
+    "NaN time in Parquet": Refused(
+        parquet(lambda: pa.table(columns() | {"time_s": _with_nan(columns()["time_s"], 60, np.nan)})),
+        ("a.parquet, row 61, column time_s", "nan", "finite"),
     ),
-    "missing value in Parquet": Refused(
-        parquet(lambda: pa.table(columns() | {"rate_dph": pa.array([None, *columns()["rate_dph"][1:]])})),
-        ("a.parquet, row 1, column rate_dph", "finite"),
+    "nothing but NaN": Refused(
+        parquet(lambda: pa.table(columns() | {"rate_dph": np.full(ROWS, np.nan)})),
+        ("a.parquet", "0 rows with a temperature and a rate", "at least 10"),
     ),
     # dataset.toml
     "broken TOML": Refused(

@@ -216,3 +216,23 @@ def test_on_dask(tmp_path: Path) -> None:
             load_manifest(tmp_path / "d"), tmp_path / "out", scheduler=cluster.scheduler_address
         )
     assert [entry["status"] for entry in entries] == ["done"] * 3
+
+
+def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:
+    """Before: such a fleet passed without a word."""
+    for k in (1, 2):
+        gyro(tmp_path / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    shutil.copytree(tmp_path / "data" / "RLG-1", tmp_path / "data" / "RLG-3")
+    described_as = (tmp_path / "data" / "RLG-3" / "dataset.toml").read_text().replace("RLG-1", "RLG-3")
+    (tmp_path / "data" / "RLG-3" / "dataset.toml").write_text(described_as)
+    done = gyrotc("fleet", tmp_path / "data", "--out", tmp_path / "out")
+    assert done.returncode == 0
+    assert (
+        "copy of another: RLG-1 (serial RLG-1) has about 100% of its rows in common with RLG-3" in done.stdout
+    )
+    summary = json.loads((tmp_path / "out" / "fleet.json").read_text())
+    assert [(c["name"], c["other"]) for c in summary["copies"]] == [("RLG-1", "RLG-3")]
+    found = {e["name"]: "copy_of_other" in e["findings"] for e in summary["serials"]}
+    assert found == {"RLG-1": True, "RLG-2": False, "RLG-3": True}
+    assert summary["serials"][2]["copy_of"] == ["RLG-1"]
+    assert "Gyros with rows of another serial" in (tmp_path / "out" / "fleet.html").read_text()

@@ -45,6 +45,11 @@ def fleet(
             f"stands apart: {outlier['name']}: {outlier['figure']} {outlier['value']:.4g}, median of the fleet "
             f"{outlier['median']:.4g} ({outlier['sigmas']:.1f} robust standard deviations)"
         )
+    for copy in summary["copies"]:
+        tell(
+            f"copy of another: {copy['name']} (serial {copy['serial']}) has about {copy['share']:.0%} of its rows in "
+            f"common with {copy['other']} (serial {copy['other_serial']}): one gyro under two serials"
+        )
     tell(f"{summary['done']} of {summary['units']} done, {summary['failed']} failed: {out / 'fleet.html'}")
     if summary["failed"]:
         raise CheckFailed(f"{summary['failed']} of {summary['units']} gyros failed")

@@ -7,7 +7,7 @@ after a problem and tells all of them. What a folder may hold is written in docs
 from .earth import earth_rate_warning
 from .facts import Jump, Outlier, RunFacts, facts_of
 from .load import axes_of, load, survey
-from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run
+from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run, SharedRows
 
 __all__ = [
     "Applied",
@@ -20,6 +20,7 @@ __all__ = [
     "Rows",
     "Run",
     "RunFacts",
+    "SharedRows",
     "axes_of",
     "earth_rate_warning",
     "facts_of",

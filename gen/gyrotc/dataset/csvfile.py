@@ -31,6 +31,7 @@ _LONGEST_LINE = 2**20
 _LF, _CR = 10, 13
 _COPIES = 2.0  # of the columns while they are checked
 _IMPORT = "`gyrotc import` reads other forms"
+_NAN = ("nan", "+nan", "-nan")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
 
@@ -73,6 +74,7 @@ class CsvFile(Source):
         options = pacsv.ConvertOptions(
             column_types=dict.fromkeys(unique, pa.float64()),
             include_columns=[unique[self.names.index(name)] for name in columns],
+            null_values=[""],  # NaN is a number that is missing, read as such
         )
         at_once = pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=unique)
         most = self._most_rows()
@@ -178,6 +180,8 @@ class _Faults:
         """The number in a cell; NaN and a fault if there is none."""
         if _NUMBER.fullmatch(cell):
             return float(cell)
+        if cell.lower() in _NAN:
+            return float("nan")
         if not cell:
             self.add(line, column, "empty", "an empty cell", "a number")
         else:

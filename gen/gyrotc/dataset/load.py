@@ -15,10 +15,12 @@ from ..inputs import refuse_above
 from .columns import arrange
 from .consistency import check_description, check_spans, common_channels, in_entry, of_axis, place_of
 from .earth import earth_rate
+from .overlap import shared_rows
 from .problems import Problems
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run
 from .schema import FILE, Description, RunEntry, check_serial, parse_description
+from .shared import sketch
 from .trust import check_channel_units, judge, suspected, suspected_of_earth
 
 __all__ = ["axes_of", "load", "survey"]
@@ -120,7 +122,12 @@ def survey(  # long: a reader is told everything that it needs, by name
     trusted = judge(doubted, trust_units or description.trust_units, problems)
     warnings += [f"{name}: units are trusted: {text}" for name, text in trusted]
     trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
-    return _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings), trusted_texts)
+    dataset = _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings), trusted_texts)
+    return replace(
+        dataset,
+        shared=shared_rows(runs, recordings, problems),
+        sketch=sketch([r.fingerprints for r in recordings.values()]),
+    )
 
 
 def _description(folder: Path, problems: Problems) -> Description | None:

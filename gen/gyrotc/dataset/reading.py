@@ -16,6 +16,7 @@ from .parquetfile import ParquetFile
 from .problems import Problems
 from .records import Applied, EarthRate, Floats, Rows
 from .schema import Columns
+from .shared import Fingerprints, fingerprints_of
 from .source import Source
 from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, faults, rate_faults
@@ -34,6 +35,7 @@ class Recording:
         layout: Its columns.
         units: Conversions to gyrotc's units, by column.
         evidence: What its units can be judged by.
+        fingerprints: What its rows can be known again by.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -43,6 +45,7 @@ class Recording:
     layout: Layout
     units: dict[str, Conversion]
     evidence: Evidence
+    fingerprints: Fingerprints
     time_s: Floats
     n_rows: int
     row_period_s: float
@@ -82,9 +85,11 @@ class Reader:
         if columns is None:
             columns, _, _ = self.file.scan()
         columns = _converted(columns, self.units)
-        time, rate = columns[layout.time], columns[value]
         if layout.pulses:
-            rate = rate_of_pulses(time, rate, self.pulse_weight_arcsec or 1.0)
+            weight = self.pulse_weight_arcsec or 1.0
+            columns |= {value: rate_of_pulses(columns[layout.time], columns[value], weight)}
+        columns = known_rows(columns, layout, self.channels)
+        time, rate = columns[layout.time], columns[value]
         if self.earth is not None:
             rate = rate - self.earth.rate_dph
         channels = {name: columns[name] for name in self.channels}
@@ -93,6 +98,18 @@ class Reader:
             rate = rate + self.applied.correction_dph(rows, self.row_period_s)
             rows = Rows(time, rows.temperature_c, rate, channels)
         return rows
+
+
+def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[str]) -> dict[str, Floats]:
+    """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
+
+    A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
+    """
+    known = np.ones(len(columns[layout.time]), dtype=bool)
+    for name in (layout.temperature, *channels):
+        if np.isnan(np.sum(columns[name])):
+            known &= ~np.isnan(columns[name])
+    return columns if known.all() else {name: values[known] for name, values in columns.items()}
 
 
 def _converted(columns: dict[str, Floats], units: Mapping[str, Conversion]) -> dict[str, Floats]:
@@ -127,7 +144,7 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+        time, evidence, fingerprints = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
@@ -138,7 +155,7 @@ def open_recording(
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, conversions, evidence, time, len(time), period)
+    return Recording(file, layout, conversions, evidence, fingerprints, time, len(time), period)
 
 
 def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
@@ -165,17 +182,18 @@ def _checked(
     units: Mapping[str, Conversion],
     pulse_weight_arcsec: float | None,
     problems: Problems,
-) -> tuple[Floats, Evidence]:
-    """Reads all columns and checks them; the times, and what the units can be judged by."""
+) -> tuple[Floats, Evidence, Fingerprints]:
+    """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
     values = file.read(file.names)
     lines = None
     if values is None:
         values, lines, unread = file.scan()
         for fault in unread:
             problems.add(_problem(file, fault, fault.row))
-        keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
-        values = {name: column[keep] for name, column in values.items()}
-        lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
+        if unread:
+            keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
+            values = {name: column[keep] for name, column in values.items()}
+            lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
     values = _converted(values, units)
     time = values[layout.time]
     found = list(faults(values, layout))
@@ -188,10 +206,17 @@ def _checked(
         problems.add(_problem(file, fault, place, units.get(fault.column)))
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
-    rates = list(layout.axes.values()) or [layout.value]
+    rows = len(time)
+    values = known_rows(values, layout, layout.channels)
+    time = values[layout.time]
+    measured = min(np.count_nonzero(~np.isnan(values[n])) for n in layout.axes.values() or [layout.value])
+    if measured < MIN_ROWS <= rows:
+        some = f"{measured} rows with a temperature and a rate, the others have NaN"
+        problems.add(InputError(file.name, some, f"at least {MIN_ROWS}"))
+    rates = [values[name] for name in layout.axes.values() or [layout.value]]
     evidence = Evidence(len(rates))
-    evidence.add(time, values[layout.temperature], [values[name] for name in rates])
-    return time, evidence
+    evidence.add(time, values[layout.temperature], rates)
+    return time, evidence, fingerprints_of(time, values[layout.temperature], rates)
 
 
 def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:

@@ -21,6 +21,7 @@ __all__ = [
     "Role",
     "Rows",
     "Run",
+    "SharedRows",
     "inside",
 ]
 
@@ -155,6 +156,27 @@ def inside(
 
 
 @dataclass(frozen=True, slots=True)
+class SharedRows:
+    """Consecutive rows that two files hold, or one file twice.
+
+    Attributes:
+        file: The one file.
+        rows: First and last of its rows, counted from 1.
+        span_s: Their times on its clock, s: first row, row after the last.
+        other_file: The other file, or the same.
+        other_rows: As `rows`, in that.
+        other_span_s: As `span_s`.
+    """
+
+    file: str
+    rows: tuple[int, int]
+    span_s: tuple[float, float]
+    other_file: str
+    other_rows: tuple[int, int]
+    other_span_s: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Dataset:
     """A folder of recordings of one axis of one serial.
 
@@ -173,6 +195,8 @@ class Dataset:
         units: `[units]` as declared.
         trusted: What the values look like against their units, where the user's word was taken for them.
         sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
+        shared: Rows that runs of one role have in common, or that a run has twice.
+        sketch: Hashes of rows by which gyros of a fleet are compared (`shared.sketch`).
     """
 
     folder: Path
@@ -189,3 +213,5 @@ class Dataset:
     units: dict[str, str] = field(default_factory=dict)
     trusted: tuple[str, ...] = ()
     sources: tuple[dict[str, Any], ...] = ()
+    shared: tuple[SharedRows, ...] = ()
+    sketch: tuple[int, ...] = ()

@@ -36,9 +36,12 @@ def faults(columns: Mapping[str, Floats], layout: Layout) -> Iterator[Fault]:
     """Faults of the numbers of one file, at most one for each column and kind."""
     good_time = True
     for name, values in columns.items():
-        if not _lie_within(values, (-_LARGEST, _LARGEST)):
-            good_time = good_time and name != layout.time
-            yield _fault(name, ~np.isfinite(values), values, "a finite number")
+        if _lie_within(values, (-_LARGEST, _LARGEST)):
+            continue
+        good_time = good_time and name != layout.time
+        wrong = ~np.isfinite(values) if name == layout.time else np.isinf(values)
+        if wrong.any():
+            yield _fault(name, wrong, values, "a finite number")
     time = columns[layout.time]
     if good_time:
         yield from _order(layout.time, time)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from .believe import BELIEVED, HELD, RESTART, believe
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow, positions, with_missing
 from .numbers import F32, Q31, Arithmetic
+from .screen import departing_rows
 from .stream import Stream
 from .training import Blocks, blocks_since_power_on, missed_before, run_blocks, samples_per_block
 
@@ -31,6 +32,7 @@ __all__ = [
     "Stream",
     "believe",
     "blocks_since_power_on",
+    "departing_rows",
     "expand_missed",
     "follow",
     "missed_before",

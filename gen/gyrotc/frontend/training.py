@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .. import status as status_bits
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
 from .numbers import F32
+from .screen import departing_rows
 from .stream import Stream
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class Blocks:
     status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
     rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
     rows: NDArray[np.int64]  # number of these rows
+    left_out_s: NDArray[np.float64]  # times of rows that were left out of these means as spikes or bursts
     steps: Steps  # every correction of the run
     in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
     stream: Stream  # its samples
@@ -110,7 +112,7 @@ def run_blocks(  # long: one line for each field of the result
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)
     temperature, slope, status = _in_force(steps, k)
-    rate, count = _mean_rate(rows, run, stream.position // n, n_blocks)
+    rate, count, left_out = _mean_rate(rows, run, stream.position // n, n_blocks, n)
     return Blocks(
         start_s=np.interp(np.arange(n_blocks) * n, stream.position, rows.time_s) if n_blocks else np.empty(0),
         valid=steps.valid,
@@ -120,6 +122,7 @@ def run_blocks(  # long: one line for each field of the result
         status=status,
         rate_dph=rate,
         rows=count,
+        left_out_s=rows.time_s[left_out],
         steps=steps,
         in_force=_last_map(steps, k),
         stream=stream,
@@ -153,10 +156,12 @@ def _in_force(
 
 
 def _mean_rate(
-    rows: Rows, run: Run, block: NDArray[np.int64], n_blocks: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Mean measured rate and number of rows in the span, for each block."""
+    rows: Rows, run: Run, block: NDArray[np.int64], n_blocks: int, rows_per_block: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Mean measured rate and number of rows in the span, for each block, and the rows that were left out."""
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
+    left_out = departing_rows(rows, run, rows_per_block)
+    counted[left_out] = False
     rate = rows.rate_dph
     if not counted.all():
         block, rate = block[counted], rate[counted]
@@ -164,4 +169,4 @@ def _mean_rate(
     total = np.bincount(block, weights=rate, minlength=n_blocks)
     with np.errstate(invalid="ignore"):
         mean = total / count
-    return mean, count.astype(np.int64)
+    return mean, count.astype(np.int64), left_out

@@ -66,6 +66,19 @@ class _Rung(_Stored):
     refused: str | None = None
 
 
+class _LeftOut(_Stored):
+    file: str
+    from_s: float
+    to_s: float
+    rows: Annotated[int, Field(ge=1)]
+
+
+class _Outliers(_Stored):
+    rows: Annotated[int, Field(ge=0)] = 0
+    share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    stretches: list[_LeftOut] = []
+
+
 class _Training(_Stored):
     ladder: list[_Rung] = []
     reason: str = ""
@@ -76,6 +89,7 @@ class _Training(_Stored):
     noise_floor_dph: Figure
     left_out: _Pooled | None = None
     left_out_spans: list[_Pooled | None] = []
+    outliers: _Outliers = _Outliers()
     noise: _Noise
     sensitivity: dict[str, Figure]
     curves: dict[str, Any]

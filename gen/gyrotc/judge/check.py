@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..dataset import Applied, Dataset, RunFacts, axes_of, facts_of, survey
+from ..dataset import Applied, Dataset, Run, RunFacts, axes_of, facts_of, survey
 from ..dataset.problems import Problems
 from ..errors import InputError
+from ..frontend import departing_rows, samples_per_block
 from ..results.check import Checked, CheckedRun, Doubted, Problem
+from ..train.outliers import stretches_left_out
 from .findings import (
     contradiction_findings,
     counter_findings,
@@ -25,6 +27,7 @@ from .findings import (
     outlier_findings,
     temperature_findings,
 )
+from .recorded import copied_channel_findings, shared_rows_findings, sign_findings, stuck_temperature_findings
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
 
@@ -40,6 +43,8 @@ _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
 _PERIODS = 0.01
 _ENVELOPE_CELLS = (20, 8)
 _ENVELOPE_MARGIN = 0.05
+_BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
+_LINES = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,12 +143,47 @@ def check(
         problems |= {str(problem): problem for problem in told.found}
         if dataset is not None:
             serial = dataset.serial
-            of_axis = [facts_of(run, run.rows()) for run in dataset.runs]
-            for doubt in _doubts(dataset, of_axis, envelope):
+            looked = [_look(run) for run in dataset.runs]
+            of_axis = [f for f, _, _ in looked]
+            offered = dict(text for _, text, _ in looked if text)
+            copied = [doubt for _, _, doubts_of_run in looked for doubt in doubts_of_run]
+            for doubt in (*_with_exclusions(_doubts(dataset, of_axis, envelope), offered), *copied):
                 doubts.setdefault(doubt, []).append(one)
             facts += [(one, f) for f in of_axis]
     named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in doubts.items())
     return CheckResult(serial, axis, tuple(problems.values()), tuple(named), tuple(facts))
+
+
+def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None, list[Doubt]]:
+    """Facts of a run; where, and with which lines, its spikes can be left out; doubts of its columns."""
+    rows = run.rows()
+    f = facts_of(run, rows)
+    where = _where(f.file, f.from_s)
+    seen = (*copied_channel_findings(run, rows), *stuck_temperature_findings(run, rows))
+    copied = [Doubt(c["id"], where, c["text"]) for c in seen]
+    wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
+    stretches = stretches_left_out(run, rows.time_s[wild])
+    if not stretches:
+        return f, None, copied
+    shown = ", ".join(
+        f'{{from_s = {s["from_s"]!r}, to_s = {s["to_s"]!r}, reason = "outlier"}}' for s in stretches[:_LINES]
+    )
+    more = f" ({len(stretches) - _LINES} more stretches)" if len(stretches) > _LINES else ""
+    text = (
+        f"{len(wild)} rows in {len(stretches)} stretches are spikes or bursts and do not reach the fit; to leave them "
+        f"out of every figure: exclude = [{shown}]{more}"
+    )
+    return f, (where, text), copied
+
+
+def _with_exclusions(doubts: Iterator[Doubt], offered: dict[str, str]) -> Iterator[Doubt]:
+    """Doubts about outliers with the lines that leave them out, which `offered` has by place."""
+    left = dict(offered)
+    for doubt in doubts:
+        text = left.pop(doubt.where, None) if doubt.id == "rate_outliers" else None
+        yield Doubt(doubt.id, doubt.where, f"{doubt.text}; {text}") if text else doubt
+    for where, text in left.items():
+        yield Doubt("rate_outliers", where, text)
 
 
 def _of_axes(doubt: Doubt, seen: Sequence[str | None], axes: int) -> Doubt:
@@ -173,6 +213,8 @@ def _doubts(dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | No
     for finding in (*counter_findings(facts), *outlier_findings(facts), *contradiction_findings(facts)):
         where = _where(finding["evidence"]["file"], finding["evidence"]["from_s"])
         yield Doubt(finding["id"], where, finding["text"])
+    for finding in (*shared_rows_findings(dataset), *sign_findings(facts)):
+        yield Doubt(finding["id"], finding["evidence"]["file"], finding["text"])
     for f in facts:
         yield from _doubts_of_temperature(f)
         yield from _doubts_of_rate(f)

@@ -123,7 +123,8 @@ def evaluate(
         left_out = training.get("left_out")
         result = result.model_copy(update={"left_out": Pooled.model_validate(left_out) if left_out else None})
     generalises = training.get("generalises") if training else None
-    result = result.model_copy(update={"generalises": generalises})
+    rows_left_out = (training or {}).get("outliers", {}).get("rows")
+    result = result.model_copy(update={"generalises": generalises, "rows_left_out": rows_left_out})
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 

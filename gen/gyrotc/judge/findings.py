@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..dataset import Dataset, RunFacts, earth_rate_warning
 from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA
 from ..model import Model
+from .recorded import shared_rows_findings, sign_findings
 
 __all__ = [
     "contradiction_findings",
@@ -68,6 +69,8 @@ def findings_of(
     found += counter_findings(facts)
     found += outlier_findings(facts)
     found += contradiction_findings(facts)
+    found += shared_rows_findings(dataset)
+    found += sign_findings(facts)
     found += earth_rate_findings(dataset, facts)
     found += _weights(model)
     found += _outliers(result)

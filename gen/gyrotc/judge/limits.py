@@ -27,6 +27,7 @@ Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
+    "shared_rows", "sign_reversed",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
 
@@ -69,6 +70,7 @@ class AtMost(_Part):
     table_bytes: Amount = None
     rom_bytes: Amount = None
     ram_bytes: Amount = None
+    rows_left_out: Amount = None  # rows of training that were spikes or bursts
 
 
 class AtLeast(_Part):
@@ -185,6 +187,7 @@ def _measured(model: Model, evaluation: Evaluation, verification: dict[str, Any]
         "table_bytes": evaluation.model.table_bytes,
         "rom_bytes": evaluation.model.rom_bytes,
         "ram_bytes": evaluation.model.ram_bytes,
+        "rows_left_out": evaluation.rows_left_out,
         "improvement": judged.improvement if judged else None,
         "covered": cells.count("1") / len(cells) if cells else None,
     }

@@ -68,8 +68,14 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def bias_over_time(runs: Sequence[tuple[str, str, Averages]]) -> str:
-    """Measured and compensated bias of every run (label, role, averages), one panel a run, common scales."""
+def bias_over_time(
+    runs: Sequence[tuple[str, str, Averages]], left_out_s: Sequence[Sequence[float]] = ()
+) -> str:
+    """Measured and compensated bias of every run (label, role, averages), one panel a run, common scales.
+
+    Args:
+        left_out_s: Times of rows that were left out of training, for each run, s; drawn as marks above.
+    """
     with mpl.rc_context(STYLE):
         columns = min(3, len(runs))
         rows = -(-len(runs) // columns)
@@ -77,12 +83,17 @@ def bias_over_time(runs: Sequence[tuple[str, str, Averages]]) -> str:
         axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
         for ax in axes.flat[len(runs) :]:
             ax.set_visible(False)
-        for ax, (label, role, a) in zip(axes.flat, runs, strict=False):
+        marks = [*left_out_s, *[()] * (len(runs) - len(left_out_s))]
+        for ax, (label, role, a), times in zip(axes.flat, runs, marks, strict=False):
             hours = (a.time_s - (a.time_s[0] if a.time_s.size else 0.0)) / 3600.0
             ax.axhline(0.0, color=ACCENT, linewidth=0.6)
             ax.plot(hours, a.before_dph, color=BEFORE, linewidth=0.8, label="measured")
             ax.plot(hours, a.after_dph, color=AFTER, linewidth=0.8, label="compensated")
             ax.set_title(f"{picture_text(label)} ({role})", fontsize=8.5, loc="left")
+            if times and a.time_s.size:
+                at = (np.array(times) - a.time_s[0]) / 3600.0
+                top = ax.get_xaxis_transform()
+                ax.plot(at, np.full(len(at), 0.97), "v", color=ACCENT, markersize=4, transform=top)
         for ax in axes[-1]:
             ax.set_xlabel("time, h")
         for ax in axes[:, 0]:

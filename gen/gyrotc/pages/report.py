@@ -126,13 +126,17 @@ def _judged(evaluation: Evaluation) -> tuple[str, Pooled | None]:
 def _pictures(
     folder: Path, model: Model, evaluation: Evaluation, training: dict[str, Any]
 ) -> dict[str, str | None]:
-    runs = []
+    runs, left_out = [], []
+    stretches = ((training or {}).get("outliers") or {}).get("stretches", [])
     for run in evaluation.runs:
         averages = _trace(folder / "trace", run, evaluation.average_s)
         if averages is not None and averages.time_s.size:
             runs.append((run.environment or run.file, run.role, averages))
+            mine = [s["from_s"] for s in stretches if s["file"] == run.file and run.role == "train"]
+            first, last = averages.time_s[0], averages.time_s[-1]
+            left_out.append([t for t in mine if first <= t <= last])
     return {
-        "bias": bias_over_time(runs) if runs else None,
+        "bias": bias_over_time(runs, left_out) if runs else None,
         "map": map_with_centers(model),
         "curve": curve_by_size(training) if training else None,
         "allan": allan_deviation(training["noise"]) if training.get("noise") else None,

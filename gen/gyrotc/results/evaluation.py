@@ -95,6 +95,9 @@ class Evaluation(Result):
         default=None,
         description="whether the correction held on history that it had not seen; null: not known",
     )
+    rows_left_out: Count | None = Field(
+        default=None, description="rows of training runs that were outliers; null: not known"
+    )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:
         """What the model is judged by: exam runs, else spans left out, else the training runs themselves."""

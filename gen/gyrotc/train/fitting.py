@@ -33,6 +33,7 @@ from . import (
 )
 from .data import joined
 from .noisefloor import noise_terms, sensitivities, stretches
+from .outliers import outliers_of, stretches_left_out
 from .spans import Span, training_spans
 
 __all__ = [
@@ -149,10 +150,13 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     front = front_end(runs, options.block_s)
     stretches = _stretches(runs)
     parts = []
+    left_out_rows: list[dict[str, Any]] = []
     for k, stretch in enumerate(stretches):
         for run in stretch:
             say(f"reading {run.file}")
-            parts.append(samples_of(front.blocks(run), front.block_s, k))
+            blocks = front.blocks(run)
+            parts.append(samples_of(blocks, front.block_s, k))
+            left_out_rows += stretches_left_out(run, blocks.left_out_s)
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -166,7 +170,8 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     spans = training_spans(firsts, data)
     left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
     model = model_of(dataset, runs, data, fitted, front, options)
-    return Fitted(model, training_of(dataset, data, fitted, front, options, spans, left_out))
+    training = training_of(dataset, data, fitted, front, options, spans, left_out)
+    return Fitted(model, training | {"outliers": outliers_of(left_out_rows, data)})
 
 
 def map_method(method: str) -> str:

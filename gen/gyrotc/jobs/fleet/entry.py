@@ -14,9 +14,10 @@ from ...outputs import faults, json_text, write_atomically
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
 ENTRY = "entry.json"
-INTERNAL = ("key", "kept")  # of no use in a summary
+INTERNAL = ("key", "kept", "sketch")  # of no use in a summary
 Entry = dict[str, Any]
 _Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+_Sketch = Annotated[str, Field(pattern="^([0-9a-f]{16})*$")]  # hashes of rows (`dataset.shared`)
 _Count = Annotated[int, Field(ge=0)]
 
 
@@ -44,6 +45,7 @@ class _Stored(BaseModel):
     error_bound_dph: float | None
     findings: list[str]
     model_hash: str
+    sketch: _Sketch
     key: _Hash
 
 

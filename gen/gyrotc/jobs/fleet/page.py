@@ -19,6 +19,7 @@ from ...outputs import json_text, result_folder, write_atomically
 from ...pages.plots import ACCENT, AFTER, BEFORE, STYLE, svg
 from ...pages.report import page_environment
 from ...texts import csv_cell
+from .copies import copies, with_copies
 from .entry import INTERNAL
 from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
@@ -34,6 +35,8 @@ _COLUMNS = (
 def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The JSON object of `fleet.json`."""
     counts = Counter(entry["status"] for entry in entries)
+    copied = copies(entries)
+    entries = with_copies(entries, copied)
     figured = [entry for entry in entries if "model_hash" in entry]
     return {
         "schema": "gyrotc.fleet/1",
@@ -46,6 +49,7 @@ def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "unfinished": counts["unfinished"],
         "figures": {f: spread(figured, f) for f in (*FIGURES, "centers", "table_bytes")},
         "outliers": [asdict(outlier) for outlier in outliers(figured)],
+        "copies": [asdict(copy) for copy in copied],
         "serials": [{k: v for k, v in entry.items() if k not in INTERNAL} for entry in entries],
     }
 
@@ -61,7 +65,7 @@ def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any
     picture = _picture([e for e in entries if e.get("after_rms_dph")], names)
     template = page_environment().get_template("fleet.html.j2")
     page = template.render(summary=summary, apart=names, picture=picture)
-    texts = (json_text(summary), _table(entries), page)
+    texts = (json_text(summary), _table(summary["serials"]), page)
     with result_folder(out, "fleet", entries=SUMMARY) as stage:
         for name, text in zip(SUMMARY, texts, strict=True):
             write_atomically(stage.folder / name, text)

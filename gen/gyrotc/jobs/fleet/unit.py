@@ -102,6 +102,7 @@ def _built(task: Task) -> Entry:
         failed_checks = "; ".join(built.failures)
         status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
         figures = {"serial": dataset.serial} | _figures(built.model, built.evaluation, built.verification)
+        figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
         entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
     return entry | {"aside": aside} if aside else entry
 

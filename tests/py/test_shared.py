@@ -1,0 +1,115 @@
+"""Rows that two recordings share are found by content; quantised, constant and patterned rates accuse nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.dataset import load
+from gyrotc.dataset.shared import fingerprints_of, windows_in_common, windows_that_repeat
+from gyrotc.errors import InputError
+from gyrotc.jobs.fleet.copies import copies
+from gyrotc.judge.check import check
+from numpy.typing import NDArray
+from recordings import Columns, columns, toml, write_csv
+
+Floats = NDArray[np.float64]
+TRAIN, EXAM = 'file = "a.csv"', 'file = "b.csv"\nrole = "exam"'
+
+
+def two_runs(folder: Path, *, role: str = "exam", extra: str = "") -> tuple[Columns, Columns]:
+    """Two runs of 6000 rows; rows 1001 to 3000 of the first are rows 3501 to 5500 of the second."""
+    a, b = columns(6000, seed=3), columns(6000, seed=4)
+    for name in ("temperature_c", "rate_dph"):
+        b[name][3500:5500] = a[name][1000:3000]
+    write_csv(folder / "a.csv", a)
+    write_csv(folder / "b.csv", b)
+    second = f'file = "b.csv"\nrole = "{role}"' + (f"\n{extra}" if extra else "")
+    (folder / "dataset.toml").write_text(toml(TRAIN, second), "utf-8")
+    return a, b
+
+
+def test_an_exam_on_training_data_is_refused_with_the_rows_and_the_line_that_mends_it(tmp_path: Path) -> None:
+    """Before: 0 problems, 0 doubts."""
+    two_runs(tmp_path / "R")
+    [problem] = check(tmp_path / "R").problems
+    assert problem.where == "b.csv, rows 3501 to 5500"
+    assert "also rows 1001 to 3000 of a.csv, which is trained on" in problem.found
+    with pytest.raises(InputError, match="rows 3501 to 5500"):
+        load(tmp_path / "R")
+    line = 'exclude = [{from_s = 35000.0, to_s = 55000.0, reason = "also in a.csv"}]'
+    assert line in problem.expected
+    two_runs(tmp_path / "R", extra=line)
+    assert check(tmp_path / "R").problems == ()
+    load(tmp_path / "R")
+
+
+def test_rows_of_two_training_runs_are_told(tmp_path: Path) -> None:
+    two_runs(tmp_path / "R", role="train")
+    result = check(tmp_path / "R")
+    assert result.problems == ()
+    [doubt] = [d for d in result.doubts if d.id == "shared_rows"]
+    assert (
+        "Rows 3501 to 5500 of b.csv are also rows 1001 to 3000 of a.csv: 2000 rows count twice" in doubt.text
+    )
+
+
+def test_a_stretch_that_a_logger_wrote_twice_is_told(tmp_path: Path) -> None:
+    table = columns(9000)
+    for name in ("temperature_c", "rate_dph"):
+        table[name][5000:8000] = table[name][1000:4000]
+    write_csv(tmp_path / "R" / "a.csv", table)
+    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "shared_rows"]
+    assert "Rows 5001 to 8000 of a.csv are also rows 1001 to 4000 of the same file" in doubt.text
+
+
+def alike(rate: Callable[[np.random.Generator], Floats], n: int = 60_000) -> int:
+    """Windows in common of two recordings of one profile, whose temperatures are the same to the last bit."""
+    t = np.arange(n) * 1.0
+    temperature = np.round(20.0 + 30.0 * np.sin(t / 9000.0), 1)
+    one, two = (fingerprints_of(t, temperature, [rate(np.random.default_rng(k))]) for k in (1, 2))
+    return len(windows_in_common(one, two)) + len(windows_that_repeat(one))
+
+
+INNOCENT: dict[str, Callable[[np.random.Generator, int], Floats]] = {
+    "constant": lambda g, n: np.zeros(n),
+    "toggles": lambda g, n: np.arange(n) % 2.0,
+    "pattern": lambda g, n: np.round(np.sin(np.arange(n) * (2.0 * np.pi / 50.0)), 2),
+    "two levels": lambda g, n: np.round(0.49 + g.normal(0.0, 0.3, n)),
+    "one level in a hundred rows": lambda g, n: np.round(g.normal(0.0, 0.19, n)),
+    "coarse": lambda g, n: np.round(g.normal(0.0, 1.0, n)),
+    "slow walk": lambda g, n: np.round(np.cumsum(g.normal(0.0, 0.02, n))),
+    "held for 50 rows": lambda g, n: np.repeat(np.round(g.normal(0.0, 1.0, n // 50)), 50),
+    "fine": lambda g, n: g.normal(0.0, 1.0, n),
+}
+
+
+@pytest.mark.parametrize("name", INNOCENT)
+def test_quantised_and_constant_rates_accuse_nobody(name: str) -> None:
+    assert alike(lambda g: INNOCENT[name](g, 60_000)) == 0
+
+
+@pytest.mark.parametrize("step", [0.0, 0.1, 1.0, 2.0])
+def test_a_shared_stretch_is_found_also_where_the_rate_is_coarse(step: float) -> None:
+    g, n = np.random.default_rng(5), 40_000
+    t = np.arange(n) * 1.0
+    first, second = g.normal(0.0, 1.0, n), g.normal(0.0, 1.0, n)
+    second[7000:10_000] = first[1000:4000]
+    coarse = [np.round(r / step) if step else r for r in (first, second)]
+    one, two = (fingerprints_of(t, np.full(n, 20.0), [r]) for r in coarse)
+    found = windows_in_common(one, two)
+    assert found
+    assert {b - a for a, b, _ in found} == {6000}
+
+
+def test_a_copy_under_another_serial_is_named() -> None:
+    words = [f"{k:016x}" for k in range(300)]
+    own = {"A": words[:100], "B": words[100:200], "C": words[200:280] + words[:20]}
+    entries = [
+        {"name": name, "serial": name, "sketch": "".join(mine), "findings": []} for name, mine in own.items()
+    ]
+    [found] = copies(entries)
+    assert (found.name, found.other, found.share) == ("A", "C", 0.2)
+    assert copies([e | {"serial": "A"} for e in entries]) == []  # axes of one gyro
