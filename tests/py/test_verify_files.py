@@ -58,7 +58,7 @@ def _hex_with_another_weight(c: Path) -> None:
 
 def _at_start(function: str, statement: str) -> Spoil:
     """A statement put at the start of a function of the runtime."""
-    head = rf"(int FN\({function}\)\([^;{{]*\{{\n)"
+    head = rf"(int gtc_f32_{function}\([^;{{]*\{{\n)"
     return lambda c: spoil(c / "gtc.c", head, rf"\1    {statement}\n")
 
 
