@@ -171,14 +171,9 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(
     number: signal.Signals, made: Path, tmp_path: Path
 ) -> None:
     program = Path(sys.executable).with_name("gyrotc")
-    command = [program, "build", made / "A", "--out", tmp_path / "out"]
-    job = subprocess.Popen(
-        command,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # a job in the background ignores SIGINT
-    )
+    # A job in the background of a shell inherits that SIGINT is ignored; env undoes it, and becomes the program.
+    command = ["env", "--default-signal", program, "build", made / "A", "--out", tmp_path / "out"]
+    job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while job.poll() is None and not list(tmp_path.glob(".out.gyrotc-part-*")):
         time.sleep(0.005)
     job.send_signal(number)
