@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 from gyrotc.jobs.build import _failures
 
 
@@ -12,5 +14,5 @@ def test_a_proven_bound_that_is_exceeded_fails_a_build() -> None:
         "emitted": [],
         "errors": [{"numeric": "q31", "status": "fail", "bound_dph": 1e-7, "worst_dph": 2e-7}],
     }
-    [failure] = _failures({"mismatches": 0}, verification, None)
+    [failure] = _failures(SimpleNamespace(mismatches=0), verification, None)
     assert "q31" in failure and "2e-07" in failure and "1e-07" in failure

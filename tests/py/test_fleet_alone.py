@@ -109,7 +109,7 @@ def _stable(folder: Path) -> dict[str, bytes]:
     return {
         path.name: path.read_bytes()
         for path in files
-        if path.name not in ("training.json", "entry.json", MARKER)
+        if path.name not in ("training.json", "entry.json", "manifest.json", MARKER)
     }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gyrotc.errors import CheckFailed
 from gyrotc.model import Model, Term
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference.table import Words
@@ -28,7 +29,11 @@ def test_a_restored_state_goes_on_bit_for_bit_in_any_history(build: Runtime, num
     rng = np.random.default_rng(seed)
     for trial in range(30):
         model = variant(seed + trial)
-        device = Device(build, quantise(model, numeric))
+        try:
+            table = quantise(model, numeric)
+        except CheckFailed:  # a model whose regions this arithmetic cannot tell apart
+            continue
+        device = Device(build, table)
         samples_per_block = int(rng.choice([1, 2, 3, 7, 10, 50]))
         channels, missed = history(model, device.table, seed + trial, 600, samples_per_block)
         whole, cut = device.state(), device.state()

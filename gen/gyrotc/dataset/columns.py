@@ -42,7 +42,9 @@ class Layout:
         return self.value if axis is None else self.axes[axis]
 
 
-def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problems) -> Layout | None:
+def arrange(
+    file: str, names: Sequence[str], columns: Columns, problems: Problems
+) -> Layout | None:  # long: one rule for each kind of column
     """Finds the meaning of the columns of a file; None (and problems) if they do not make a recording."""
     before = len(problems)
     _check_names(file, names, problems)

@@ -107,7 +107,9 @@ def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[st
     """
     known = np.ones(len(columns[layout.time]), dtype=bool)
     for name in (layout.temperature, *channels):
-        if np.isnan(np.sum(columns[name])):
+        with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
+            doubtful = np.isnan(np.sum(columns[name]))
+        if doubtful:
             known &= ~np.isnan(columns[name])
     return columns if known.all() else {name: values[known] for name, values in columns.items()}
 
@@ -182,7 +184,7 @@ def _checked(
     units: Mapping[str, Conversion],
     pulse_weight_arcsec: float | None,
     problems: Problems,
-) -> tuple[Floats, Evidence, Fingerprints]:
+) -> tuple[Floats, Evidence, Fingerprints]:  # long: one refusal after the other
     """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
     values = file.read(file.names)
     lines = None

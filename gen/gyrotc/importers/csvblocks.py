@@ -15,7 +15,9 @@ _BLOCK_BYTES = 2**23
 _LONGEST_LINE = 2**20
 
 
-def blocks_of(path: Path, dialect: Dialect, size: int) -> Iterator[tuple[bytes, int, float]]:
+def blocks_of(
+    path: Path, dialect: Dialect, size: int
+) -> Iterator[tuple[bytes, int, float]]:  # long: one state of the reader
     """Blocks of whole lines of rows in UTF-8 with LF, the number of their first line, and the share read.
 
     Raises:

@@ -145,7 +145,7 @@ def _run(
     options: ImportOptions,
     tell: Say,
     progress: Progress | None,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # long: the stages of an import in their order
     """Writes one run; its entry."""
     layout = rows.layout
     names = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]

@@ -21,7 +21,7 @@ __all__ = ["open_mat"]
 _DEEPEST = 4
 
 
-def open_mat(path: Path) -> LoggerFile:
+def open_mat(path: Path) -> LoggerFile:  # long: one branch for each form of the file
     """A MATLAB file: numeric vectors, columns of matrices, fields of structs.
 
     Raises:

@@ -155,7 +155,9 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
     return name, None, ""
 
 
-def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
+def meaning(
+    name: str, unit: str | None, table: str = ""
+) -> Meaning:  # long: one rule after the other, the surest first
     """What a column of that name and (where the file gives one) that unit holds."""
     base, in_name, why = split_unit(name)
     kind = kind_of(unit) if unit else None

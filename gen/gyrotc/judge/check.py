@@ -1,3 +1,4 @@
+# long: every doubt about recordings is told here
 """`gyrotc check`: everything that is wrong with recordings, and everything that is doubtful, at once.
 
 A problem is what `fit` refuses. A doubt is what it takes and a person should look at. A recording that still grows

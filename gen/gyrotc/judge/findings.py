@@ -1,3 +1,4 @@
+# long: every finding is told here
 """What a user should know about a model and the data behind it, computed from the data.
 
 A finding has an id that stays stable, a text, and the numbers behind it. Findings never stop a job. They follow

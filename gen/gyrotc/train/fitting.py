@@ -1,3 +1,4 @@
+# long: what training.json and model.json say of a fit stands together
 """From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
 
 Joins the stages dataset → frontend → train → model; computes nothing of its own beyond the choice of
@@ -132,7 +133,9 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
-def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
+def fit_dataset(
+    dataset: Dataset, options: FitOptions, *, progress: Progress | None = None
+) -> Fitted:  # long: the stages of a fit in their order
     """Fits a model to the training runs of a data set.
 
     Raises:
