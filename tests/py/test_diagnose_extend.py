@@ -10,12 +10,13 @@ import pytest
 from gyrotc.dataset import Dataset, load
 from gyrotc.diagnose.extend.extension import _shipped, extend
 from gyrotc.diagnose.extend.gain import gain_of
-from gyrotc.diagnose.extend.refit import Effect, joined, samples
+from gyrotc.diagnose.extend.refit import Effect, samples
 from gyrotc.diagnose.extend.refitting import Refitting, folds_of
 from gyrotc.diagnose.result import diagnose
 from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.metrics import Averages
 from gyrotc.terms.operators import first_order
+from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from recordings import toml, write_csv
 

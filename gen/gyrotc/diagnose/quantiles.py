@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scipy.special import chdtri, ndtri
 
-__all__ = ["CHI2_95_ONE", "CHI2_95_TWO", "MAD_TO_SIGMA", "NORMAL_95"]
+__all__ = ["CHI2_95_ONE", "CHI2_95_TWO", "NORMAL_95"]
 
 CHI2_95_ONE = float(chdtri(1, 0.05))
 """Fall of twice the log-likelihood at the ends of a 95 % interval of one parameter (Wilks): 3.84."""
@@ -14,6 +14,3 @@ CHI2_95_TWO = float(chdtri(2, 0.05))
 
 NORMAL_95 = float(ndtri(0.975))
 """Half width of a 95 % interval in standard deviations: 1.96."""
-
-MAD_TO_SIGMA = 1.0 / float(ndtri(0.75))
-"""From the median absolute deviation to the standard deviation of normal values: 1.4826."""

@@ -15,11 +15,12 @@ import numpy as np
 from ...dataset import Dataset
 from ...metrics import Averages
 from ...train import Fit, TrainingData
+from ...train.data import joined
 from ...train.fitting import FitOptions
 from ..attribute.refine import Refined
 from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
-from .refit import Effect, joined, samples, score
+from .refit import Effect, samples, score
 from .refitting import FEW_RUNS, Chain, Refitting, folds_of
 
 __all__ = ["Extension", "extend"]

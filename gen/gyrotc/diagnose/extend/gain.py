@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics import Averages, time_statistics
-from ..quantiles import MAD_TO_SIGMA
+from ...metrics import MAD_TO_SIGMA, Averages, time_statistics
 
 __all__ = ["Gain", "floor_of", "gain_of"]
 

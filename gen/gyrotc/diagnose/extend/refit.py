@@ -16,10 +16,11 @@ from ...metrics import Averages, average
 from ...terms import CATALOGUE, Scene, Term
 from ...terms.recursion import Course, Outcome
 from ...train import Fit, TrainingData, fit, predict
+from ...train.data import joined
 from ...train.fitting import FrontEnd, samples_of
 from ..attribute.refine import Refined
 
-__all__ = ["Effect", "Played", "fit_extended", "joined", "play_runs", "samples", "score"]
+__all__ = ["Effect", "Played", "fit_extended", "play_runs", "samples", "score"]
 
 Array = NDArray[np.float64]
 
@@ -145,12 +146,6 @@ def _simulated(run: Played, effect: Effect) -> Array:
     scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
     assert effect.term.bias is not None
     return effect.term.bias(scene, effect.values, np.random.default_rng(0))
-
-
-def joined(parts: Sequence[TrainingData]) -> TrainingData:
-    """Samples of several runs as one."""
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
 
 
 def fit_extended(

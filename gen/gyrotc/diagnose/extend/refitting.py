@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...dataset import Dataset
 from ...metrics import Averages
 from ...train import Fit
+from ...train.data import joined
 from ...train.fitting import FitOptions, front_end, map_method
 from ...train.spans import training_spans
 from ..attribute.attribution import choose
@@ -18,7 +19,7 @@ from ..attribute.refine import Refined
 from ..attribute.single_cycle import cycle_of
 from ..pipeline import search_of
 from ..screen.blocks import Records
-from .refit import Effect, Played, fit_extended, joined, play_runs, score
+from .refit import Effect, Played, fit_extended, play_runs, score
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 

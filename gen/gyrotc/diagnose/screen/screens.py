@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.ndimage import median_filter
 
+from ...metrics import MAD_TO_SIGMA
 from ..orthonormal import orthonormal
-from ..quantiles import MAD_TO_SIGMA
 from .blocks import Records, centred_slope
 
 __all__ = ["Screened", "screen"]
