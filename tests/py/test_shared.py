@@ -113,3 +113,10 @@ def test_a_copy_under_another_serial_is_named() -> None:
     [found] = copies(entries)
     assert (found.name, found.other, found.share) == ("A", "C", 0.2)
     assert copies([e | {"serial": "A"} for e in entries]) == []  # axes of one gyro
+
+
+def test_values_beyond_float32_are_no_trouble() -> None:
+    """A damaged cell may hold 1e276: it is refused by its range, not here."""
+    time = np.arange(2048.0)
+    wild = np.full(2048, 1e276)
+    fingerprints_of(time, wild, [wild])

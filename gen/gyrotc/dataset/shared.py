@@ -105,8 +105,9 @@ class _Rows:
 
 
 def _bits(values: Floats) -> Words:
-    """Values as float32, as whole numbers; 0 and -0 are one."""
-    bits = (values.astype(np.float32) + np.float32(0.0)).view(np.uint32)
+    """Values as float32, as whole numbers; 0 and -0 are one, and so is all that is beyond float32."""
+    with np.errstate(over="ignore"):
+        bits = (values.astype(np.float32) + np.float32(0.0)).view(np.uint32)
     return np.asarray(bits.astype(np.uint64))
 
 
