@@ -74,7 +74,9 @@ def run_to_end(command: Sequence[str], folder: Path, what: str, stdin: Stream = 
     # Files, not pipes: a recording goes in and comes out, and is in memory once.
     with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
         # The clock ends it; the limit of processor time is for what escapes the clock, and must not come first.
-        with confined(command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S) as process:
+        with confined(
+            command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S
+        ) as process:
             try:
                 process.wait(LIMIT_S)
             except subprocess.TimeoutExpired as error:
