@@ -126,7 +126,7 @@ def _costs(job: Job, core: str, level: str, n: int) -> Iterator[dict[str, Any]]:
     flags = (*(flag for flag in target.flags if flag != "-O2"), *level.split())
     target = target.model_copy(update={"flags": flags})
     sizes = _sizes(job, target)
-    for entry in board_entries(job, target):
+    for entry in (found.content() for found in board_entries(job, target)):
         if entry["status"] != "pass":
             raise CheckFailed(f"{core} {level}: {entry}")
         yield {

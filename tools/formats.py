@@ -23,6 +23,7 @@ from gyrotc.results.limits import HeldLimits
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.planned import Plan
 from gyrotc.results.truth import SimulatedTruth
+from gyrotc.results.verification import JointVerification, Verification
 from pydantic import BaseModel
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,8 +41,13 @@ RESULTS: dict[str, type[Numbered]] = {
     "manifest": Manifest,
     "plan": Plan,
     "truth": SimulatedTruth,
+    "verify": Verification,
+    "verify-axes": JointVerification,
 }
 """Results whose tables stand in docs/FORMAT.md."""
+
+TOLD_ABOVE: dict[str, tuple[type[Numbered], ...]] = {"verify-axes": (Verification,)}
+"""Results whose objects are those of a result above them."""
 
 KINDS: dict[str, type[BaseModel]] = {**RESULTS, "model": Model}
 """All that has a schema."""
@@ -52,7 +58,8 @@ def made() -> dict[Path, str]:
     found = {SCHEMAS / f"{name}.json": schema_text(kind) for name, kind in KINDS.items()}
     text = FORMAT.read_text("utf-8")
     for name, kind in RESULTS.items():
-        block = f"<!-- fields of {name}: made by `make formats` -->\n\n{tables(kind)}\n<!-- end of {name} -->"
+        table = tables(kind, TOLD_ABOVE.get(name, ()))
+        block = f"<!-- fields of {name}: made by `make formats` -->\n\n{table}\n<!-- end of {name} -->"
         pattern = re.compile(rf"<!-- fields of {name}:.*?<!-- end of {name} -->", re.DOTALL)
         if not pattern.search(text):
             raise SystemExit(f"{FORMAT} has no place for the fields of {name}")

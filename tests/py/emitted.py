@@ -47,7 +47,7 @@ def flip(path: Path, pattern: str, bit: int = 0) -> None:
 
 def entries(folder: Path, *names: str) -> dict[tuple[str, str], dict[str, Any]]:
     """Entries of `verify` by target and arithmetic; code that a test has spoilt is run all the same."""
-    result = verify(folder, targets=names, trust_code=True)
+    result = verify(folder, targets=names, trust_code=True).content()
     return {(e["name"], e["numeric"]): e for e in result["targets"]}
 
 

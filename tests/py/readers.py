@@ -137,7 +137,7 @@ def make_seeds(folder: Path) -> None:
     )  # fmt: skip
     changes = changes_since(Earlier(out), fitted.model, evaluation, manifest)
     for name, content in (
-        ("verify", verification), ("evaluate", evaluation.content()), ("limits", held.content()),
+        ("verify", verification.content()), ("evaluate", evaluation.content()), ("limits", held.content()),
         ("manifest", manifest.content()), ("changes", changes.content()),
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))

@@ -76,7 +76,7 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -
     (term,) = load_model(out / "model.json").terms
     assert term.id == made_up.id
     assert built.evaluation.mismatches == 0, "the compiled code is what the reference says"
-    assert built.verification["passed"] > 0 and built.verification["failed"] == 0
+    assert built.verification.passed > 0 and built.verification.failed == 0
     assert "/* slow_rate */" in next((out / "c").glob("gtc_sim_*.c")).read_text()
     assert "slow rate" in (out / "report.html").read_text()
 

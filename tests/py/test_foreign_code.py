@@ -46,7 +46,7 @@ def test_text_of_a_recording_does_not_become_code(
     with tempfile.TemporaryDirectory() as short:  # a value of [meta] is cut at 120 characters
         shown = Path(short) / "x"
         model = Model.from_dict(model_dict | {"meta": FIELDS[field](touching(shown))})
-        result = verify(emitted(tmp_path, model), targets=[FAST])
+        result = verify(emitted(tmp_path, model), targets=[FAST]).content()
         assert not shown.exists(), "the recording's code was run"
     assert result["failed"] == 0, result["targets"]
 
@@ -104,7 +104,7 @@ def test_code_planted_in_a_folder_is_neither_compiled_nor_run(
     planted = re.sub(pattern, text.replace("%s", str(shown)), path.read_text(), count=1)
     assert planted != path.read_text()
     path.write_text(planted, newline="")
-    for entry in verify(copy, targets=[FAST])["targets"]:
+    for entry in verify(copy, targets=[FAST]).content()["targets"]:
         assert entry["status"] == "fail" and f"{name} " in entry["error"] and "--trust-code" in entry["error"]
     assert not shown.exists()
 
@@ -113,7 +113,7 @@ def test_headers_of_the_folder_do_not_take_the_place_of_the_systems(whole: Path,
     copy = Path(shutil.copytree(whole, tmp_path / "copy"))
     for name in ("stdio.h", "stdint.h", "stddef.h", "board.h"):
         (copy / "c" / name).write_text("#error taken from the folder\n")
-    result = verify(copy, compiled=False)
+    result = verify(copy, compiled=False).content()
     assert result["failed"] == 4 and {e["verdict"] for e in result["emitted"]} == {"equal", "foreign"}
 
 
@@ -153,15 +153,15 @@ def test_an_entry_of_meta_is_not_taken_for_the_options_of_the_emission(
 ) -> None:
     line = "gyrotc emit model.json --out . --zero-at 55.0"
     model = Model.from_dict(model_dict | {"meta": {"Make again": line, "warnings": ["Make again:  " + line]}})
-    assert verify(emitted(tmp_path, model), compiled=False)["failed"] == 0
+    assert verify(emitted(tmp_path, model), compiled=False).content()["failed"] == 0
     emit(model, tmp_path, zero_at=20.0)
-    assert verify(tmp_path, compiled=False)["failed"] == 0
+    assert verify(tmp_path, compiled=False).content()["failed"] == 0
 
 
 def test_arithmetics_are_verified_in_the_order_they_were_emitted_in(whole: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(whole, tmp_path / "copy"))
     emit(load_model(folder / "model.json"), folder, numerics=["q31", "f32"])
-    assert verify(folder, compiled=False)["failed"] == 0
+    assert verify(folder, compiled=False).content()["failed"] == 0
 
 
 def test_evaluate_refuses_it_too(whole: Path, tmp_path: Path) -> None:

@@ -21,12 +21,13 @@ from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.diagnose.signatures import cache
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
-from gyrotc.inputs.stored import checked_result, read_result
 from gyrotc.jobs.fleet import load_manifest
 from gyrotc.judge.limits import load_limits
 from gyrotc.model import load_model
 from gyrotc.pages import report
-from gyrotc.results.evaluation import EvaluatedRun
+from gyrotc.results.base import checked_result, read_result
+from gyrotc.results.evaluation import EvaluatedRun, Evaluation
+from gyrotc.results.verification import Verification
 from gyrotc.simulate import read, simulate
 from gyrotc.simulate.truth import simulated_floor
 from gyrotc.verify.logs import log_parts
@@ -38,7 +39,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "manifest": load_manifest,
     "scenario": read,
     "log": log_parts,
-    "result": lambda path: read_result(path, "evaluate"),
+    "result": lambda path: read_result(path, Evaluation),
     "recording": lambda path: load(path.parent),
 }
 
@@ -218,9 +219,16 @@ def test_the_noise_of_a_truth(tmp_path: Path) -> None:
 
 
 def test_results_of_other_types_are_refused_by_field() -> None:
-    content: dict[str, Any] = {"schema": "gyrotc.verify/1", "passed": 1, "failed": 0, "targets": []}
-    content |= {"emitted": [], "errors": []}
-    assert checked_result(content, "verify", "v.json") is content
+    content: dict[str, Any] = {
+        "schema": "gyrotc.verify/1",
+        "gyrotc_version": "0.1.0",
+        "serial": "A",
+        "axis": None,
+    }
+    content |= {"passed": 1, "failed": 0, "missing": 0, "targets": [], "emitted": [], "errors": []}
+    content |= {"model_hash": "00", "c_hash": "00", "error_bound_dph": 0.0}
+    content |= {"worst_error_dph": {"value": 0.0, "inputs_visited": 0}}
+    assert checked_result(content, Verification, "v.json").content() == content
     for change, told in (
         ({"passed": "1"}, "v.json, field passed: '1'"),
         ({"targets": [3]}, "v.json, field targets.0: 3"),
@@ -228,8 +236,8 @@ def test_results_of_other_types_are_refused_by_field() -> None:
         ({"failed": -1}, "v.json, field failed: -1"),
         ({"schema": None}, "v.json, field schema: None"),
     ):
-        assert told in refused(lambda: checked_result(content | change, "verify", "v.json"))  # noqa: B023
-    assert "is not a JSON object" in refused(lambda: checked_result([], "verify", "v.json"))
+        assert told in refused(lambda: checked_result(content | change, Verification, "v.json"))  # noqa: B023
+    assert "is not a JSON object" in refused(lambda: checked_result([], Verification, "v.json"))
 
 
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from gyrotc.results.evaluation import (
     RunStatistics,
     Statistics,
 )
+from gyrotc.results.verification import MapError, Verification, VerifiedTarget, WorstError
 from recordings import columns, described, write_csv
 
 _NOTHING = dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
@@ -65,14 +66,17 @@ EVALUATION = Evaluation(
         sum_abs_weights_dph=0.02,
     ),
 )  # fmt: skip
-VERIFICATION = {
-    "targets": [
-        {"name": "host-gcc-O2", "status": "pass"},
-        {"name": "cortex-m4f", "status": "missing"},
-    ],
-    "errors": [{"numeric": "f32"}],
-    "error_bound_dph": 1e-8,
-}
+VERIFICATION = Verification(
+    gyrotc_version="0.1.0", serial="A", axis=None, model_hash="00", c_hash="00", passed=1, failed=0, missing=1,
+    targets=(
+        VerifiedTarget(name="host-gcc-O2", numeric="f32", status="pass"),
+        VerifiedTarget(name="cortex-m4f", numeric="f32", status="missing"),
+    ),
+    emitted=(),
+    errors=(MapError(numeric="f32", status="pass", bound_dph=1e-8, worst_dph=0.0, inputs_visited=1),),
+    error_bound_dph=1e-8,
+    worst_error_dph=WorstError(value=0.0, inputs_visited=1),
+)  # fmt: skip
 MEASURED = {
     "rms_dph": 0.0011, "std_dph": 0.001, "mean_dph": 0.0004, "max_abs_dph": 0.004, "rms_over_floor": 1.1,
     "rms_30min_dph": 0.0003, "angle_1h_arcsec": 0.5, "first_10min_rms_dph": 0.002, "error_bound_dph": 1e-8,

@@ -33,7 +33,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 def _entry(job: Job, target: Target, numeric: str) -> dict:
-    return next(e for e in board_entries(job, target) if e["numeric"] == numeric)
+    return next(e for e in _contents(job, target) if e["numeric"] == numeric)
+
+
+def _contents(job: Job, target: Target) -> list[dict]:
+    return [entry.content() for entry in board_entries(job, target)]
 
 
 @pytest.mark.parametrize("name", ["cortex-m4f", "s390x"])
@@ -118,7 +122,7 @@ def test_a_table_of_another_layout_is_refused_at_run_time(folder: Path, numeric:
 
 def test_a_table_of_another_layout_is_refused_by_the_compiler(folder: Path) -> None:
     spoil(folder / "c" / "gtc.h", r"#define GTC_TABLE_LAYOUT 1", "#define GTC_TABLE_LAYOUT 2")
-    for entry in board_entries(job_of(folder), with_flags("host-gcc-O2")):
+    for entry in _contents(job_of(folder), with_flags("host-gcc-O2")):
         assert entry["status"] == "fail" and "layout" in entry["error"]
 
 
@@ -152,16 +156,16 @@ def test_a_fault_in_a_term_or_in_the_hand_over_is_caught(fault: str, extended: P
         return
     copy = Path(shutil.copytree(extended, tmp_path / "copy"))
     spoil(copy / "c" / "gtc.c", *TERM_FAULTS[fault], count=0)
-    for entry in board_entries(job_of(copy), with_flags("host-gcc-O2")):
+    for entry in _contents(job_of(copy), with_flags("host-gcc-O2")):
         assert ran_and_differed(entry), entry
 
 
 def test_the_controls_of_terms_start_from_a_build_that_passes(extended: Path) -> None:
-    for entry in board_entries(job_of(extended), with_flags("host-gcc-O2")):
+    for entry in _contents(job_of(extended), with_flags("host-gcc-O2")):
         assert entry["status"] == "pass", entry
 
 
 def test_the_controls_start_from_a_build_that_passes(folder: Path) -> None:
     copy = Path(shutil.copytree(folder, folder / "copy"))
-    for entry in board_entries(job_of(copy), with_flags("host-gcc-O2")):
+    for entry in _contents(job_of(copy), with_flags("host-gcc-O2")):
         assert entry["status"] == "pass", entry

@@ -35,7 +35,7 @@ def _pair(folder: Path, name: str, *algorithm: str) -> Path:
 
 
 def _signed(folder: Path, key: Path) -> tuple[str, int]:
-    result = verify(folder, compiled=False, signature=key.with_suffix(".pub"))
+    result = verify(folder, compiled=False, signature=key.with_suffix(".pub")).content()
     return result["signature"]["status"], result["failed"]
 
 
@@ -47,7 +47,7 @@ def test_gyrotc_signs_and_openssl_agrees(key: Path, tmp_path: Path, gyrotc: Comm
     assert _openssl(*check, "-in", record, "-sigfile", signature).returncode == 0
     assert _signed(folder, key) == ("pass", 0)
     # The signature is no foreign file, and does not change what a board's log belongs to.
-    assert verify(folder, compiled=False)["failed"] == 0
+    assert verify(folder, compiled=False).content()["failed"] == 0
     done = gyrotc("verify", folder, "--signature", key.with_suffix(".pub"), "--target", "host-gcc-O2")
     assert done.returncode == 0 and "signature good" in done.stdout
 

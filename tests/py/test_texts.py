@@ -223,7 +223,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {
         "folder": made,
         "evaluation": evaluate(made, dataset, compiled=False),
-        "verification": verify(made, compiled=False),
+        "verification": verify(made, compiled=False).content(),
     }
 
 

@@ -37,7 +37,7 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 def test_every_target_of_the_common_tools_agrees_in_every_bit(whole: Path) -> None:
     """Two byte orders, two word lengths, hardware, software and double evaluation of float."""
     names = ["cortex-m0", "cortex-m4f", "s390x", *(n for n in all_targets() if n.startswith("host-"))]
-    result = verify(whole, targets=names)
+    result = verify(whole, targets=names).content()
     assert result["failed"] == 0 and result["missing"] == 0
     for entry in result["targets"]:
         assert (entry["status"], entry["mismatches"]) == ("pass", 0), entry
@@ -83,7 +83,7 @@ def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
 
 def test_a_flipped_bit_of_the_emitted_answers_fails(copy: Path) -> None:
     flip(copy / "c" / "vectors_rlg_0042.txt", r"\n[0-9a-f]{8} ([0-9a-f]{8})\n", bit=31)
-    result = verify(copy, targets=[FAST], trust_code=True)
+    result = verify(copy, targets=[FAST], trust_code=True).content()
     assert result["failed"] == 1 and result["passed"] >= 1
     assert [e["mismatches"] for e in result["emitted"] if e["status"] == "fail"] == [1]
 
@@ -93,7 +93,7 @@ def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     data = bytearray(path.read_bytes())
     data[40] ^= 16
     path.write_bytes(data)
-    result = verify(copy, targets=[FAST], trust_code=True)
+    result = verify(copy, targets=[FAST], trust_code=True).content()
     assert result["failed"] == 1
     assert {e["file"]: e["mismatches"] for e in result["emitted"]}[path.name] == 1
 
@@ -131,7 +131,7 @@ def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
     known = {FAST: all_targets()[FAST], "absent": absent}
     monkeypatch.setattr(package, "all_targets", lambda: known)
     for names, failed in (((), 0), (("all",), 0), (("absent",), 1), (("all", "absent"), 1)):
-        result = verify(whole, targets=names)
+        result = verify(whole, targets=names).content()
         missing = [e for e in result["targets"] if e["status"] == "missing"]
         assert {e["name"] for e in missing} == {"absent"}
         assert {e["package"] for e in missing} == {"some-package"}
@@ -143,11 +143,11 @@ def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path
     """Host, emulated board, the other byte order; a wrong constant of the front end is seen in the rows."""
     names = [FAST, "cortex-m4f", "s390x"]
     dataset = recorded(tmp_path / "recordings")
-    for entry in verify(copy, targets=names, dataset=dataset)["targets"]:
+    for entry in verify(copy, targets=names, dataset=dataset).content()["targets"]:
         assert entry["status"] == "pass"
         assert entry["replayed"] == {"runs": 2, "rows": 1714, "mismatches": 0, "first_mismatches": []}
     spoil(copy / "c" / "gtc.c", r"#define NEW_TRUTH 3U", "#define NEW_TRUTH 2U", count=0)
-    for entry in verify(copy, targets=[FAST], dataset=dataset, trust_code=True)["targets"]:
+    for entry in verify(copy, targets=[FAST], dataset=dataset, trust_code=True).content()["targets"]:
         assert entry["status"] == "fail" and entry["mismatches"] > 0
 
 
@@ -195,11 +195,11 @@ def test_log_of_a_board_is_checked_and_kept(copy: Path, gyrotc: Command) -> None
     assert boards and all(e["status"] == "pass" and 777 < e["vectors"] < 10000 for e in boards)
     assert {e["name"] for e in result["targets"]} == {"bench 7, iar 9", FAST}
     # A later run keeps what a board has shown of the same model and code ...
-    verify_again = verify(copy, targets=[FAST])
+    verify_again = verify(copy, targets=[FAST]).content()
     assert any(e["name"] == "bench 7, iar 9" for e in verify_again["targets"])
     # ... and drops it with the code.
     spoil(copy / "c" / "main.c", "return 1;", "return 3;")
-    assert {e["name"] for e in verify(copy, targets=[FAST])["targets"]} == {FAST}
+    assert {e["name"] for e in verify(copy, targets=[FAST]).content()["targets"]} == {FAST}
 
 
 @pytest.mark.parametrize("crc", [False, True], ids=["all", "crc"])

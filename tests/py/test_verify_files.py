@@ -34,7 +34,7 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 def _wrong(folder: Path, **options: object) -> dict[str, str]:
     """Files that are not as they should be, with the verdict; the in-memory part alone."""
-    result = verify(folder, compiled=False, **options)  # type: ignore[arg-type]
+    result = verify(folder, compiled=False, **options).content()  # type: ignore[arg-type]
     wrong = {e["file"]: e["verdict"] for e in result["emitted"] if e["status"] == "fail"}
     assert result["failed"] == len(wrong)
     return wrong
@@ -142,7 +142,7 @@ def test_the_first_place_that_differs_is_shown_with_both_texts(copy: Path, gyrot
     # Code that gyrotc did not write is not run ...
     assert all("not compiled" in e["error"] for e in result["targets"])
     # ... unless the user says so.
-    result = verify(copy, targets=["host-gcc-O2"], trust_code=True)
+    result = verify(copy, targets=["host-gcc-O2"], trust_code=True).content()
     assert {e["status"] for e in result["targets"]} == {"pass"} and result["failed"] == 2
 
 
@@ -175,7 +175,7 @@ def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path, gy
     for file in sorted((unit / "c").iterdir()):
         right = file.read_bytes()
         file.write_bytes(right[:-1] + b" ")
-        result = verify_axes(unit, results)
+        result = verify_axes(unit, results).content()
         assert [e["file"] for e in result["emitted"] if e["status"] == "fail"] == [file.name]
         file.write_bytes(right)
     (unit / "x" / "c" / "gtc.h").unlink()

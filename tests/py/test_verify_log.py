@@ -37,7 +37,7 @@ def _spoilt(line: str) -> str:
 def _result(folder: Path, tmp_path: Path, lines: list[str]) -> dict:
     log = tmp_path / "bench.log"
     log.write_text("\r\n".join(lines) + "\r\n")
-    return verify(folder, log=log)
+    return verify(folder, log=log).content()
 
 
 def _at(run: list[str], start: str, numeric: str) -> int:

@@ -48,7 +48,7 @@ MODELS = {
 def test_every_target_agrees_in_every_bit(name: str, tmp_path: Path, results: Results) -> None:
     model = MODELS[name]()
     folder = emitted(tmp_path / "model", model)
-    result = verify(folder, targets=["all"], dataset=recorded(tmp_path / "recordings"))
+    result = verify(folder, targets=["all"], dataset=recorded(tmp_path / "recordings")).content()
     missing = {(e["name"], e["package"]) for e in result["targets"] if e["status"] == "missing"}
     assert not missing, f"install these packages: {' '.join(sorted({p for _, p in missing}))}"
     wrong = [e for e in result["targets"] if e["status"] != "pass" or e["mismatches"]]
@@ -88,5 +88,5 @@ def test_meter_counts_instructions_cycles_and_stack(name: str, tmp_path: Path) -
 def test_instruction_counts_repeat_exactly(tmp_path: Path) -> None:
     folder = emitted(tmp_path)
     names = ["cortex-m0", "cortex-m3", "cortex-m4f", "cortex-m7", "rv32imac"]
-    first, second = (verify(folder, targets=names)["targets"] for _ in range(2))
+    first, second = (verify(folder, targets=names).content()["targets"] for _ in range(2))
     assert [e["instructions"] for e in first] == [e["instructions"] for e in second]

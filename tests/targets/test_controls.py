@@ -13,7 +13,7 @@ from test_negative_controls import CONTRACTED, SELF_TEST_FAILED, natural_express
 
 
 def _f32(folder: Path, target: Target) -> dict:
-    return next(e for e in board_entries(job_of(folder), target) if e["numeric"] == "f32")
+    return next(e for e in board_entries(job_of(folder), target) if e.numeric == "f32").content()
 
 
 @pytest.fixture

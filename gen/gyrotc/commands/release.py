@@ -33,8 +33,8 @@ def sign(
     parts = [folder / axis for axis in axes] or [folder]
     results = {part.name: verify(part, compiled=False) for part in parts}
     judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
-    wrong = [e["file"] for result in judged for e in result["emitted"] if e["status"] == "fail"]
-    if wrong or any(result["failed"] for result in judged):
+    wrong = [name for result in judged for name in result.wrong_files]
+    if wrong or any(result.failed for result in judged):
         raise CheckFailed(f"not signed: {wrong[0] if wrong else 'a check'} fails; see gyrotc verify {folder}")
     for part in [*parts, *([folder] if axes else [])]:
         with result_folder(part, "sign", entries=("c",)) as stage:

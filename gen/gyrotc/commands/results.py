@@ -12,6 +12,7 @@ from ..pages.published import ENVIRONMENTS
 from ..results.changes import Changes
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
+from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
 
 
 def _e(value: float | None, digits: int = 2) -> str:
@@ -70,83 +71,87 @@ def prediction_line(training: dict[str, Any]) -> str:
     return f"{floor}; predicted RMS over it: {ratio:.4f}"
 
 
-def verify_table(result: dict[str, Any]) -> RichTable:
+def verify_table(result: Verification) -> RichTable:
     table = RichTable(title="Bit for bit against the reference", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("target", "", "status"):
         table.add_column(name, no_wrap=True)
     for name in ("vectors", "rows", "differ", "map call", "code", "stack"):
         table.add_column(name, justify="right", no_wrap=True)
-    for entry in result["targets"]:
-        replayed = entry.get("replayed") or {}
-        counted = next((n for n in ("instructions", "cycles", "ticks") if n in entry), None)
+    for entry in result.targets:
+        replayed, counted = entry.replayed, entry.map_cost
+        differ = (
+            None if entry.mismatches is None else entry.mismatches + (replayed.mismatches if replayed else 0)
+        )
         table.add_row(
-            entry["name"], entry["numeric"], entry["status"], str(entry.get("vectors", "-")),
-            str(replayed.get("rows", "-")),
-            str(entry["mismatches"] + replayed.get("mismatches", 0)) if "mismatches" in entry else "-",
-            f"{entry[counted]['mean']:.0f} {counted[:5]}" if counted else "-",
-            str(entry.get("code_bytes", "-")), str(entry.get("stack_bytes", "-")),
+            entry.name, entry.numeric, entry.status, _known(entry.vectors),
+            _known(replayed.rows if replayed else None), _known(differ),
+            f"{counted[1].mean:.0f} {counted[0][:5]}" if counted else "-",
+            _known(entry.code_bytes), _known(entry.stack_bytes),
         )  # fmt: skip
     return table
 
 
-def verify_notes(result: dict[str, Any]) -> Iterator[str]:
+def _known(number: int | None) -> str:
+    return "-" if number is None else str(number)
+
+
+def verify_notes(result: Verification) -> Iterator[str]:
     """What is missing, and what differs, with all bits; one line each."""
-    for entry in result["targets"]:
-        if entry["status"] == "missing":
-            yield f"{entry['name']} {entry['numeric']}: missing; it needs the packages {entry['package']}"
-        replayed = entry.get("replayed") or {}
-        found = [entry.get("error"), replayed.get("error"), *entry.get("first_mismatches", ())]
-        for text in [*found, *replayed.get("first_mismatches", ())]:
-            if text:
-                yield f"{entry['name']} {entry['numeric']}: {text}"
+    for entry in result.targets:
+        who = f"{entry.name} {entry.numeric}"
+        if entry.status == "missing":
+            yield f"{who}: missing; it needs the packages {entry.package}"
+        replayed = entry.replayed
+        found = [entry.error, replayed.error if replayed else None, *entry.first_mismatches]
+        yield from (f"{who}: {text}" for text in found if text)
+        yield from (f"{who}: {text}" for text in replayed.first_mismatches) if replayed else ()
     yield from file_notes(result)
-    yield from _log_notes(result["log"]) if result.get("log") else ()
-    for error in result["errors"]:
-        for text in error.get("first_mismatches", ()):
-            yield f"{error['numeric']}: {text}"
+    yield from _log_notes(result.log) if result.log else ()
+    for error in result.errors:
+        yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (
-            f"{error['numeric']}: worst error {error['worst_dph']:.2e} deg/h of {error['inputs_visited']} inputs "
-            f"visited; the bound is {error['bound_dph']:.2e}"
-            + (" and is EXCEEDED" if error["worst_dph"] > error["bound_dph"] else "")
+            f"{error.numeric}: worst error {error.worst_dph:.2e} deg/h of {error.inputs_visited} inputs "
+            f"visited; the bound is {error.bound_dph:.2e}"
+            + (" and is EXCEEDED" if error.worst_dph > error.bound_dph else "")
         )
 
 
-def _log_notes(log: dict[str, Any]) -> Iterator[str]:
+def _log_notes(log: ReadLog) -> Iterator[str]:
     """What a log holds, to its last line."""
-    found = ", ".join(f"{part['numeric']} from line {part['line']}" for part in log["parts"])
-    yield f"{log['file']}: {log['lines']} lines; compared: {found}; {log['outside']} lines outside of the board test"
-    yield from (f"{log['file']}, outside: {line}" for line in log["first_outside"])
-    for numeric in log["absent"]:
-        yield f"{log['file']}: the board did not test {numeric}"
+    found = ", ".join(f"{part.numeric} from line {part.line}" for part in log.parts)
+    yield f"{log.file}: {log.lines} lines; compared: {found}; {log.outside} lines outside of the board test"
+    yield from (f"{log.file}, outside: {line}" for line in log.first_outside)
+    for numeric in log.absent:
+        yield f"{log.file}: the board did not test {numeric}"
 
 
-def file_notes(result: dict[str, Any]) -> Iterator[str]:
+def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
-    files = result["emitted"]
-    for file in files:
-        if file["verdict"] == "foreign":
-            yield f"{file['file']}: foreign; gyrotc did not write it, move it elsewhere"
-        elif file["verdict"] == "missing":
-            yield f"{file['file']}: missing"
-        elif file["verdict"] != "equal":
-            yield f"{file['file']}: {_difference_text(file)}"
-    equal = sum(file["verdict"] == "equal" for file in files)
-    options = result.get("options") or {}
-    shift = f", shifted to 0 at {options['zero_at_c']:g} C" if options.get("zero_at_c") is not None else ""
-    yield f"{equal} of {len(files)} files are, byte for byte, what the model gives{shift}"
-    signed = result.get("signature")
+    for file in result.emitted:
+        if file.verdict == "foreign":
+            yield f"{file.file}: foreign; gyrotc did not write it, move it elsewhere"
+        elif file.verdict == "missing":
+            yield f"{file.file}: missing"
+        elif file.verdict != "equal":
+            yield f"{file.file}: {_difference_text(file)}"
+    equal = sum(file.verdict == "equal" for file in result.emitted)
+    options = result.options if isinstance(result, Verification) else None
+    zero_at = options.zero_at_c if options else None
+    shift = f", shifted to 0 at {zero_at:g} C" if zero_at is not None else ""
+    yield f"{equal} of {len(result.emitted)} files are, byte for byte, what the model gives{shift}"
+    signed = result.signature
     if signed:
-        verdict = "good" if signed["status"] == "pass" else f"BAD: {signed['reason']}"
-        yield f"signature {verdict}; key sha256 {signed['key']}"
+        verdict = "good" if signed.status == "pass" else f"BAD: {signed.reason}"
+        yield f"signature {verdict}; key sha256 {signed.key}"
 
 
-def _difference_text(file: dict[str, Any]) -> str:
-    kind = "word" if "word" in file else "line"
-    if kind not in file:
-        return f"{file['verdict']}; it is {file['found']}"
+def _difference_text(file: VerifiedFile) -> str:
+    kind, place = ("line", file.line) if file.word is None else ("word", file.word)
+    if place is None:
+        return f"{file.verdict}; it is {file.found or 'no regular file'}"
     return (
-        f"{file['verdict']}, {file['mismatches']} {kind}s; first at {kind} {file[kind]}: there {file['found']!r}, "
-        f"the model gives {file['expected']!r}"
+        f"{file.verdict}, {file.mismatches} {kind}s; first at {kind} {place}: there {file.found!r}, "
+        f"the model gives {file.expected!r}"
     )
 
 

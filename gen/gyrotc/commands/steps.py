@@ -166,6 +166,7 @@ def verify(  # long: the parts of a command in the order in which they are print
     from ..dataset import load
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
+    from ..results.verification import JointVerification, Verification
     from ..verify import verify as run
 
     allowed = allow_edited or ()
@@ -189,22 +190,22 @@ def verify(  # long: the parts of a command in the order in which they are print
                     trust_code=trust_code,
                     progress=say,
                 )
-                write_atomically(stage.folder / "verify.json", json_text(results[str(axis)]))
-    result = next(iter(results.values()))
+                write_atomically(stage.folder / "verify.json", json_text(results[str(axis)].content()))
+    result: Verification | JointVerification = next(iter(results.values()))
     if axes:
         with result_folder(folder, "verify", entries=("verify.json",)) as stage:
             result = verify_axes(folder, results, allowed, signature)
-            write_atomically(stage.folder / "verify.json", json_text(result))
-    write_json(json_file, result)
+            write_atomically(stage.folder / "verify.json", json_text(result.content()))
+    write_json(json_file, result.content())
     for one in results.values():
         OUT.print(verify_table(one))
         for line in verify_notes(one):
             tell(line)
     for line in file_notes(result) if axes else ():
         tell(line)
-    if result["failed"]:
-        n_targets = sum(len(one["targets"]) for one in results.values())
-        raise CheckFailed(f"{result['failed']} checks failed; {n_targets} targets")
+    if result.failed:
+        n_targets = sum(len(one.targets) for one in results.values())
+        raise CheckFailed(f"{result.failed} checks failed; {n_targets} targets")
 
 
 @app.command()

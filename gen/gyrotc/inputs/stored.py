@@ -95,33 +95,6 @@ class _Training(_Stored):
     curves: dict[str, Any]
 
 
-class _Target(_Stored):
-    name: str
-    numeric: str
-    status: Literal["pass", "fail", "missing"]
-
-
-class _Emitted(_Stored):
-    file: str
-    status: Literal["pass", "fail"]
-    mismatches: Count
-
-
-class _ErrorOf(_Stored):
-    numeric: str
-    bound_dph: float
-    worst_dph: float
-    inputs_visited: Count
-
-
-class _Verification(_Stored):
-    passed: Count
-    failed: Count
-    targets: list[_Target]
-    emitted: list[_Emitted]
-    errors: list[_ErrorOf]
-
-
 class _Diagnosis(_Stored):
     verdict: str
     text: str
@@ -131,11 +104,10 @@ class _Diagnosis(_Stored):
     pictures: list[str] = []
 
 
-Kind = Literal["training", "verify", "diagnose"]
+Kind = Literal["training", "diagnose"]
 
 KINDS: dict[Kind, tuple[type[BaseModel], str | None]] = {
     "training": (_Training, "gyrotc.fit/1"),
-    "verify": (_Verification, "gyrotc.verify/1"),
     "diagnose": (_Diagnosis, "gyrotc.diagnose/1"),
 }
 """Fields and schema of every kind."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from .. import __version__
 from ..emit import emitted_tables
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
@@ -17,6 +17,7 @@ from ..pages.report import page_environment
 from ..reference.runtime import runtime_folders
 from ..results.base import read_result
 from ..results.evaluation import Evaluation
+from ..results.verification import JointVerification, Verification
 from ..texts import c_environment
 from ..verify import file_entries
 from ..verify.signature import check_signature, load_public_key
@@ -94,11 +95,11 @@ def axes_in(folder: Path) -> tuple[str, ...]:
 
 def verify_axes(
     folder: Path,
-    results: Mapping[str, dict[str, Any]],
+    results: Mapping[str, Verification],
     edited: Sequence[str] = (),
     signature: Path | None = None,
-) -> dict[str, Any]:
-    """The JSON object of `gyrotc verify` for a unit: its axes' results, and the files that stand in `folder/c`.
+) -> JointVerification:
+    """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
 
     These must be those of the axes' own folders, which `results` judges.
 
@@ -108,17 +109,25 @@ def verify_axes(
     models = {axis: load_model(folder / axis / "model.json") for axis in results}
     if not (folder / "c").is_dir():
         raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
-    numeric = next(iter(results.values()))["errors"][0]["numeric"]
+    numeric = next(iter(results.values())).errors[0].numeric
     emitted = file_entries(
         folder / "c", joint_texts(models, _sources(folder, tuple(results)), numeric), edited
     )
-    counts = {k: sum(r[k] for r in results.values()) for k in ("passed", "failed", "missing")}
-    counts["failed"] += sum(e["status"] == "fail" for e in emitted)
-    first = next(iter(results.values()))
-    head = {k: first[k] for k in ("schema", "gyrotc_version", "serial")} | {"axis": None}
     signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
-    counts["failed"] += signed is not None and signed["status"] == "fail"
-    return head | counts | {"emitted": emitted, "signature": signed, "axes": dict(results)}
+    wrong = sum(file.status == "fail" for file in emitted)
+    return JointVerification(
+        gyrotc_version=__version__,
+        serial=next(iter(results.values())).serial,
+        axis=None,
+        passed=sum(one.passed for one in results.values()),
+        failed=sum(one.failed for one in results.values())
+        + wrong
+        + (signed is not None and signed.status == "fail"),
+        missing=sum(one.missing for one in results.values()),
+        emitted=tuple(emitted),
+        signature=signed,
+        axes=dict(results),
+    )
 
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:

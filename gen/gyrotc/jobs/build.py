@@ -24,6 +24,7 @@ from ..results.changes import Changes
 from ..results.evaluation import Evaluation
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
+from ..results.verification import Verification
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
 from .axes import join_axes
@@ -46,7 +47,7 @@ class Built:
     model: Model
     training: dict[str, Any]
     evaluation: Evaluation
-    verification: dict[str, Any]
+    verification: Verification
     refused: dict[str, str]
     failures: tuple[str, ...]
     diagnosis: dict[str, Any] | None = None
@@ -155,7 +156,7 @@ def _build_axis(
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics)
     verification = verify(work, compiled=order.compiled, progress=lambda name: say(f"verifying {name}"))
-    _write(work / "verify.json", verification)
+    _write(work / "verify.json", verification.content())
     evaluation = evaluate(
         work,
         dataset,
@@ -206,19 +207,19 @@ def _of_axis(axis: str, say: Progress) -> Progress:
     return lambda text: say(f"{axis}: {text}")
 
 
-def _failures(evaluation: Evaluation, verification: dict[str, Any], held: HeldLimits | None) -> Iterator[str]:
-    for entry in verification["targets"]:
-        if entry["status"] == "fail":
-            reason = entry.get("error") or f"{entry['mismatches']} of {entry['vectors']} vectors differ"
-            yield f"{entry['name']} {entry['numeric']}: {reason}"
-    for file in verification["emitted"]:
-        if file["status"] == "fail":
-            yield f"{file['file']}: {file['verdict']}"
-    for error in verification["errors"]:
-        if error["status"] == "fail":
+def _failures(evaluation: Evaluation, verification: Verification, held: HeldLimits | None) -> Iterator[str]:
+    for entry in verification.targets:
+        if entry.status == "fail":
+            reason = entry.error or f"{entry.mismatches} of {entry.vectors} vectors differ"
+            yield f"{entry.name} {entry.numeric}: {reason}"
+    for file in verification.emitted:
+        if file.status == "fail":
+            yield f"{file.file}: {file.verdict}"
+    for error in verification.errors:
+        if error.status == "fail":
             yield (
-                f"{error['numeric']}: {error['worst_dph']:.3g} deg/h from the model, above the proven bound of "
-                f"{error['bound_dph']:.3g}"
+                f"{error.numeric}: {error.worst_dph:.3g} deg/h from the model, above the proven bound of "
+                f"{error.bound_dph:.3g}"
             )
     if evaluation.mismatches:
         yield f"{evaluation.mismatches} steps of the recordings differ from the reference"

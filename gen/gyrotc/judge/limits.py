@@ -19,6 +19,7 @@ from ..inputs import parse_toml, read_input
 from ..model import Model
 from ..results.evaluation import Evaluation
 from ..results.limits import HeldLimits, Limit, Value
+from ..results.verification import Verification
 from ..verify.toolchain import all_targets
 
 __all__ = ["Limits", "held_against", "load_limits"]
@@ -139,7 +140,7 @@ def load_limits(path: Path) -> Limits:
 
 
 def held_against(
-    limits: Limits, model: Model, evaluation: Evaluation, verification: dict[str, Any] | None
+    limits: Limits, model: Model, evaluation: Evaluation, verification: Verification | None
 ) -> HeldLimits:
     """Every limit with what was measured, and whether all are met."""
     checks = (
@@ -158,7 +159,7 @@ def held_against(
     )
 
 
-def _measured(model: Model, evaluation: Evaluation, verification: dict[str, Any] | None) -> dict[str, Any]:
+def _measured(model: Model, evaluation: Evaluation, verification: Verification | None) -> dict[str, Any]:
     """Figures by the names of limits; None: not measured."""
     found = evaluation.judged()
     judged = found[1] if found else None
@@ -182,7 +183,7 @@ def _measured(model: Model, evaluation: Evaluation, verification: dict[str, Any]
         "angle_1h_arcsec": worst(run.angle_1h_arcsec for run in runs),
         "first_10min_rms_dph": worst(run.first_10min_rms_dph for run in runs),
         "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
-        "error_bound_dph": verification["error_bound_dph"] if verification else None,
+        "error_bound_dph": verification.error_bound_dph if verification else None,
         "centers": evaluation.model.centers,
         "table_bytes": evaluation.model.table_bytes,
         "rom_bytes": evaluation.model.rom_bytes,
@@ -212,13 +213,13 @@ def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
         yield _limit(f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1])
 
 
-def _needs(needs: Needs, evaluation: Evaluation, verification: dict[str, Any] | None) -> Iterator[Limit]:
-    entries = verification["targets"] if verification else []
-    bounds = [error["numeric"] for error in verification["errors"]] if verification else []
+def _needs(needs: Needs, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
+    entries = verification.targets if verification else ()
+    bounds = [error.numeric for error in verification.errors] if verification else []
     for numeric in needs.arithmetics:
         yield _limit("needs.arithmetics", tuple(sorted(bounds)), numeric, numeric in bounds)
     for target in needs.targets:
-        status = tuple(sorted({entry["status"] for entry in entries if entry["name"] == target}))
+        status = tuple(sorted({entry.status for entry in entries if entry.name == target}))
         yield _limit("needs.targets", status, target, status == ("pass",))
     if needs.generalises:
         yield _limit("needs.generalises", evaluation.generalises, True, evaluation.generalises is True)

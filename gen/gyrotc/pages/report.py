@@ -24,6 +24,7 @@ from ..results.changes import Changes
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
+from ..results.verification import Verification
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
@@ -49,7 +50,7 @@ def write_report(folder: Path) -> Path:
     evaluation = read_result(folder / "evaluate.json", Evaluation)
     training = read_stored(folder / "training.json", "training", optional=True)
     beside = {
-        "verification": read_stored(folder / "verify.json", "verify", optional=True),
+        "verification": read_optional(folder / "verify.json", Verification),
         "manifest": read_optional(folder / "manifest.json", Manifest),
         "diagnosis": read_stored(folder / "diagnosis" / "diagnose.json", "diagnose", optional=True),
         "limits": read_optional(folder / "limits.json", HeldLimits),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import types
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -19,11 +19,16 @@ def schema_text(kind: type[BaseModel]) -> str:
     return json.dumps(kind.model_json_schema(by_alias=True), indent=1, ensure_ascii=True) + "\n"
 
 
-def tables(kind: type[BaseModel]) -> str:
-    """A table of fields for a result, and one for each object inside it, in Markdown."""
+def tables(kind: type[BaseModel], told: Collection[type[BaseModel]] = ()) -> str:
+    """A table of fields for a result, and one for each object inside it, in Markdown.
+
+    Args:
+        told: Results whose tables stand above: their objects are not told again.
+    """
     seen: dict[type[BaseModel], None] = {kind: None}
+    above = {inner for one in told for inner in _in_order({one: None})}
     parts = []
-    for one in _in_order(seen):
+    for one in (one for one in _in_order(seen) if one not in above):
         head = "" if one is kind else f"`{_name(one)}`: {_first_line(one)}\n\n"
         rows = [
             f"| `{_alias(one, name)}` | {_cell(one, name)} | {_told(one, name)} |"

@@ -11,7 +11,6 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,9 +19,18 @@ from ..dataset import Dataset
 from ..emit import emit_texts
 from ..emit.vectors import Vectors, make_vectors
 from ..errors import InputError
-from ..inputs.stored import read_result
 from ..model import Model, load_model
 from ..reference import answers
+from ..results.base import read_optional
+from ..results.verification import (
+    EmittedWith,
+    MapError,
+    SignatureCheck,
+    Verification,
+    VerifiedFile,
+    VerifiedTarget,
+    WorstError,
+)
 from .board import Job, board_entries
 from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
@@ -33,8 +41,6 @@ from .toolchain import Target, all_targets
 
 __all__ = ["file_entries", "verify"]
 
-SCHEMA = "gyrotc.verify/1"
-Entry = dict[str, Any]
 Progress = Callable[[str], None]
 
 
@@ -50,8 +56,8 @@ def verify(  # long: the order of the checks, then one line for each field of th
     signature: Path | None = None,
     trust_code: bool = False,
     progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Verifies `folder/c` against `folder/model.json`; the JSON object of `gyrotc verify`.
+) -> Verification:
+    """Verifies `folder/c` against `folder/model.json`; what `verify.json` holds.
 
     Args:
         folder: What `build` or `emit` wrote.
@@ -92,37 +98,41 @@ def verify(  # long: the order of the checks, then one line for each field of th
     )
     emitted = file_entries(job.c_folder, texts, edited)
     signed = check_signature(job.c_folder, key) if key is not None else None
-    wrong = [e["file"] for e in emitted if e["status"] == "fail"]
+    wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
-    identity = {"model_hash": model.hash, "c_hash": c_hash(folder / "c")}
+    identity = (model.hash, c_hash(folder / "c"))
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
     if dataset is not None and not barred:
-        replay_dataset(job, entries, chosen, dataset, say)
+        entries = replay_dataset(job, entries, chosen, dataset, say)
     entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
     exact = options.shifted(model)
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     if exhaustive and not barred:
-        errors = [_every_input(job, exact, say) if e["numeric"] == "q31" else e for e in errors]
-    return {
-        "schema": SCHEMA,
-        "gyrotc_version": __version__,
-        "serial": model.serial,
-        "axis": model.axis,
-        **identity,
-        **_counts(entries, [*emitted, *errors, *([signed] if signed else [])], set(targets) - {"all"}),
-        "targets": entries,
-        "log": brought,
-        "options": options.model_dump(mode="json"),
-        "emitted": emitted,
-        "signature": signed,
-        "errors": errors,
-        "error_bound_dph": max(e["bound_dph"] for e in errors),
-        "worst_error_dph": {
-            "value": max(e["worst_dph"] for e in errors),
-            "inputs_visited": max(e["inputs_visited"] for e in errors),
-        },
-    }
+        errors = [_every_input(job, exact, say) if e.numeric == "q31" else e for e in errors]
+    passed, failed, missing = _counts(
+        entries, [*emitted, *errors, *([signed] if signed else [])], set(targets)
+    )
+    return Verification(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        model_hash=identity[0],
+        c_hash=identity[1],
+        passed=passed,
+        failed=failed,
+        missing=missing,
+        targets=tuple(entries),
+        log=brought,
+        options=EmittedWith(numeric=options.numeric, zero_at_c=options.zero_at_c),
+        emitted=tuple(emitted),
+        signature=signed,
+        errors=tuple(errors),
+        error_bound_dph=max(e.bound_dph for e in errors),
+        worst_error_dph=WorstError(
+            value=max(e.worst_dph for e in errors), inputs_visited=max(e.inputs_visited for e in errors)
+        ),
+    )
 
 
 def _choose(names: Sequence[str]) -> list[Target]:
@@ -143,19 +153,18 @@ def _check_edited(names: Sequence[str]) -> None:
             )
 
 
-def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[Entry]:
+def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[VerifiedTarget]:
     """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
     more = f" (and {len(wrong) - 1} more files)" if len(wrong) > 1 else ""
     reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}; --trust-code runs it all the same"
-    entry = {"status": "fail", "error": reason}
     pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
-    return [{"name": name, "numeric": numeric} | entry for name, numeric in pairs]
+    return [VerifiedTarget(name=name, numeric=n, status="fail", error=reason) for name, n in pairs]
 
 
-def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[Entry]:
+def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[VerifiedTarget]:
     """Entries in the order of the targets; compilers and emulators run side by side."""
 
-    def one(target: Target) -> list[Entry]:
+    def one(target: Target) -> list[VerifiedTarget]:
         progress(target.name)
         return board_entries(job, target)
 
@@ -163,34 +172,35 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[E
         return [entry for entries in pool.map(one, targets) for entry in entries]
 
 
-def _earlier(folder: Path, identity: dict[str, str], *, boards_only: bool) -> list[Entry]:
+def _earlier(folder: Path, identity: tuple[str, str], *, boards_only: bool) -> list[VerifiedTarget]:
     """Entries of an earlier `verify.json` that still hold: same model, same code."""
     try:
-        earlier = read_result(folder / "verify.json", "verify", optional=True)
+        earlier = read_optional(folder / "verify.json", Verification)
     except InputError:
         return []
-    same = all(earlier.get(k) == v for k, v in identity.items())
-    return [e for e in earlier["targets"] if "log" in e or not boards_only] if same else []
+    if earlier is None or (earlier.model_hash, earlier.c_hash) != identity:
+        return []
+    return [entry for entry in earlier.targets if entry.log is not None or not boards_only]
 
 
-def _merged(earlier: list[Entry], entries: list[Entry]) -> list[Entry]:
-    new = {(e["name"], e["numeric"]) for e in entries}
-    return [e for e in earlier if (e["name"], e["numeric"]) not in new] + entries
+def _merged(earlier: list[VerifiedTarget], entries: list[VerifiedTarget]) -> list[VerifiedTarget]:
+    new = {(entry.name, entry.numeric) for entry in entries}
+    return [entry for entry in earlier if (entry.name, entry.numeric) not in new] + entries
 
 
-def _counts(entries: list[Entry], checks: list[Entry], named: set[str]) -> dict[str, int]:
+def _counts(
+    entries: Sequence[VerifiedTarget],
+    checks: Sequence[VerifiedFile | MapError | SignatureCheck],
+    named: set[str],
+) -> tuple[int, int, int]:
     """Targets passed, failed, missing. A named target that is missing has failed, and so has a check."""
-    status = [e["status"] for e in entries]
-    absent = sum(e["status"] == "missing" and e["name"] in named for e in entries)
-    wrong = sum(check["status"] == "fail" for check in checks)
-    return {
-        "passed": status.count("pass"),
-        "failed": status.count("fail") + absent + wrong,
-        "missing": status.count("missing"),
-    }
+    status = [entry.status for entry in entries]
+    absent = sum(entry.status == "missing" and entry.name in named for entry in entries)
+    wrong = sum(check.status == "fail" for check in checks)
+    return status.count("pass"), status.count("fail") + absent + wrong, status.count("missing")
 
 
-def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> Entry:
+def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> MapError:
     """Largest departure of the emitted map from the float64 model over the map vectors, and the bound."""
     table = job.tables[numeric]
     inputs = table.decode_inputs(vectors.map_inputs(numeric))
@@ -200,28 +210,28 @@ def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> Entry:
     t, slope = inputs[usable].T
     exact = model.map_dph(t, slope * 60.0 / model.block_s)
     worst = float(np.max(np.abs(got - exact), initial=0.0))
-    return {
-        "numeric": numeric,
-        "status": "pass" if worst <= table.error_bound_dph else "fail",
-        "bound_dph": table.error_bound_dph,
-        "worst_dph": worst,
-        "inputs_visited": int(usable.sum()),
-    }
+    return MapError(
+        numeric=numeric,
+        status="pass" if worst <= table.error_bound_dph else "fail",
+        bound_dph=table.error_bound_dph,
+        worst_dph=worst,
+        inputs_visited=int(usable.sum()),
+    )
 
 
-def _every_input(job: Job, model: Model, progress: Progress) -> Entry:
+def _every_input(job: Job, model: Model, progress: Progress) -> MapError:
     """The same for every input of the fixed-point table."""
     table = job.tables["q31"]
     visited = visit_all(job.c_folder, model, table, trusted=job.trusted, progress=progress)
     sound = visited.mismatches == 0 and visited.worst_dph <= table.error_bound_dph
-    return {
-        "numeric": "q31",
-        "status": "pass" if sound else "fail",
-        "bound_dph": table.error_bound_dph,
-        "worst_dph": visited.worst_dph,
-        "arithmetic_dph": visited.arithmetic_dph,
-        "mean_dph": visited.mean_dph,
-        "inputs_visited": visited.inputs,
-        "mismatches": visited.mismatches,
-        "first_mismatches": list(visited.first),
-    }
+    return MapError(
+        numeric="q31",
+        status="pass" if sound else "fail",
+        bound_dph=table.error_bound_dph,
+        worst_dph=visited.worst_dph,
+        arithmetic_dph=visited.arithmetic_dph,
+        mean_dph=visited.mean_dph,
+        inputs_visited=visited.inputs,
+        mismatches=visited.mismatches,
+        first_mismatches=tuple(visited.first),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import CheckFailed
 from ..model import Model
 from ..reference.table import Table
+from ..results.verification import Cost, FunctionCost, VerifiedTarget
 from .boardlog import BoardOutput, compare, read_output
 from .functions import function_costs
 from .source import board_files, checked_sources
@@ -36,21 +38,22 @@ class Job:
     trusted: bool = False  # the user takes the code of the folder as it is
 
 
-def board_entries(job: Job, target: Target) -> list[dict[str, Any]]:
+def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
     """Entries of `verify.json` for one target, one for each arithmetic."""
     numerics = [n for n in job.tables if n in target.numerics]
     package = target.missing()
     if package is not None:
-        missing = {"name": target.name, "status": "missing"}
-        return [missing | {"numeric": n, "package": package} for n in numerics]
+        return [
+            VerifiedTarget(name=target.name, status="missing", numeric=n, package=package) for n in numerics
+        ]
     with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
         return list(_entries(job, target, numerics, Path(work)))
 
 
-def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[dict[str, Any]]:
+def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
     """Compiles runtime and table once, and a test program for each arithmetic."""
     shared: list[Path] | CheckFailed
-    functions: dict[str, dict[str, dict[str, Any]]] = {}
+    functions: dict[str, dict[str, FunctionCost]] = {}
     files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
     try:
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
@@ -60,26 +63,25 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
-        entry: dict[str, Any] = {
-            "name": target.name,
-            "status": "fail",
-            "numeric": numeric,
-            "compiler": compiler_version(target.compiler),
-            "flags": " ".join(target.all_flags),
-            "table_bytes": job.tables[numeric].table_bytes,
-        }
+        entry = partial(
+            VerifiedTarget,
+            name=target.name,
+            numeric=numeric,
+            compiler=compiler_version(target.compiler),
+            flags=" ".join(target.all_flags),
+            table_bytes=job.tables[numeric].table_bytes,
+        )
+        told: dict[str, Any] = {"functions": functions[numeric]} if numeric in functions else {}
         try:
             if isinstance(shared, CheckFailed):
                 raise shared
-            entry |= _one(job, target, numeric, shared, work, c)
-            if numeric in functions:
-                entry["functions"] = functions[numeric]
+            yield entry(**_ran(job, target, numeric, shared, work, c), **told)
         except CheckFailed as error:
-            entry["error"] = str(error)
-        yield entry
+            yield entry(status="fail", error=str(error))
 
 
-def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path, c: Path) -> dict[str, Any]:
+def _ran(job: Job, target: Target, numeric: str, shared: list[Path], work: Path, c: Path) -> dict[str, Any]:
+    """What a target showed of one arithmetic, by the names of `VerifiedTarget`."""
     defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
     if target.counts:
         defines.append('BOARD_HEADER="board.h"')
@@ -97,7 +99,7 @@ def _one(job: Job, target: Target, numeric: str, shared: list[Path], work: Path,
         "status": "fail" if comparison.mismatches else "pass",
         "vectors": comparison.vectors,
         "mismatches": comparison.mismatches,
-        "first_mismatches": list(comparison.first),
+        "first_mismatches": comparison.first,
         **_costs(target, output),
         **_sizes(target, program, shared),
     }
@@ -132,11 +134,11 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for what, cost in output.costs.items():
         prefix = "" if what == "map" else f"{what}_"
-        found[prefix + target.counts] = {
-            "min": round(cost.low / target.ticks_per_count),
-            "mean": round(cost.total / cost.calls / target.ticks_per_count, 1),
-            "max": round(cost.high / target.ticks_per_count),
-        }
+        found[prefix + target.counts] = Cost(
+            min=round(cost.low / target.ticks_per_count),
+            mean=round(cost.total / cost.calls / target.ticks_per_count, 1),
+            max=round(cost.high / target.ticks_per_count),
+        )
         found[f"{prefix}stack_bytes"] = cost.stack
     return found
 

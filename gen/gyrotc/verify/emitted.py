@@ -11,12 +11,12 @@ import os
 import stat
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from ..emit import Emission, quantise_all
 from ..emit.record import BESIDES, Options, read_options
 from ..errors import CheckFailed, InputError
 from ..model import Model
+from ..results.verification import VerifiedFile
 
 __all__ = ["EDITABLE", "c_hash", "file_entries", "made_again"]
 
@@ -24,8 +24,6 @@ __all__ = ["EDITABLE", "c_hash", "file_entries", "made_again"]
 EDITABLE = frozenset({"main.c"})
 _SHOWN = 160  # characters of a line
 _BEYOND = 2**16  # bytes that are read of a file beyond its right length
-
-Entry = dict[str, Any]
 
 
 def c_hash(c_folder: Path) -> str:
@@ -54,41 +52,32 @@ def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
         return options, quantise_all(model, None)
 
 
-def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()) -> list[Entry]:
+def file_entries(
+    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()
+) -> list[VerifiedFile]:
     """One entry for each file that should be there or is.
 
     Args:
         c_folder: The emitted folder.
         texts: What must lie there, by name.
         edited: Names of `EDITABLE` that may differ, but not be missing.
-
-    Returns:
-        `file`, `verdict` (`equal`, `differs`, `missing`, `foreign`, or `edited` where that is allowed), `status`,
-        `mismatches` (lines or words that differ; 1 for what has none), and where it differs the first place with what
-        stands there and what should.
     """
     return list(_entries(c_folder, texts, edited))
 
 
-def _entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str]) -> Iterator[Entry]:
+def _entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str]) -> Iterator[VerifiedFile]:
     there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
     for name, data in sorted(texts.items()):
         if name not in there:
-            yield _failed(name, "missing")
+            yield VerifiedFile(file=name, verdict="missing", status="fail", mismatches=1)
             continue
         found = _content(c_folder / name, len(data))
         if found == data:
-            yield {"file": name, "verdict": "equal", "status": "pass", "mismatches": 0}
-        elif found is not None and name in edited:
-            yield {"file": name, "verdict": "edited", "status": "pass"} | _difference(name, found, data)
+            yield VerifiedFile(file=name, verdict="equal", status="pass", mismatches=0)
         else:
-            yield _failed(name, "differs") | _difference(name, found, data)
+            yield _differing(name, found, data, allowed=name in edited)
     for name in sorted(there - set(texts) - BESIDES):
-        yield _failed(name, "foreign")
-
-
-def _failed(name: str, verdict: str) -> Entry:
-    return {"file": name, "verdict": verdict, "status": "fail", "mismatches": 1}
+        yield VerifiedFile(file=name, verdict="foreign", status="fail", mismatches=1)
 
 
 def _content(path: Path, length: int) -> bytes | None:
@@ -102,23 +91,27 @@ def _content(path: Path, length: int) -> bytes | None:
         return None
 
 
-def _difference(name: str, found: bytes | None, data: bytes) -> Entry:
+def _differing(name: str, found: bytes | None, data: bytes, *, allowed: bool) -> VerifiedFile:
     """How much differs, and the first place: a line, or a word of an image."""
     if found is None:
-        return {"found": "no regular file that can be read"}
-    if name.endswith(".bin"):
-        kind, got, want = "word", _words(found), _words(data)
-    else:
-        kind, got, want = "line", _lines(found), _lines(data)
+        told = "no regular file that can be read"
+        return VerifiedFile(file=name, verdict="differs", status="fail", mismatches=1, found=told)
+    image = name.endswith(".bin")
+    parts = _words if image else _lines
+    got, want = parts(found), parts(data)
     pairs = zip(got, want, strict=False)
     wrong = [number for number, (a, b) in enumerate(pairs, 1) if a != b]
     first = wrong[0] if wrong else min(len(got), len(want)) + 1
-    places = {"found": got, "expected": want}
-    return {
-        "mismatches": len(wrong) + abs(len(got) - len(want)),
-        kind: first,
-        **{side: parts[first - 1] if first <= len(parts) else "nothing" for side, parts in places.items()},
-    }
+    there, expected = (side[first - 1] if first <= len(side) else "nothing" for side in (got, want))
+    return VerifiedFile(
+        file=name,
+        verdict="edited" if allowed else "differs",
+        status="pass" if allowed else "fail",
+        mismatches=len(wrong) + abs(len(got) - len(want)),
+        found=there,
+        expected=expected,
+        **{"word" if image else "line": first},
+    )
 
 
 def _words(data: bytes) -> list[str]:

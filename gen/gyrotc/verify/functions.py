@@ -11,9 +11,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from ..errors import CheckFailed
+from ..results.verification import FunctionCost
 from .toolchain import Target, compile_objects, symbols
 
 __all__ = ["PUBLIC", "Graph", "function_costs", "parse_graph"]
@@ -81,8 +81,8 @@ def parse_graph(text: str) -> Graph:
     return graph
 
 
-def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, dict[str, Any]]]:
-    """Costs by arithmetic and public function: `code_bytes`, `stack_bytes`, `helpers`; empty without a gcc that tells.
+def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
+    """Costs by arithmetic and public function; empty without a gcc that tells.
 
     Raises:
         CheckFailed: The compiler refused, or a stack has no bound.
@@ -100,15 +100,15 @@ def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict
     }
 
 
-def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, dict[str, Any]]:
-    costs: dict[str, dict[str, Any]] = {}
+def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, FunctionCost]:
+    costs: dict[str, FunctionCost] = {}
     for function in PUBLIC:
         linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
         name = next((n for n in sizes if linked.match(n)), None)
         if name is not None:
-            costs[function] = {
-                "code_bytes": sizes[name],
-                "stack_bytes": graph.deepest(name),
-                "helpers": sorted(graph.helpers(name)),
-            }
+            costs[function] = FunctionCost(
+                code_bytes=sizes[name],
+                stack_bytes=graph.deepest(name),
+                helpers=tuple(sorted(graph.helpers(name))),
+            )
     return costs

@@ -11,6 +11,7 @@ from ..emit.vectors import Vectors
 from ..errors import CheckFailed
 from ..inputs import read_input
 from ..reference import answers
+from ..results.verification import Cost, LogPart, ReadLog, VerifiedTarget
 from .board import Job, check_identity
 from .boardlog import BoardLog, BoardOutput, Comparison, compare, read_log
 
@@ -18,10 +19,8 @@ __all__ = ["log_entries", "log_parts"]
 
 _SHOWN = 5  # lines outside of a board test, differences
 
-Entry = dict[str, Any]
 
-
-def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[Entry], Entry]:
+def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[VerifiedTarget], ReadLog]:
     """Entries of `verify.json`, one for each board and arithmetic, and what the log holds in all.
 
     All parts of an arithmetic are compared; an entry passes only if each of them does.
@@ -38,17 +37,17 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[Entry], Ent
     groups: dict[tuple[str, str], list[tuple[BoardOutput, Comparison]]] = {}
     for part, comparison in compared:
         groups.setdefault((part.board or log.stem, part.numeric), []).append((part, comparison))
-    whole = {
-        "file": log.name,
-        "lines": found.lines,
-        "parts": [
-            {"line": p.line, "numeric": p.numeric, "vectors": c.vectors, "mismatches": c.mismatches}
+    whole = ReadLog(
+        file=log.name,
+        lines=found.lines,
+        parts=tuple(
+            LogPart(line=p.line, numeric=p.numeric, vectors=c.vectors, mismatches=c.mismatches)
             for p, c in compared
-        ],
-        "absent": [n for n in job.tables if all(p.numeric != n for p, _ in compared)],
-        "outside": len(found.outside),
-        "first_outside": [f"line {number}: {line[:80]}" for number, line in found.outside[:_SHOWN]],
-    }
+        ),
+        absent=tuple(n for n in job.tables if all(p.numeric != n for p, _ in compared)),
+        outside=len(found.outside),
+        first_outside=tuple(f"line {number}: {line[:80]}" for number, line in found.outside[:_SHOWN]),
+    )
     return [_entry(job, log, name, parts) for (name, _), parts in groups.items()], whole
 
 
@@ -77,28 +76,34 @@ def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> Comparison:
     return compare(part, answers(table, replace(vectors, n_random=part.random)))
 
 
-def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, Comparison]]) -> Entry:
+def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, Comparison]]) -> VerifiedTarget:
     """What one board showed of one arithmetic; the cost of the calls is that of the last part."""
     mismatches = sum(c.mismatches for _, c in parts)
     several = len(parts) > 1
     first = [f"part at line {p.line}, {text}" if several else text for p, c in parts for text in c.first]
     output = parts[-1][0]
-    entry: Entry = {
-        "name": name,
-        "status": "fail" if mismatches else "pass",
-        "numeric": output.numeric,
-        "compiler": "not known",
-        "flags": "not known",
-        "log": log.name,
-        "parts": len(parts),
-        "table_bytes": job.tables[output.numeric].table_bytes,
-        "vectors": sum(c.vectors for _, c in parts),
-        "mismatches": mismatches,
-        "first_mismatches": first[:_SHOWN],
-    }
+    return VerifiedTarget(
+        name=name,
+        status="fail" if mismatches else "pass",
+        numeric=output.numeric,
+        compiler="not known",
+        flags="not known",
+        log=log.name,
+        parts=len(parts),
+        table_bytes=job.tables[output.numeric].table_bytes,
+        vectors=sum(c.vectors for _, c in parts),
+        mismatches=mismatches,
+        first_mismatches=tuple(first[:_SHOWN]),
+        **_costs(output),
+    )
+
+
+def _costs(output: BoardOutput) -> dict[str, Any]:
+    """Ticks and stack of the calls, by the names of `VerifiedTarget`."""
+    found: dict[str, Any] = {}
     for what, cost in output.costs.items():
         prefix = "" if what == "map" else f"{what}_"
         mean = round(cost.total / cost.calls, 1)
-        entry[f"{prefix}ticks"] = {"min": cost.low, "mean": mean, "max": cost.high}
-        entry[f"{prefix}stack_bytes"] = cost.stack
-    return entry
+        found[f"{prefix}ticks"] = Cost(min=cost.low, mean=mean, max=cost.high)
+        found[f"{prefix}stack_bytes"] = cost.stack
+    return found

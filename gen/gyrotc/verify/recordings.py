@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from ..dataset import Dataset
 from ..errors import CheckFailed
 from ..reference.table import Table
+from ..results.verification import ReplayedRows, VerifiedTarget
 from .board import Job
 from .replay import History, history_of, replay_on, replay_program
 from .toolchain import Target
@@ -52,18 +52,18 @@ class _Lane:
 
 def replay_dataset(
     job: Job,
-    entries: Sequence[dict[str, Any]],
+    entries: Sequence[VerifiedTarget],
     targets: Sequence[Target],
     dataset: Dataset,
     progress: Callable[[str], None],
-) -> None:
-    """Replays every run on every target whose board test ran; adds `replayed` to its entry."""
+) -> list[VerifiedTarget]:
+    """Replays every run on every target whose board test ran; the entries, with `replayed` in theirs."""
     with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         lanes = {}
-        for entry in entries:
-            target = next((t for t in targets if t.name == entry["name"]), None)
-            if target is not None and entry["status"] != "missing" and target.reads_input:
-                lanes[id(entry)] = _Lane(target, job.tables[entry["numeric"]])
+        for number, entry in enumerate(entries):
+            target = next((t for t in targets if t.name == entry.name), None)
+            if target is not None and entry.status != "missing" and target.reads_input:
+                lanes[number] = _Lane(target, job.tables[entry.numeric])
         for lane in lanes.values():
             try:
                 lane.program = stack.enter_context(
@@ -78,19 +78,16 @@ def replay_dataset(
                 history = history_of(rows, run, job.model, table)
                 same = [lane for lane in lanes.values() if lane.table is table]
                 list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
-    for entry in entries:
-        if id(entry) in lanes:
-            _enter(entry, lanes[id(entry)])
+    return [_entered(entry, lanes.get(number)) for number, entry in enumerate(entries)]
 
 
-def _enter(entry: dict[str, Any], lane: _Lane) -> None:
-    entry["replayed"] = {
-        "runs": lane.runs,
-        "rows": lane.rows,
-        "mismatches": lane.mismatches,
-        "first_mismatches": lane.first,
-    }
+def _entered(entry: VerifiedTarget, lane: _Lane | None) -> VerifiedTarget:
+    if lane is None:
+        return entry
+    replayed = ReplayedRows(
+        runs=lane.runs, rows=lane.rows, mismatches=lane.mismatches, first_mismatches=tuple(lane.first)
+    )
     if lane.error is not None:
-        entry["replayed"]["error"] = lane.error
-    if lane.error is not None or lane.mismatches:
-        entry["status"] = "fail"
+        replayed = replayed.model_copy(update={"error": lane.error})
+    status = "fail" if lane.error is not None or lane.mismatches else entry.status
+    return entry.model_copy(update={"replayed": replayed, "status": status})

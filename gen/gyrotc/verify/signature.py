@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..emit.record import RECORD, SIGNATURE
 from ..errors import InputError
 from ..outputs import write_atomically
+from ..results.verification import SignatureCheck
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
@@ -35,20 +36,25 @@ def sign_record(c_folder: Path, key: Ed25519PrivateKey) -> Path:
     return path
 
 
-def check_signature(c_folder: Path, key: Ed25519PublicKey) -> dict[str, Any]:
-    """Whether the record's signature is of this key: `file`, `status`, `key` (SHA-256 of its 32 bytes), `reason`."""
+def check_signature(c_folder: Path, key: Ed25519PublicKey) -> SignatureCheck:
+    """Whether the record's signature is of this key."""
     from cryptography.exceptions import InvalidSignature
 
-    entry = {"file": SIGNATURE, "status": "fail", "key": hashlib.sha256(key.public_bytes_raw()).hexdigest()}
+    reason = None
     try:
         record = _bytes(c_folder / RECORD, 2**20, "")
         signature = _bytes(c_folder / SIGNATURE, _LENGTH, "")
         key.verify(signature, record)
     except InputError as error:
-        return entry | {"reason": str(error)}
+        reason = str(error)
     except InvalidSignature:
-        return entry | {"reason": "not a signature of this record by this key"}
-    return entry | {"status": "pass", "reason": None}
+        reason = "not a signature of this record by this key"
+    return SignatureCheck(
+        file=SIGNATURE,
+        status="fail" if reason else "pass",
+        key=hashlib.sha256(key.public_bytes_raw()).hexdigest(),
+        reason=reason,
+    )
 
 
 def load_public_key(path: Path) -> Ed25519PublicKey:

@@ -10,6 +10,7 @@ from ...errors import CheckFailed, GyrotcError, InputError
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ...results.evaluation import Evaluation
+from ...results.verification import Verification
 from ..build import build_into
 from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
@@ -107,7 +108,7 @@ def _built(task: Task) -> Entry:
     return entry | {"aside": aside} if aside else entry
 
 
-def _figures(model: Model, evaluation: Evaluation, verification: Entry) -> Entry:
+def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> Entry:
     """What the summary shows and outliers are sought in."""
     role, judged = evaluation.judged() or (None, None)
     floor = evaluation.noise_floor_dph
@@ -123,7 +124,7 @@ def _figures(model: Model, evaluation: Evaluation, verification: Entry) -> Entry
         "centers": model.n_centers,
         "table_bytes": evaluation.model.table_bytes,
         "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
-        "error_bound_dph": verification["error_bound_dph"],
+        "error_bound_dph": verification.error_bound_dph,
         "findings": [finding.id for finding in evaluation.findings],
         "model_hash": model.hash,
     }
