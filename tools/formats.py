@@ -22,6 +22,7 @@ from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.limits import HeldLimits
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.planned import Plan
+from gyrotc.results.training import Training
 from gyrotc.results.truth import SimulatedTruth
 from gyrotc.results.verification import JointVerification, Verification
 from pydantic import BaseModel
@@ -40,6 +41,7 @@ RESULTS: dict[str, type[Numbered]] = {
     "limits": HeldLimits,
     "manifest": Manifest,
     "plan": Plan,
+    "training": Training,
     "truth": SimulatedTruth,
     "verify": Verification,
     "verify-axes": JointVerification,

@@ -35,6 +35,7 @@ from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.planned import Plan
+from gyrotc.results.training import DeclaredUnits
 from gyrotc.simulate import read as read_scenario
 from gyrotc.simulate import simulate
 from gyrotc.simulate.truth import simulated_floor
@@ -123,7 +124,7 @@ def make_seeds(folder: Path) -> None:
     out = folder / "result"
     fitted = fit_dataset(dataset, FitOptions())
     fitted.model.save(out / "model.json")
-    (out / "training.json").write_text(json.dumps(fitted.training))
+    (out / "training.json").write_text(json.dumps(fitted.training.content()))
     emit(fitted.model, out)
     verification = verify(out, compiled=False)
     evaluation = evaluate(out, dataset, trace=out / "trace", training=fitted.training, compiled=False)
@@ -133,7 +134,7 @@ def make_seeds(folder: Path) -> None:
     held = held_against(load_limits(folder / "limits.toml"), fitted.model, evaluation, verification)
     manifest = Manifest(
         gyrotc_version="0.1.0", serial="A", axis=None, model_hash="00", refused={"q31": "x"}, meta={},
-        units={}, sources=(), versions={"numpy": "2"}, files={"c/gtc.h": "00"},
+        units=DeclaredUnits(declared={}, trusted=()), sources=(), versions={"numpy": "2"}, files={"c/gtc.h": "00"},
     )  # fmt: skip
     changes = changes_since(Earlier(out), fitted.model, evaluation, manifest)
     for name, content in (

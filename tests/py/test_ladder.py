@@ -206,7 +206,7 @@ def test_where_touching_spans_are_cut_changes_nothing_that_matters(tmp_path: Pat
 
 def close(whole: Fitted, parts: Fitted) -> None:
     assert parts.model.method == whole.model.method
-    for a, b in zip(whole.training["ladder"], parts.training["ladder"], strict=True):
+    for a, b in zip(*(f.training.content()["ladder"] for f in (whole, parts)), strict=True):
         assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=0.02), a["id"]
     e = whole.model.envelope
     t, r = np.meshgrid(np.linspace(*e.temperature_c, 21), np.linspace(*e.slope_c_per_min, 11))
@@ -231,7 +231,7 @@ def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path
     moved = cut_at(tmp_path / "moved", table | {"rate_dph": table["rate_dph"] + 1e4}, [])
     later = cut_at(tmp_path / "later", table | {"time_s": table["time_s"] + 4096.0}, [])
     assert moved.model.method == later.model.method == whole.model.method
-    for row, a, b in zip(*(f.training["ladder"] for f in (whole, moved, later)), strict=True):
+    for row, a, b in zip(*(f.training.content()["ladder"] for f in (whole, moved, later)), strict=True):
         if row["id"] != "nothing":
             assert a["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
         assert b["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]

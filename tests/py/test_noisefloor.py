@@ -20,9 +20,9 @@ def test_white_noise_is_angle_random_walk_alone() -> None:
     arw = 0.002
     sigma = arw / np.sqrt(STEP_S / 3600.0)
     terms = noise_terms([sigma * r for r in runs()], STEP_S)
-    assert terms["arw_deg_per_sqrt_h"] == pytest.approx(arw, rel=0.03), f"seed {SEED}"
-    assert terms["bias_instability_dph"] < 0.05 * sigma
-    assert terms["allan"][0]["deviation_dph"] == pytest.approx(sigma, rel=0.02)
+    assert terms.arw_deg_per_sqrt_h == pytest.approx(arw, rel=0.03), f"seed {SEED}"
+    assert terms.bias_instability_dph is not None and terms.bias_instability_dph < 0.05 * sigma
+    assert terms.allan[0].deviation_dph == pytest.approx(sigma, rel=0.02)
 
 
 def test_rate_random_walk_is_found_beside_white_noise() -> None:
@@ -32,7 +32,7 @@ def test_rate_random_walk_is_found_beside_white_noise() -> None:
     step = walk * np.sqrt(STEP_S / 3600.0)
     made = [sigma * r + np.cumsum(rng.normal(0.0, step, len(r))) for r in runs()]
     terms = noise_terms(made, STEP_S)
-    assert terms["rate_random_walk_dph_per_sqrt_h"] == pytest.approx(walk, rel=0.15), f"seed {SEED}"
+    assert terms.rate_random_walk_dph_per_sqrt_h == pytest.approx(walk, rel=0.15), f"seed {SEED}"
 
 
 def test_quantisation_is_found() -> None:
@@ -43,13 +43,13 @@ def test_quantisation_is_found() -> None:
     rate = np.diff(counted - angle) / STEP_S
     terms = noise_terms([rate], STEP_S)
     # A dithered floor has an error of variance q²/6, twice that of rounding: Q = q/√6.
-    assert terms["quantisation_arcsec"] == pytest.approx(quantum / np.sqrt(6.0), rel=0.05), f"seed {SEED}"
+    assert terms.quantisation_arcsec == pytest.approx(quantum / np.sqrt(6.0), rel=0.05), f"seed {SEED}"
 
 
 def test_terms_scale_with_the_rate() -> None:
     one = noise_terms(runs(2), STEP_S)
     ten = noise_terms([10.0 * r for r in runs(2)], STEP_S)
-    assert ten["arw_deg_per_sqrt_h"] == pytest.approx(10.0 * one["arw_deg_per_sqrt_h"])
+    assert ten.arw_deg_per_sqrt_h == pytest.approx(10.0 * (one.arw_deg_per_sqrt_h or 0.0))
 
 
 def test_the_deviation_is_that_of_allantools() -> None:
@@ -79,21 +79,21 @@ def test_stretches_end_at_gaps_and_runs() -> None:
 
 def test_a_short_record_has_no_terms() -> None:
     terms = noise_terms([np.zeros(5)], STEP_S)
-    assert terms["arw_deg_per_sqrt_h"] is None
-    assert terms["allan"] == []
+    assert terms.arw_deg_per_sqrt_h is None
+    assert terms.allan == ()
 
 
 def test_sensitivities_of_a_plane() -> None:
     rng = np.random.default_rng(SEED)
     t, r = rng.uniform(-40.0, 60.0, 500), rng.uniform(-5.0, 5.0, 500)
     found = sensitivities(t, r, 0.007 + 1e-5 * t - 2e-4 * r, rng.uniform(1.0, 5.0, 500))
-    assert found["bias_dph_per_c"] == pytest.approx(1e-5)
-    assert found["bias_dph_per_c_per_min"] == pytest.approx(-2e-4)
-    assert found["residual_rms_dph"] == pytest.approx(0.0, abs=1e-12)
+    assert found.bias_dph_per_c == pytest.approx(1e-5)
+    assert found.bias_dph_per_c_per_min == pytest.approx(-2e-4)
+    assert found.residual_rms_dph == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_constant_temperature_has_no_slope() -> None:
     found = sensitivities(np.full(50, 25.0), np.zeros(50), np.arange(50.0), np.ones(50))
-    assert found["bias_dph_per_c"] is None
-    assert found["bias_dph_per_c_per_min"] is None
-    assert found["residual_rms_dph"] == pytest.approx(np.arange(50.0).std())
+    assert found.bias_dph_per_c is None
+    assert found.bias_dph_per_c_per_min is None
+    assert found.residual_rms_dph == pytest.approx(np.arange(50.0).std())

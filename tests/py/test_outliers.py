@@ -55,18 +55,18 @@ def test_ten_spikes_cost_less_than_a_hundredth_of_the_floor(tmp_path: Path, clea
     at = np.arange(1, 11) * 2600
     table["rate_dph"][at] += 5.0
     spiked = fitted(tmp_path / "R", table)
-    floor = clean.training["noise_floor_dph"]
-    print("departure in floors", departure(spiked, clean) / floor, "centers", spiked.training["centers"])
+    floor = clean.training.noise_floor_dph
+    print("departure in floors", departure(spiked, clean) / floor, "centers", spiked.training.centers)
     assert departure(spiked, clean) < 0.01 * floor
-    assert abs(spiked.training["noise_floor_dph"] / floor - 1.0) < 0.01
-    assert spiked.training["centers"] == clean.training["centers"]
-    told = spiked.training["outliers"]
+    assert abs(spiked.training.noise_floor_dph / floor - 1.0) < 0.01
+    assert spiked.training.centers == clean.training.centers
+    told = spiked.training.content()["outliers"]
     assert told["rows"] == 10
     assert [s["from_s"] for s in told["stretches"]] == at.tolist()
     [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "rate_outliers"]
     line = doubt.text[doubt.text.index("exclude = ") :]
     again = fitted(tmp_path / "R", table, f"{RUN}\n{line}")  # pasted as it is offered
-    assert again.training["outliers"]["rows"] == 0
+    assert again.training.content()["outliers"]["rows"] == 0
     assert "rate_outliers" not in {d.id for d in check(tmp_path / "R").doubts}
 
 
@@ -74,12 +74,12 @@ def test_a_burst_is_left_out_whole(tmp_path: Path, clean: Fitted) -> None:
     table = cycle()
     table["rate_dph"][9000:9015] += np.random.default_rng(3).normal(0.0, 20.0, 15)
     burst = fitted(tmp_path / "R", table)
-    assert 14 <= burst.training["outliers"]["rows"] <= 30
-    assert departure(burst, clean) < 0.1 * clean.training["noise_floor_dph"]
+    assert 14 <= burst.training.content()["outliers"]["rows"] <= 30
+    assert departure(burst, clean) < 0.1 * clean.training.noise_floor_dph
 
 
 def test_a_clean_recording_loses_nothing(clean: Fitted) -> None:
-    assert clean.training["outliers"] == {"rows": 0, "share": 0.0, "stretches": []}
+    assert clean.training.content()["outliers"] == {"rows": 0, "share": 0.0, "stretches": []}
 
 
 NOISES: dict[str, Callable[[np.random.Generator, int], Floats]] = {
@@ -112,7 +112,7 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
     table["temperature_c"][15_000:15_004] = np.nan
     run = f'{RUN}\nexclude = [{{from_s = 90.0, to_s = 140.0, reason = "no lock"}}]'
     result = fitted(tmp_path / "R", table, run)
-    assert departure(result, clean) < 0.2 * clean.training["noise_floor_dph"]
+    assert departure(result, clean) < 0.2 * clean.training.noise_floor_dph
     assert check(tmp_path / "R").problems == ()
     [run_of] = load(tmp_path / "R").runs
     assert len(run_of.rows()) == ROWS - 4

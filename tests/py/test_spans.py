@@ -103,7 +103,7 @@ def test_three_runs_are_left_out_whole() -> None:
 def test_what_was_cut_can_be_printed_and_recorded() -> None:
     span = training_spans(runs(1), profile((50, 30.0)))[1]
     assert str(span) == "0.csv 600 ... 1200 s (part)"
-    assert span.to_dict() == {
+    assert span.result().content() == {
         "file": "0.csv",
         "from_s": 600.0,
         "to_s": 1200.0,

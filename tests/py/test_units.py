@@ -158,7 +158,7 @@ def test_kelvin_is_refused_with_its_unit(tmp_path: Path) -> None:
 
 def test_what_is_trusted_stands_in_training_json(tmp_path: Path) -> None:
     folder = made(tmp_path / "R", dps(columns(600)), head=HEAD + "trust_units = true\n")
-    training = fit_dataset(load(folder), FitOptions(centers=0)).training
+    training = fit_dataset(load(folder), FitOptions(centers=0)).training.content()
     assert training["units"]["declared"] == {}
     assert "white noise" in training["units"]["trusted"][0]
     assert json.dumps(training)

@@ -12,6 +12,7 @@ from ..pages.published import ENVIRONMENTS
 from ..results.changes import Changes
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
+from ..results.training import Training
 from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
 
 
@@ -41,33 +42,31 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
     return _e(part.before.rms_dph), _e(part.after.rms_dph), _e(part.after.std_dph)
 
 
-def span_lines(training: dict[str, Any]) -> Iterator[str]:
+def span_lines(training: Training) -> Iterator[str]:
     """What was cut where there are fewer than three training runs."""
-    spans = training["spans"]
+    spans = training.spans
     if spans:
         yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
         for s in spans:
-            yield f"  {s['file']}: {s['from_s']:.6g} ... {s['to_s']:.6g} s ({s['kind']}, gap {s['guard_s']:g} s)"
+            yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
 
 
-def ladder_lines(training: dict[str, Any]) -> Iterator[str]:
+def ladder_lines(training: Training) -> Iterator[str]:
     """Which correction was chosen, why, and what each leaves on history that it has not seen."""
-    if training.get("ladder"):
-        yield f"correction {training['method']}: {training['reason']}"
+    if training.ladder:
+        yield f"correction {training.method}: {training.reason}"
         tried = (
-            f"{r['id']} {r['left_out_rms_dph']:.3g}"
-            for r in training["ladder"]
-            if r["left_out_rms_dph"] is not None
+            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.ladder if r.left_out_rms_dph is not None
         )
         yield f"  left-out RMS, deg/h: {', '.join(tried)}"
 
 
-def prediction_line(training: dict[str, Any]) -> str:
+def prediction_line(training: Training) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
-    ratio = training["predicted_rms_ratio"]
-    floor = f"noise floor {training['noise_floor_dph']:.3g} deg/h"
+    ratio = training.predicted_rms_ratio
+    floor = f"noise floor {training.noise_floor_dph:.3g} deg/h"
     if ratio is None:
-        return f"{floor}; no prediction of RMS over it: {training['prediction_withheld']}"
+        return f"{floor}; no prediction of RMS over it: {training.prediction_withheld}"
     return f"{floor}; predicted RMS over it: {ratio:.4f}"
 
 

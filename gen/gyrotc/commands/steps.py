@@ -76,12 +76,12 @@ def fit(
         stage.of(recordings.serial, recordings.axis)
         fitted = fit_dataset(recordings, options, progress=say)
         fitted.model.save(stage.folder / "model.json")
-        write_atomically(stage.folder / "training.json", json_text(fitted.training))
-    write_json(json_file, fitted.training)
+        write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
+    write_json(json_file, fitted.training.content())
     for line in (*span_lines(fitted.training), *ladder_lines(fitted.training)):
         tell(line)
-    for finding in fitted.training["findings"]:
-        tell(f"finding {finding['id']}: {finding['text']}")
+    for finding in fitted.training.findings:
+        tell(f"finding {finding.id}: {finding.text}")
     tell(prediction_line(fitted.training))
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
 

@@ -12,6 +12,7 @@ from .. import __version__
 from ..dataset import Dataset
 from ..metrics import LEAST_SPAN_C
 from ..model import Model
+from ..results.training import Training
 from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
 from ..train.spans import training_spans
@@ -54,7 +55,7 @@ class Diagnosis:
     analysis: Analysis | None
     extension: Extension | None
     model: Model | None
-    training: dict[str, Any] | None = None
+    training: Training | None = None
     cycle: Cycle | None = None
 
 
@@ -381,7 +382,7 @@ def _sentence(result: dict[str, Any]) -> str:
 
 def _extended_model(
     dataset: Dataset, extension: Extension, options: FitOptions
-) -> tuple[Model, dict[str, Any]] | tuple[None, None]:
+) -> tuple[Model, Training] | tuple[None, None]:
     """The model file of the extension, and what training says of it."""
     if extension.extended is None:
         return None, None

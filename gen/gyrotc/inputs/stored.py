@@ -7,92 +7,18 @@ through a page. Fields that nothing reads are let through.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from ..errors import InputError
 from . import checked, read_json
 
 __all__ = ["KINDS", "Kind", "checked_result", "read_result"]
 
-Figure = Annotated[float, Field(ge=-1e300, le=1e300)] | None
-Count = Annotated[int, Field(ge=0)]
-
 
 class _Stored(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
-
-
-class _Statistics(_Stored):
-    rms_dph: Figure
-    std_dph: Figure
-    mean_dph: Figure
-    max_abs_dph: Figure
-
-
-class _Pooled(_Stored):
-    samples: Count
-    before: _Statistics
-    after: _Statistics
-    improvement: Figure
-
-
-class _Finding(_Stored):
-    id: str
-    text: str
-
-
-class _AllanPoint(_Stored):
-    tau_s: Annotated[float, Field(gt=0.0, le=1e12)]
-    deviation_dph: Annotated[float, Field(ge=0.0, le=1e12)]
-    freedom: Annotated[float, Field(gt=0.0, le=1e12)]
-
-
-class _Noise(_Stored):
-    quantisation_arcsec: Figure
-    arw_deg_per_sqrt_h: Figure
-    bias_instability_dph: Figure
-    rate_random_walk_dph_per_sqrt_h: Figure
-    allan: list[_AllanPoint]
-
-
-class _Rung(_Stored):
-    id: str
-    left_out_rms_dph: Figure
-    standard_error_dph: Figure
-    beats_constant: bool
-    chosen: bool
-    refused: str | None = None
-
-
-class _LeftOut(_Stored):
-    file: str
-    from_s: float
-    to_s: float
-    rows: Annotated[int, Field(ge=1)]
-
-
-class _Outliers(_Stored):
-    rows: Annotated[int, Field(ge=0)] = 0
-    share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    stretches: list[_LeftOut] = []
-
-
-class _Training(_Stored):
-    ladder: list[_Rung] = []
-    reason: str = ""
-    generalises: bool | None = None
-    findings: list[_Finding] = []
-    predicted_rms_ratio: Figure = None
-    prediction_withheld: str | None = None
-    noise_floor_dph: Figure
-    left_out: _Pooled | None = None
-    left_out_spans: list[_Pooled | None] = []
-    outliers: _Outliers = _Outliers()
-    noise: _Noise
-    sensitivity: dict[str, Figure]
-    curves: dict[str, Any]
 
 
 class _Diagnosis(_Stored):
@@ -104,10 +30,9 @@ class _Diagnosis(_Stored):
     pictures: list[str] = []
 
 
-Kind = Literal["training", "diagnose"]
+Kind = Literal["diagnose"]
 
 KINDS: dict[Kind, tuple[type[BaseModel], str | None]] = {
-    "training": (_Training, "gyrotc.fit/1"),
     "diagnose": (_Diagnosis, "gyrotc.diagnose/1"),
 }
 """Fields and schema of every kind."""

@@ -24,6 +24,7 @@ from ..results.changes import Changes
 from ..results.evaluation import Evaluation
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
+from ..results.training import Training
 from ..results.verification import Verification
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
@@ -45,7 +46,7 @@ class Built:
     """
 
     model: Model
-    training: dict[str, Any]
+    training: Training
     evaluation: Evaluation
     verification: Verification
     refused: dict[str, str]
@@ -152,7 +153,7 @@ def _build_axis(
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)
     fitted.model.save(work / "model.json")
-    _write(work / "training.json", fitted.training)
+    _write(work / "training.json", fitted.training.content())
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics)
     verification = verify(work, compiled=order.compiled, progress=lambda name: say(f"verifying {name}"))

@@ -167,7 +167,7 @@ def _look(run: Run) -> tuple[RunFacts, tuple[str, str] | None, list[Doubt]]:
     if not stretches:
         return f, None, copied
     shown = ", ".join(
-        f'{{from_s = {s["from_s"]!r}, to_s = {s["to_s"]!r}, reason = "outlier"}}' for s in stretches[:_LINES]
+        f'{{from_s = {s.from_s!r}, to_s = {s.to_s!r}, reason = "outlier"}}' for s in stretches[:_LINES]
     )
     more = f" ({len(stretches) - _LINES} more stretches)" if len(stretches) > _LINES else ""
     text = (

@@ -6,11 +6,10 @@ noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,19 +20,19 @@ from .. import __version__
 from ..dataset import Dataset, Rows, Run, RunFacts, facts_of
 from ..emit import emitted_tables
 from ..errors import CheckFailed, GyrotcError
-from ..inputs.stored import read_result
 from ..metrics import Averages, average, pooled, statistics, time_statistics
 from ..model import Model, load_model
 from ..quantise import Table
+from ..results.base import read_result
 from ..results.evaluation import (
     EvaluatedRun,
     Evaluation,
     FoundIn,
     ModelSizes,
-    Pooled,
     RunStatistics,
     Statistics,
 )
+from ..results.training import Training
 from ..simulate.truth import simulated_floor
 from ..texts import file_stem
 from ..verify.footprint import Footprint, footprint
@@ -80,7 +79,7 @@ def evaluate(
     numeric: str | None = None,
     average_s: float | None = None,
     trace: Path | None = None,
-    training: Mapping[str, Any] | None = None,
+    training: Training | None = None,
     compiled: bool = True,
     trust_code: bool = False,
     progress: Progress | None = None,
@@ -91,7 +90,7 @@ def evaluate(
         numeric: Arithmetic to run; default the first emitted one.
         average_s: Averaging of all RMS figures; default the model's.
         trace: Folder for one CSV per run.
-        training: The object of `training.json`; default that of `folder`, where it was made from these
+        training: What `training.json` says; default that of `folder`, where it was made from these
             recordings. Without an exam run its figures of spans left out count.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
@@ -120,22 +119,22 @@ def evaluate(
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
     if result.exam is None and training:
-        left_out = training.get("left_out")
-        result = result.model_copy(update={"left_out": Pooled.model_validate(left_out) if left_out else None})
-    generalises = training.get("generalises") if training else None
-    rows_left_out = (training or {}).get("outliers", {}).get("rows")
+        result = result.model_copy(update={"left_out": training.left_out})
+    generalises = training.generalises if training else None
+    outliers = training.outliers if training else None
+    rows_left_out = outliers.rows if outliers else None
     result = result.model_copy(update={"generalises": generalises, "rows_left_out": rows_left_out})
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 
 
-def _training_of(folder: Path, dataset: Dataset, model: Model) -> Mapping[str, Any] | None:
+def _training_of(folder: Path, dataset: Dataset, model: Model) -> Training | None:
     """What `fit` wrote into the folder, where these are the recordings that it was made from."""
     known = {(d.file, d.sha256) for d in model.data}
     path = folder / "training.json"
     if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
         return None
-    return read_result(path, "training")
+    return read_result(path, Training)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..dataset import Dataset, RunFacts, earth_rate_warning
 from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA
 from ..model import Model
+from ..results.training import Training
 from .recorded import shared_rows_findings, sign_findings
 
 __all__ = [
@@ -51,7 +52,7 @@ def findings_of(
     facts: Sequence[RunFacts],
     model: Model,
     result: Mapping[str, Any],
-    training: Mapping[str, Any] | None = None,
+    training: Training | None = None,
 ) -> list[Finding]:
     """All findings, the gravest first.
 
@@ -59,7 +60,7 @@ def findings_of(
         facts: What was seen in each run that was evaluated.
         model: The model that was evaluated.
         result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
-        training: The object of `training.json`, for figures of spans left out of training.
+        training: What `training.json` says, for figures of spans left out of training.
     """
     found = [*temperature_findings(facts)]
     if not found:
@@ -223,19 +224,22 @@ def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator
         yield _finding("earth_rate_not_stated", warning, mean_dph=mean)
 
 
-def _of_training(training: Mapping[str, Any] | None) -> Iterator[Finding]:
+def _of_training(training: Training | None) -> Iterator[Finding]:
     """What the choice of the correction found; `fit` wrote it."""
-    for finding in training.get("findings", ()) if training else ():
-        if finding["id"] in _OF_TRAINING:
-            yield dict(finding)
+    for finding in training.findings if training else ():
+        if finding.id in _OF_TRAINING:
+            yield finding.content()
 
 
-def _unseen(result: Mapping[str, Any], training: Mapping[str, Any] | None) -> Iterator[Finding]:
+def _unseen(result: Mapping[str, Any], training: Training | None) -> Iterator[Finding]:
     """The residual on runs or spans that were not trained on, against that of training and the noise."""
     seen, floor = _rms(result.get("train")), result.get("noise_floor_dph")
-    left_out = training.get("left_out") if training else None
-    for name, pooled in (("exam runs", result.get("exam")), ("spans left out in turn", left_out)):
-        rms = _rms(pooled)
+    left_out = training.left_out if training else None
+    unseen = (
+        ("exam runs", _rms(result.get("exam"))),
+        ("spans left out in turn", left_out.after.rms_dph if left_out else None),
+    )
+    for name, rms in unseen:
         if rms is None or seen is None or rms <= _UNSEEN_TO_SEEN * seen:
             continue
         if floor is None or rms > _UNSEEN_TO_FLOOR * floor:
@@ -247,7 +251,7 @@ def _unseen(result: Mapping[str, Any], training: Mapping[str, Any] | None) -> It
                 unseen_rms_dph=rms,
                 train_rms_dph=seen,
                 noise_floor_dph=floor,
-                spans=[_rms(span) for span in training.get("left_out_spans", ())] if training else [],
+                spans=[span.after.rms_dph for span in training.left_out_spans] if training else [],
             )
             return
 

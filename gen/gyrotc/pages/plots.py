@@ -20,6 +20,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..metrics import Averages
 from ..model import Model
+from ..results.training import NoiseTerms, Training
 from ..texts import checked_svg, picture_text
 
 __all__ = [
@@ -159,9 +160,9 @@ def _hatch_uncovered(ax: Axes, model: Model) -> None:
         )
 
 
-def curve_by_size(training: dict[str, Any]) -> str | None:
+def curve_by_size(training: Training) -> str | None:
     """What each further center brings: error left over the number of centers, the chosen one marked."""
-    curves = training["curves"]
+    curves = training.curves
     sizes = curves.get("sizes") or []
     if len(sizes) < 2:
         return None
@@ -196,14 +197,14 @@ _CURVES = (
 )
 
 
-def allan_deviation(noise: dict[str, Any]) -> str | None:
+def allan_deviation(noise: NoiseTerms) -> str | None:
     """Allan deviation over averaging time, with its uncertainty and the line of the angle random walk."""
-    points = [p for p in noise["allan"] if p["deviation_dph"] > 0.0]
+    points = [p for p in noise.allan if p.deviation_dph > 0.0]
     if len(points) < 2:
         return None
-    tau = np.array([p["tau_s"] for p in points])
-    value = np.array([p["deviation_dph"] for p in points])
-    spread = value / np.sqrt(2.0 * np.array([p["freedom"] for p in points]))
+    tau = np.array([p.tau_s for p in points])
+    value = np.array([p.deviation_dph for p in points])
+    spread = value / np.sqrt(2.0 * np.array([p.freedom for p in points]))
     with mpl.rc_context(STYLE):
         figure = _figure(10.0, 2.8)
         ax = figure.subplots()
@@ -211,7 +212,7 @@ def allan_deviation(noise: dict[str, Any]) -> str | None:
         ax.errorbar(
             tau, value, yerr=(low, spread), fmt="o-", color=AFTER, markersize=3.5, linewidth=1.0, capsize=2
         )
-        walk = noise["arw_deg_per_sqrt_h"]
+        walk = noise.arw_deg_per_sqrt_h
         if walk:
             ax.plot(
                 tau,

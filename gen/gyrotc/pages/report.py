@@ -24,6 +24,7 @@ from ..results.changes import Changes
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
+from ..results.training import Training
 from ..results.verification import Verification
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
@@ -48,7 +49,7 @@ def write_report(folder: Path) -> Path:
     """
     model = load_model(folder / "model.json")
     evaluation = read_result(folder / "evaluate.json", Evaluation)
-    training = read_stored(folder / "training.json", "training", optional=True)
+    training = read_optional(folder / "training.json", Training)
     beside = {
         "verification": read_optional(folder / "verify.json", Verification),
         "manifest": read_optional(folder / "manifest.json", Manifest),
@@ -125,22 +126,23 @@ def _judged(evaluation: Evaluation) -> tuple[str, Pooled | None]:
 
 
 def _pictures(
-    folder: Path, model: Model, evaluation: Evaluation, training: dict[str, Any]
+    folder: Path, model: Model, evaluation: Evaluation, training: Training | None
 ) -> dict[str, str | None]:
     runs, left_out = [], []
-    stretches = ((training or {}).get("outliers") or {}).get("stretches", [])
+    outliers = training.outliers if training else None
+    stretches = outliers.stretches if outliers else ()
     for run in evaluation.runs:
         averages = _trace(folder / "trace", run, evaluation.average_s)
         if averages is not None and averages.time_s.size:
             runs.append((run.environment or run.file, run.role, averages))
-            mine = [s["from_s"] for s in stretches if s["file"] == run.file and run.role == "train"]
+            mine = [s.from_s for s in stretches if s.file == run.file and run.role == "train"]
             first, last = averages.time_s[0], averages.time_s[-1]
             left_out.append([t for t in mine if first <= t <= last])
     return {
         "bias": bias_over_time(runs, left_out) if runs else None,
         "map": map_with_centers(model),
         "curve": curve_by_size(training) if training else None,
-        "allan": allan_deviation(training["noise"]) if training.get("noise") else None,
+        "allan": allan_deviation(training.noise) if training else None,
     }
 
 

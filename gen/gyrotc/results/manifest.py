@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from .base import Axis, Result
+from .training import DeclaredUnits
 
 __all__ = ["Manifest"]
 
@@ -21,6 +22,6 @@ class Manifest(Result):
     refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
     versions: dict[str, str] = Field(description="programs that it was made with")
     meta: dict[str, Any] = Field(description="`[meta]` of the data set")
-    units: dict[str, Any] = Field(description="units of the columns, as declared")
+    units: DeclaredUnits = Field(description="of the recordings")
     sources: tuple[Any, ...] = Field(description="`[source]` of recordings that were imported")
     files: dict[str, str] = Field(description="SHA-256 of every file, by its path in the folder")

@@ -20,6 +20,8 @@ from ..errors import InputError
 from ..frontend import Blocks, run_blocks
 from ..metrics import Averages, pooled
 from ..model import Model
+from ..results.evaluation import FoundIn
+from ..results.training import DeclaredUnits, LeftOutRows, NoiseTerms, Rung, Training
 from . import (
     AUTO,
     NETWORK_METHODS,
@@ -75,10 +77,10 @@ class FitOptions:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model, the JSON object of `training.json`, and the residuals of spans left out (None: not done)."""
+    """A model, and what `training.json` says of it."""
 
     model: Model
-    training: dict[str, Any]
+    training: Training
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,7 @@ def fit_dataset(
     front = front_end(runs, options.block_s)
     stretches = _stretches(runs)
     parts = []
-    left_out_rows: list[dict[str, Any]] = []
+    left_out_rows: list[LeftOutRows] = []
     for k, stretch in enumerate(stretches):
         for run in stretch:
             say(f"reading {run.file}")
@@ -174,7 +176,7 @@ def fit_dataset(
     left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
     model = model_of(dataset, runs, data, fitted, front, options)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
-    return Fitted(model, training | {"outliers": outliers_of(left_out_rows, data)})
+    return Fitted(model, training.model_copy(update={"outliers": outliers_of(left_out_rows, data)}))
 
 
 def map_method(method: str) -> str:
@@ -349,41 +351,40 @@ def training_of(
     options: FitOptions,
     spans: Sequence[Span],
     left_out: list[Averages] | None,
-) -> dict[str, Any]:
-    """The JSON object of `training.json`."""
-    return {
-        "schema": "gyrotc.fit/1",
-        "gyrotc_version": __version__,
-        "serial": dataset.serial,
-        "axis": dataset.axis,
-        "units": units_of(dataset),
-        "method": fitted.method,
-        "seed": options.seed,
-        "samples": int(data.bias_dph.size),
-        "block_s": front.block_s,
-        "average_s": options.average_s,
-        "centers": fitted.n_centers,
-        "table_bytes": fitted.table_bytes,
-        "sum_abs_weights_dph": fitted.sum_abs_weights,
-        "predicted_rms_ratio": fitted.predicted_rms_ratio,
-        "prediction_withheld": fitted.withheld,
-        "noise_floor_dph": fitted.noise_floor_dph,
-        "spans": [span.to_dict() for span in spans],
-        "left_out": pooled(left_out).content() if left_out else None,
-        "left_out_spans": [pooled([a]).content() for a in left_out or []],
-        "noise": _noise(data, fitted, front.block_s),
-        "sensitivity": sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
-        "ladder": [dict(row) for row in fitted.ladder],
-        "reason": fitted.reason,
-        "generalises": _generalises(fitted),
-        "findings": [dict(f) for f in fitted.findings],
-        "curves": dict(fitted.curves),
-    }
+) -> Training:
+    """What `training.json` holds."""
+    return Training(
+        gyrotc_version=__version__,
+        serial=dataset.serial,
+        axis=dataset.axis,
+        units=units_of(dataset),
+        method=fitted.method,
+        seed=options.seed,
+        samples=int(data.bias_dph.size),
+        block_s=front.block_s,
+        average_s=options.average_s,
+        centers=fitted.n_centers,
+        table_bytes=fitted.table_bytes,
+        sum_abs_weights_dph=fitted.sum_abs_weights,
+        predicted_rms_ratio=fitted.predicted_rms_ratio,
+        prediction_withheld=fitted.withheld,
+        noise_floor_dph=fitted.noise_floor_dph,
+        spans=tuple(span.result() for span in spans),
+        left_out=pooled(left_out) if left_out else None,
+        left_out_spans=tuple(pooled([a]) for a in left_out or []),
+        noise=_noise(data, fitted, front.block_s),
+        sensitivity=sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
+        ladder=tuple(Rung(**row) for row in fitted.ladder),
+        reason=fitted.reason,
+        generalises=_generalises(fitted),
+        findings=tuple(FoundIn(**f) for f in fitted.findings),
+        curves=dict(fitted.curves),
+    )
 
 
-def units_of(dataset: Dataset) -> dict[str, Any]:
+def units_of(dataset: Dataset) -> DeclaredUnits:
     """Units as declared, and what the user's word was taken against, for `training.json` and `manifest.json`."""
-    return {"declared": dict(dataset.units), "trusted": list(dataset.trusted)}
+    return DeclaredUnits(declared=dict(dataset.units), trusted=tuple(dataset.trusted))
 
 
 def _generalises(fitted: Fit) -> bool | None:
@@ -393,7 +394,7 @@ def _generalises(fitted: Fit) -> bool | None:
     return True if fitted.ladder else None
 
 
-def _noise(data: TrainingData, fitted: Fit, block_s: float) -> dict[str, Any]:
+def _noise(data: TrainingData, fitted: Fit, block_s: float) -> NoiseTerms:
     """Noise terms of what the map leaves, from means over a block."""
     residual = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
     return noise_terms(stretches(residual, data.time_s, data.run, block_s), block_s)

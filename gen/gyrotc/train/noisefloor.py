@@ -10,16 +10,15 @@ with quantisation Q, angle random walk N, bias instability B and rate random wal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..metrics import LEAST_SPAN_C
+from ..results.training import AllanPoint, NoiseTerms, Sensitivity
 
-__all__ = ["AllanPoint", "allan_variance", "noise_terms", "sensitivities", "stretches"]
+__all__ = ["allan_variance", "noise_terms", "sensitivities", "stretches"]
 
 Floats = NDArray[np.float64]
 
@@ -27,15 +26,6 @@ _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
 _LEAST_SPAN_C_PER_MIN = 0.1
 _S_PER_H = 3600.0
-
-
-@dataclass(frozen=True, slots=True)
-class AllanPoint:
-    """Allan deviation (deg/h) at an averaging time (s), and about how many independent differences it rests on."""
-
-    tau_s: float
-    deviation_dph: float
-    freedom: float
 
 
 def stretches(values: Floats, time_s: Floats, run: NDArray[np.int64], step_s: float) -> list[Floats]:
@@ -59,7 +49,9 @@ def allan_variance(residuals: Sequence[Floats], step_s: float) -> list[AllanPoin
             square, count = total.get(factor, (0.0, 0))
             total[factor] = (square + 0.5 * float(differences @ differences), count + len(differences))
     return [
-        AllanPoint(factor * step_s, float(np.sqrt(square / count)), count / factor)
+        AllanPoint(
+            tau_s=factor * step_s, deviation_dph=float(np.sqrt(square / count)), freedom=count / factor
+        )
         for factor, (square, count) in sorted(total.items())
         if count / factor >= _LEAST_PAIRS
     ]
@@ -71,7 +63,7 @@ def _differences(rates: Floats, factor: int) -> Floats:
     return np.asarray(angle[2 * factor :] - 2.0 * angle[factor:-factor] + angle[: -2 * factor]) / factor
 
 
-def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
+def noise_terms(residuals: Sequence[Floats], step_s: float) -> NoiseTerms:
     """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
 
     Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
@@ -88,7 +80,7 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
         "bias_instability_dph",
         "rate_random_walk_dph_per_sqrt_h",
     )
-    terms: dict[str, Any] = dict.fromkeys(names)
+    terms: dict[str, float | None] = dict.fromkeys(names)
     if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
         tau = np.array([p.tau_s for p in points])
         square = np.array([p.deviation_dph for p in points]) ** 2
@@ -100,19 +92,13 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> dict[str, Any]:
         scale = shapes.max(axis=0)
         squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
         terms = dict(zip(names, (float(v) for v in np.sqrt(squares / scale)), strict=True))
-    allan = [{"tau_s": p.tau_s, "deviation_dph": p.deviation_dph, "freedom": p.freedom} for p in points]
-    return terms | {"allan": allan}
+    return NoiseTerms(**terms, allan=tuple(points))
 
 
 def sensitivities(
     temperature_c: Floats, slope_c_per_min: Floats, bias_dph: Floats, weight: Floats
-) -> dict[str, float | None]:
-    """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane.
-
-    Returns:
-        `bias_dph_per_c`, `bias_dph_per_c_per_min` (None where the input hardly changes) and what remains,
-        `residual_rms_dph`.
-    """
+) -> Sensitivity:
+    """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane."""
     root = np.sqrt(weight)
     inputs = {"bias_dph_per_c": temperature_c, "bias_dph_per_c_per_min": slope_c_per_min}
     least = {"bias_dph_per_c": LEAST_SPAN_C, "bias_dph_per_c_per_min": _LEAST_SPAN_C_PER_MIN}
@@ -121,7 +107,9 @@ def sensitivities(
     design = np.stack(columns, axis=1)
     solution, *_ = np.linalg.lstsq(design * root[:, None], bias_dph * root, rcond=None)
     residual = bias_dph - design @ solution
-    result: dict[str, float | None] = dict.fromkeys(inputs)
-    result |= {name: float(value) for name, value in zip(used, solution[1:], strict=True)}
-    result["residual_rms_dph"] = float(np.sqrt(np.average(residual**2, weights=weight)))
-    return result
+    slopes = dict(zip(used, (float(value) for value in solution[1:]), strict=True))
+    return Sensitivity(
+        bias_dph_per_c=slopes.get("bias_dph_per_c"),
+        bias_dph_per_c_per_min=slopes.get("bias_dph_per_c_per_min"),
+        residual_rms_dph=float(np.sqrt(np.average(residual**2, weights=weight))),
+    )

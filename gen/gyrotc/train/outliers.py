@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Run
+from ..results.training import LeftOutRows, Outliers
 from .data import TrainingData
 
 __all__ = ["outliers_of", "stretches_left_out"]
@@ -17,8 +17,8 @@ _JOINED = 10  # rows between two that make them one stretch
 _LISTED = 200  # stretches; beyond, they are counted only
 
 
-def stretches_left_out(run: Run, times_s: NDArray[np.float64]) -> list[dict[str, Any]]:
-    """Stretches of rows that were left out: file, times on its clock (s; the end exclusive), rows.
+def stretches_left_out(run: Run, times_s: NDArray[np.float64]) -> list[LeftOutRows]:
+    """Stretches of rows that were left out, times on the clock of the run, the end exclusive.
 
     Args:
         times_s: Times of these rows, increasing.
@@ -28,18 +28,18 @@ def stretches_left_out(run: Run, times_s: NDArray[np.float64]) -> list[dict[str,
     first = np.flatnonzero(np.diff(times_s, prepend=-np.inf) > _JOINED * run.row_period_s)
     last = np.r_[first[1:], len(times_s)] - 1
     return [
-        {
-            "file": run.file,
-            "from_s": float(times_s[a]),
-            "to_s": round(float(times_s[b] + 0.5 * run.row_period_s), 6),
-            "rows": int(b - a + 1),
-        }
+        LeftOutRows(
+            file=run.file,
+            from_s=float(times_s[a]),
+            to_s=round(float(times_s[b] + 0.5 * run.row_period_s), 6),
+            rows=int(b - a + 1),
+        )
         for a, b in zip(first, last, strict=True)
     ]
 
 
-def outliers_of(stretches: Sequence[dict[str, Any]], data: TrainingData) -> dict[str, Any]:
+def outliers_of(stretches: Sequence[LeftOutRows], data: TrainingData) -> Outliers:
     """`outliers` of `training.json`: number of rows left out, their share, where (the first 200 stretches)."""
-    rows = sum(stretch["rows"] for stretch in stretches)
+    rows = sum(stretch.rows for stretch in stretches)
     kept = float(data.weight.sum())
-    return {"rows": rows, "share": rows / (rows + kept), "stretches": list(stretches[:_LISTED])}
+    return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))

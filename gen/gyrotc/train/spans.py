@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Run
+from ..results.training import SpanLeftOut
 
 __all__ = ["Fold", "Span", "history_folds", "training_spans"]
 
@@ -72,9 +73,11 @@ class Span:
         gap = self.guard_s if guard else 0.0
         return np.asarray((run == self.run) & (time_s >= self.from_s - gap) & (time_s < self.to_s + gap))
 
-    def to_dict(self) -> dict[str, Any]:
+    def result(self) -> SpanLeftOut:
         """For `training.json`."""
-        return {name: getattr(self, name) for name in ("file", "from_s", "to_s", "kind", "guard_s")}
+        return SpanLeftOut(
+            file=self.file, from_s=self.from_s, to_s=self.to_s, kind=self.kind, guard_s=self.guard_s
+        )
 
     def __str__(self) -> str:
         return f"{self.file} {self.from_s:g} ... {self.to_s:g} s ({self.kind})"

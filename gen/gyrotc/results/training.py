@@ -1,0 +1,131 @@
+"""`training.json`: how a model was fitted, what was tried, and what its recordings are like."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from .base import Amount, Axis, Count, Figure, Part, Result
+from .evaluation import FoundIn, Pooled
+
+__all__ = [
+    "AllanPoint", "DeclaredUnits", "LeftOutRows", "NoiseTerms", "Outliers", "Rung", "Sensitivity", "SpanLeftOut",
+    "Training",
+]  # fmt: skip
+
+_Length = Annotated[float, Field(gt=0.0, le=1e12)]
+
+
+class DeclaredUnits(Part):
+    """Units of the recordings."""
+
+    declared: dict[str, str] = Field(description="unit by column, as declared")
+    trusted: tuple[str, ...] = Field(description="what values look like that contradict them, but were taken")
+
+
+class SpanLeftOut(Part):
+    """A span that was left out in turn."""
+
+    file: str = Field(description="as in `dataset.toml`")
+    from_s: float = Field(description="its start, s")
+    to_s: float = Field(description="its end, s")
+    kind: Literal["branch", "part"] = Field(
+        description="a branch of a cycle, or a part of a run without branches"
+    )
+    guard_s: Amount = Field(description="what was left out on either side of it besides, s")
+
+
+class AllanPoint(Part):
+    """A point of the Allan deviation."""
+
+    tau_s: _Length = Field(description="averaging time, s")
+    deviation_dph: Amount = Field(description="deg/h")
+    freedom: _Length = Field(description="number of independent differences, about")
+
+
+class NoiseTerms(Part):
+    """Noise that remains after compensation (IEEE Std 647); null where the record is too short."""
+
+    quantisation_arcsec: Figure = Field(description="Q, arcsec")
+    arw_deg_per_sqrt_h: Figure = Field(description="angle random walk N, deg/√h")
+    bias_instability_dph: Figure = Field(description="B, deg/h")
+    rate_random_walk_dph_per_sqrt_h: Figure = Field(description="K, deg/h/√h")
+    allan: tuple[AllanPoint, ...] = Field(description="at octaves of the block")
+
+
+class Sensitivity(Part):
+    """A plane through the bias before compensation; null where the input hardly changes."""
+
+    bias_dph_per_c: Figure = Field(description="slope in temperature, deg/h/C")
+    bias_dph_per_c_per_min: Figure = Field(description="slope in its rate, deg/h/(C/min)")
+    residual_rms_dph: Figure = Field(description="what the plane leaves, deg/h")
+
+
+class Rung(Part):
+    """A correction that was tried."""
+
+    id: str = Field(description="method")
+    left_out_rms_dph: Figure = Field(description="RMS on thermal history left out in turn, deg/h")
+    standard_error_dph: Figure = Field(description="of this RMS, deg/h")
+    beats_constant: bool = Field(description="whether it was shown to leave less than a constant does")
+    chosen: bool = Field(description="whether it was taken")
+    refused: str | None = Field(default=None, description="why it could not be taken, where it was the best")
+
+
+class LeftOutRows(Part):
+    """A stretch of rows that were left out."""
+
+    file: str = Field(description="as in `dataset.toml`")
+    from_s: float = Field(description="time of the first row, s")
+    to_s: float = Field(description="half a row after the last, s")
+    rows: Annotated[int, Field(ge=1)] = Field(description="number of rows")
+
+
+class Outliers(Part):
+    """Spikes and bursts, which do not reach the fit."""
+
+    rows: Count = Field(description="rows that were left out")
+    share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(description="of all rows")
+    stretches: tuple[LeftOutRows, ...] = Field(description="the first 200")
+
+
+class Training(Result):
+    """How a model was fitted (`gyrotc fit`)."""
+
+    schema_: Annotated[Literal["gyrotc.fit/1"], Field(alias="schema")] = "gyrotc.fit/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    units: DeclaredUnits = Field(description="of the recordings")
+    method: str = Field(description="training method")
+    seed: int = Field(description="from which everything random follows")
+    samples: Count = Field(description="blocks that were trained on")
+    block_s: float = Field(description="length of a block, s")
+    average_s: float = Field(description="averaging of all RMS figures, s")
+    centers: Count = Field(description="of all networks")
+    table_bytes: Count = Field(description="parameters of the map in a table, bytes")
+    sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
+    predicted_rms_ratio: Figure = Field(
+        description="expected RMS over the noise floor on data of the same history; null: no prediction"
+    )
+    prediction_withheld: str | None = Field(description="why there is none")
+    noise_floor_dph: Figure = Field(description="estimated, of means over `average_s`, deg/h")
+    spans: tuple[SpanLeftOut, ...] = Field(description="where there are fewer than three training runs")
+    left_out: Pooled | None = Field(description="all of them, each judged by a fit without it")
+    left_out_spans: tuple[Pooled, ...] = Field(description="each of them")
+    noise: NoiseTerms = Field(description="of the compensated training runs")
+    sensitivity: Sensitivity = Field(description="of the bias before compensation")
+    ladder: tuple[Rung, ...] = Field(
+        description="what was tried, the simplest first; empty of a named method"
+    )
+    reason: str = Field(description="why this one was chosen, in words")
+    generalises: bool | None = Field(
+        description="whether it was shown to hold on history that it had not seen; null: not asked"
+    )
+    findings: tuple[FoundIn, ...] = Field(description="what a person should know")
+    curves: dict[str, Any] = Field(
+        description="figures of the method; `sizes` and `chosen` where it chose a number of centers"
+    )
+    outliers: Outliers | None = Field(
+        default=None, description="rows that were left out; absent of an extended model"
+    )
