@@ -33,6 +33,7 @@ from gyrotc.model import Model, table_id
 from gyrotc.pages import report
 from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
+from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.texts import (
     C_COMMENT,
@@ -223,7 +224,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {
         "folder": made,
         "evaluation": evaluate(made, dataset, compiled=False),
-        "verification": verify(made, compiled=False).content(),
+        "verification": verify(made, compiled=False),
     }
 
 
@@ -290,7 +291,7 @@ def test_the_report_of_a_build(
     finding = {"id": "text", "text": "text", "evidence": {}}
     evaluation = result["evaluation"].content() | {"findings": [finding]}
     evaluation["runs"] = [run | {"environment": "text"} for run in evaluation["runs"]]
-    verification = result["verification"] | {
+    verification = result["verification"].content() | {
         "targets": [_RAN],
         "emitted": [{"file": "f", "status": "fail", "mismatches": 1}],
     }
@@ -659,7 +660,9 @@ def test_terminals_show_every_text_and_obey_none(
     console.print(
         evaluation_table(evaluation.model_copy(update={"runs": runs, "serial": "[/x] " + "".join(HOSTILE)}))
     )
-    console.print(verify_table({"targets": [_RAN | {"name": t} for t in HOSTILE]}))
+    ran = VerifiedTarget(name="host", numeric="f32", status="fail", error="text", mismatches=1, vectors=2)
+    named = [ran.model_copy(update={"name": text}) for text in HOSTILE]
+    console.print(verify_table(result["verification"].model_copy(update={"targets": named})))
     said = re.sub(r"\x1b\[\d*(;\d+)*m", "", stream.getvalue())  # rich's own, bold and plain
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u202e]", said)
     for text in ("[/bold]", "[red]", ":smile:", "<U+001B>[2J", "<U+202E>", "[link=http://x]"):
