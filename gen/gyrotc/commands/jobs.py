@@ -102,9 +102,15 @@ def build(
     else:
         write_json(json_file, {str(r.evaluation.axis): r.evaluation.content() for r in results})
     for result in results:
+        if result.model.axis:
+            tell(f"axis {result.model.axis}")
         _print_built(result)
     tell(f"report: {out / 'report.html'}")
-    failures = [failure for result in results for failure in result.failures]
+    failures = [
+        f"axis {axis}: {failure}" if (axis := result.model.axis) else failure
+        for result in results
+        for failure in result.failures
+    ]
     if failures:
         raise CheckFailed("; ".join(failures))
 

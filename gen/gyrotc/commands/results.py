@@ -161,7 +161,8 @@ def summary(result: Evaluation) -> str:
         return "no sample to judge by"
     part = found[1]
     if result.exam:
-        published = {run.environment for run in result.runs} == set(ENVIRONMENTS)
+        simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
+        published = simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
         text = f"improvement {part.improvement:.2f}" + (" (paper: 9.8-10.4)" if published else "")
     else:
         text = f"improvement on spans left out {part.improvement:.2f}"
@@ -171,13 +172,32 @@ def summary(result: Evaluation) -> str:
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 
+_RULES = {
+    "guard_band": "guard band w = U",
+    "guard_band_binary": "guard band w = U, binary",
+    "simple_acceptance": "simple acceptance",
+}
+
+
 def limit_lines(limits: HeldLimits) -> Iterator[str]:
-    """Every limit with what was measured."""
+    """The verdict, and every limit with what was measured and its uncertainty."""
     product = f" of {limits.product}" if limits.product else ""
-    yield f"limits{product}: {'met' if limits.met else 'NOT met'}"
+    verdict = limits.verdict or ("PASS" if limits.met else "FAIL")
+    rule = f" ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)" if limits.decision_rule else ""
+    yield f"limits{product}: {verdict}{rule}"
     for check in limits.limits:
-        mark = "" if check.met else ", NOT MET"
-        yield f"  {check.limit} {_plain(check.bound)}: {_plain(check.measured)}{mark}"
+        name, bound = check.limit.replace("at_most.", "").replace("at_least.", ""), _plain(check.bound)
+        sign = (
+            "<= "
+            if check.limit.startswith("at_most.")
+            else ">= "
+            if check.limit.startswith("at_least.")
+            else ""
+        )
+        known = check.expanded_uncertainty
+        spread = f" +- {known:.2g}" if known else ""
+        mark = "" if check.verdict in ("PASS", None) and check.met else f", {check.verdict or 'FAIL'}"
+        yield f"  {name} {sign}{bound}: {_plain(check.measured)}{spread}{mark}"
 
 
 def change_lines(changes: Changes) -> Iterator[str]:
@@ -189,10 +209,14 @@ def change_lines(changes: Changes) -> Iterator[str]:
     else:
         apart, at = changes.map, changes.map.at
         share = f" = {apart.rms_over_floor:.2g} x noise floor" if apart.rms_over_floor else ""
+        if apart.expanded_uncertainty_dph is not None:
+            more = "more than" if apart.significant else "no more than"
+            share += f", {more} the uncertainty of both maps gives (U = {apart.expanded_uncertainty_dph:.2g})"
         yield (
             f"against the earlier result: maps {apart.rms_dph:.3e} deg/h RMS apart{share}, at most "
             f"{apart.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
+    yield from _as_found_lines(changes)
     for name, figure in changes.figures.items():
         if not isinstance(figure, str) and _plain(figure.before) != _plain(figure.after):
             yield f"  {name}: {_plain(figure.before)} -> {_plain(figure.after)}"
@@ -206,6 +230,17 @@ def change_lines(changes: Changes) -> Iterator[str]:
                 yield f"  {kind}, {what.replace('_', ' ')}: {', '.join(names)}"
     for name, version in changes.versions.items():
         yield f"  {name}: {version.before} -> {version.after}"
+
+
+def _as_found_lines(changes: Changes) -> Iterator[str]:
+    """The earlier correction on the new recordings."""
+    found = changes.as_found
+    if found is None:
+        if changes.as_found_missing:
+            yield f"  as found: not known ({changes.as_found_missing})"
+        return
+    verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
+    yield f"  as found: RMS {_e(found.figures.after.rms_dph)} deg/h with the earlier correction{verdict}"
 
 
 def _plain(value: Any) -> str:

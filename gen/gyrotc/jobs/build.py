@@ -173,7 +173,11 @@ def _build_axis(
         _write(work / "limits.json", held.content())
     manifest = _manifest(work, dataset, fitted.model, emission.refused)
     _write(work / "manifest.json", manifest.content())
-    changes = changes_since(earlier, fitted.model, evaluation, manifest) if earlier else None
+    changes = (
+        changes_since(earlier, fitted.model, evaluation, manifest, dataset=dataset, limits=order.limits)
+        if earlier
+        else None
+    )
     if changes:
         _write(work / "changes.json", changes.content())
     if order.compiled:

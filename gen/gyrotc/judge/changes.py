@@ -10,8 +10,10 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
+from ..dataset import Dataset
 from ..errors import InputError
 from ..model import Model, load_model
 from ..results.base import read_optional
@@ -27,8 +29,12 @@ from ..results.changes import (
 )
 from ..results.evaluation import Evaluation
 from ..results.manifest import Manifest
+from .as_found import as_found, history_of
+from .limits import Limits
 
 __all__ = ["Earlier", "changes_since", "load_earlier"]
+
+Floats = NDArray[np.float64]
 
 _GRID = (61, 25)  # points of T and of dT/dt over the common envelope
 
@@ -37,9 +43,13 @@ class Earlier:
     """An earlier result: its model and the results beside it (None where a file is not there)."""
 
     def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.model = load_model(folder / "model.json")
         self.evaluation = read_optional(folder / "evaluate.json", Evaluation)
         self.manifest = read_optional(folder / "manifest.json", Manifest)
+        changes = read_optional(folder / "changes.json", Changes)
+        self.history = changes.history if changes else ()
+        self.date = _stated(self.model)
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
@@ -59,9 +69,26 @@ def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
     return earlier
 
 
-def changes_since(earlier: Earlier, model: Model, evaluation: Evaluation, manifest: Manifest) -> Changes:
-    """What is different from an earlier result."""
+def changes_since(
+    earlier: Earlier,
+    model: Model,
+    evaluation: Evaluation,
+    manifest: Manifest,
+    *,
+    dataset: Dataset | None = None,
+    limits: Limits | None = None,
+) -> Changes:
+    """What is different from an earlier result.
+
+    Args:
+        dataset: The new recordings, to say how the unit was found.
+        limits: Limits of the product, which hold for the state as found as well.
+    """
     old = earlier.model
+    moved = _map(old, model)
+    found, missing = (None, "not asked for")
+    if dataset is not None:
+        found, missing = as_found(earlier, dataset, limits, evaluation.average_s)
     before, after = _ids(earlier.evaluation), _ids(evaluation)
     return Changes(
         gyrotc_version=__version__,
@@ -70,7 +97,7 @@ def changes_since(earlier: Earlier, model: Model, evaluation: Evaluation, manife
         same_model=old.hash == model.hash,
         model_hash=TextChange(before=old.hash, after=model.hash),
         recordings=_recordings(old, model),
-        map=_map(old, model),
+        map=moved,
         envelope=Envelopes.of(
             temperature_c=(old.envelope.temperature_c, model.envelope.temperature_c),
             slope_c_per_min=(old.envelope.slope_c_per_min, model.envelope.slope_c_per_min),
@@ -79,7 +106,21 @@ def changes_since(earlier: Earlier, model: Model, evaluation: Evaluation, manife
         findings=NameChanges(new=_only(after, before), gone=_only(before, after)),
         versions=dict(_versions(earlier.manifest, manifest)),
         files=_files(earlier.manifest, manifest),
+        as_found=found,
+        as_found_missing=missing,
+        history=history_of(earlier, model, evaluation, found, moved, _stated(model) or _started(dataset)),
     )
+
+
+def _stated(model: Model) -> str | None:
+    date = model.meta.get("calibrated_on")
+    return None if date is None else str(date)
+
+
+def _started(dataset: Dataset | None) -> str | None:
+    """Day of the last recording, where the recordings carry dates."""
+    days = [run.started for run in dataset.runs if run.started is not None] if dataset else []
+    return max(days).date().isoformat() if days else None
 
 
 def _name(serial: str, axis: str | None) -> str:
@@ -118,13 +159,40 @@ def _map(old: Model, new: Model) -> Apart | None:
     worst = np.unravel_index(int(np.argmax(np.abs(apart))), apart.shape)
     floor = new.noise_floor_dph
     rms = float(np.sqrt(np.mean(apart**2)))
+    expected = _expected_rms(old, new, t, slope)
     return Apart(
         rms_dph=rms,
         mean_dph=float(np.mean(apart)),
         max_abs_dph=float(np.abs(apart[worst])),
         at=At(temperature_c=float(t[worst]), slope_c_per_min=float(slope[worst])),
         rms_over_floor=rms / floor if floor else None,
+        expanded_uncertainty_dph=None if expected is None else 2.0 * expected,
+        # Errors of a map hang together over its envelope, at most all of them: then the ratio is one normal number.
+        significant=None if expected is None else rms > 2.0 * expected,
     )
+
+
+def _expected_rms(old: Model, new: Model, t: Floats, slope: Floats) -> float | None:
+    """RMS that the uncertainties of two maps give over points of T and dT/dt although nothing has moved."""
+    before, after = (_variance(model, t, slope) for model in (old, new))
+    if before is None or after is None:
+        return None
+    return float(np.sqrt(np.mean(before + after)))
+
+
+def _variance(model: Model, t: Floats, slope: Floats) -> Floats | None:
+    if model.uncertainty_dph is None:
+        return None
+    rows = np.array(model.uncertainty_dph.rows)
+    place = []
+    for x, span, n in (
+        (slope, model.envelope.slope_c_per_min, rows.shape[0]),
+        (t, model.envelope.temperature_c, rows.shape[1]),
+    ):
+        low, high = span
+        share = (x - low) / (high - low) if high > low else np.zeros_like(x)
+        place.append(np.clip((share * n).astype(np.int64), 0, n - 1))
+    return np.asarray(rows[place[0], place[1]] ** 2)
 
 
 def _figures(

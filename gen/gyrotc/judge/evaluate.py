@@ -27,6 +27,7 @@ from ..results.base import read_result
 from ..results.evaluation import (
     EvaluatedRun,
     Evaluation,
+    FigureUncertainty,
     FoundIn,
     ModelSizes,
     RunStatistics,
@@ -39,6 +40,7 @@ from ..verify.footprint import Footprint, footprint
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
+from .uncertainty import figure_uncertainties
 
 __all__ = ["Replayed", "evaluate", "trace_name"]
 
@@ -124,8 +126,27 @@ def evaluate(
     outliers = training.outliers if training else None
     rows_left_out = outliers.rows if outliers else None
     result = result.model_copy(update={"generalises": generalises, "rows_left_out": rows_left_out})
+    result = result.model_copy(update={"uncertainty": _uncertainties(result, parts)})
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
+
+
+def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, FigureUncertainty] | None:
+    """Of the figures that the model is judged by; where spans were left out, from the scatter of training runs."""
+    role = "exam" if result.exam else "train"
+    own = [(p.averages, run) for p, run in zip(parts, result.runs, strict=True) if run.role == role]
+    scale = 1.0
+    if result.exam is None and result.left_out and result.train:
+        left_out, train = result.left_out.after.rms_dph, result.train.after.rms_dph
+        scale = left_out / train if left_out and train else 1.0
+    floor = None
+    if result.noise_floor_dph:
+        samples = max(result.train.samples, 1) if result.train else 1
+        floor = (result.noise_floor_dph, None if result.noise_floor_source == "simulated" else samples)
+    found = figure_uncertainties(
+        [a for a, _ in own], [run for _, run in own], result.average_s, scale=scale, floor=floor
+    )
+    return found or None
 
 
 def _training_of(folder: Path, dataset: Dataset, model: Model) -> Training | None:

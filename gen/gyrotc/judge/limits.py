@@ -18,9 +18,10 @@ from ..errors import InputError
 from ..inputs import parse_toml, read_input
 from ..model import Model
 from ..results.evaluation import Evaluation
-from ..results.limits import HeldLimits, Limit, Value
+from ..results.limits import DecisionRule, HeldLimits, Limit, Value, Verdict
 from ..results.verification import Verification
 from ..verify.toolchain import all_targets
+from .conformity import decided, worst_of
 
 __all__ = ["Limits", "held_against", "load_limits"]
 
@@ -104,6 +105,7 @@ class Limits(_Part):
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     product: str = ""
+    decision_rule: DecisionRule = "guard_band"
     at_most: AtMost = AtMost()
     at_least: AtLeast = AtLeast()
     covers: Covers = Covers()
@@ -144,7 +146,7 @@ def held_against(
 ) -> HeldLimits:
     """Every limit with what was measured, and whether all are met."""
     checks = (
-        *_amounts(limits, _measured(model, evaluation, verification)),
+        *_amounts(limits, _measured(model, evaluation, verification), evaluation),
         *_ranges(limits.covers, model),
         *_needs(limits.needs, evaluation, verification),
     )
@@ -156,6 +158,8 @@ def held_against(
         sha256=limits.sha256,
         met=all(check.met for check in checks),
         limits=checks,
+        verdict=worst_of(check.verdict for check in checks),
+        decision_rule=limits.decision_rule,
     )
 
 
@@ -194,36 +198,60 @@ def _measured(model: Model, evaluation: Evaluation, verification: Verification |
     }
 
 
-def _limit(name: str, measured: Value, bound: Value, met: bool) -> Limit:
-    return Limit(limit=name, measured=measured, bound=bound, met=met)
+_NOT_RANDOM = {
+    "uncertainty_dph": "is itself a standard uncertainty",
+    "error_bound_dph": "proven for every input",
+    "covered": "counted",
+    "centers": "counted",
+    "table_bytes": "counted",
+    "rom_bytes": "counted",
+    "ram_bytes": "counted",
+    "rows_left_out": "counted",
+}
+"""Figures that no noise of a recording moves."""
 
 
-def _amounts(limits: Limits, measured: dict[str, Any]) -> Iterator[Limit]:
-    for name, bound in limits.at_most.model_dump(exclude_none=True).items():
-        value = measured[name]
-        yield _limit(f"at_most.{name}", value, bound, value is not None and value <= bound)
-    for name, bound in limits.at_least.model_dump(exclude_none=True).items():
-        value = measured[name]
-        yield _limit(f"at_least.{name}", value, bound, value is not None and value >= bound)
+def _limit(name: str, measured: Value, bound: Value, met: bool, why: str) -> Limit:
+    """A limit of something that is so or not."""
+    verdict: Verdict = "PASS" if met else "FAIL"
+    return Limit(limit=name, measured=measured, bound=bound, met=met, verdict=verdict, uncertainty_from=why)
+
+
+def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -> Iterator[Limit]:
+    known = evaluation.uncertainty or {}
+    for part, sign in (("at_most", 1.0), ("at_least", -1.0)):
+        for name, bound in getattr(limits, part).model_dump(exclude_none=True).items():
+            yield decided(
+                f"{part}.{name}",
+                measured[name],
+                bound,
+                sign,
+                limits.decision_rule,
+                _NOT_RANDOM.get(name) or known.get(name),
+            )
 
 
 def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
     for name, (low, high) in covers.model_dump(exclude_none=True).items():
         has = getattr(model.envelope, name)
-        yield _limit(f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1])
+        yield _limit(
+            f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1], "range of the recordings"
+        )
 
 
 def _needs(needs: Needs, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
     entries = verification.targets if verification else ()
     bounds = [error.numeric for error in verification.errors] if verification else []
     for numeric in needs.arithmetics:
-        yield _limit("needs.arithmetics", tuple(sorted(bounds)), numeric, numeric in bounds)
+        yield _limit("needs.arithmetics", tuple(sorted(bounds)), numeric, numeric in bounds, "compared")
     for target in needs.targets:
         status = tuple(sorted({entry.status for entry in entries if entry.name == target}))
-        yield _limit("needs.targets", status, target, status == ("pass",))
+        yield _limit("needs.targets", status, target, status == ("pass",), "compared")
     if needs.generalises:
-        yield _limit("needs.generalises", evaluation.generalises, True, evaluation.generalises is True)
+        yield _limit(
+            "needs.generalises", evaluation.generalises, True, evaluation.generalises is True, "yes or no"
+        )
     found = tuple(finding.id for finding in evaluation.findings)
     for name in needs.no_findings:
         there = found if name == "any" else tuple(f for f in found if f == name)
-        yield _limit("needs.no_findings", there, name, not there)
+        yield _limit("needs.no_findings", there, name, not there, "yes or no")

@@ -6,10 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Axis, Figure, Part, Result
+from .base import Amount, Axis, Figure, Part, Result
+from .evaluation import Pooled
+from .limits import HeldLimits
 
 __all__ = [
-    "Apart", "At", "Changes", "Envelopes", "FigureChange", "FileChanges", "NameChanges", "RangeChange", "TextChange",
+    "Apart", "AsFound", "At", "Calibration", "Changes", "Envelopes", "FigureChange", "FileChanges", "NameChanges",
+    "RangeChange", "TextChange",
 ]  # fmt: skip
 
 
@@ -74,6 +77,37 @@ class Apart(Part):
     max_abs_dph: float = Field(description="deg/h")
     at: At = Field(description="where they are farthest apart")
     rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null where that is not known")
+    expanded_uncertainty_dph: Amount | None = Field(
+        default=None,
+        description="U (k = 2) of `rms_dph`: twice the RMS that the uncertainties of both maps give "
+        "(`uncertainty_dph` of the models) although the gyro has not changed; null where a model has none",
+    )
+    significant: bool | None = Field(
+        default=None, description="whether `rms_dph` is more than that; null where it is not known"
+    )
+
+
+class AsFound(Part):
+    """The earlier correction on the new recordings: how the unit was when it came back."""
+
+    judged_on: Literal["exam", "train"] = Field(
+        description="runs of the new data set that it was judged on; it has seen none of them"
+    )
+    figures: Pooled = Field(description="of these runs, `after` with the earlier correction")
+    limits: HeldLimits | None = Field(description="the same limits; null where there were none")
+
+
+class Calibration(Part):
+    """One of the calibrations of a unit, the earliest first."""
+
+    date: str | None = Field(description="`calibrated_on` of `[meta]`, else the start of the last recording")
+    model_hash: str = Field(description="of its model")
+    as_found_rms_dph: Figure = Field(description="of the correction before it on its recordings, deg/h")
+    as_left_rms_dph: Figure = Field(description="of its own, deg/h")
+    moved_rms_dph: Figure = Field(description="how far the map moved since the one before, deg/h")
+    moved_mean_dph: Figure = Field(description="its mean over the common envelope, deg/h")
+    expanded_uncertainty_dph: Figure = Field(description="U (k = 2) of `moved_rms_dph`")
+    significant: bool | None = Field(description="whether it moved by more than that")
 
 
 class Changes(Result):
@@ -94,3 +128,11 @@ class Changes(Result):
     findings: NameChanges = Field(description="ids of findings")
     versions: dict[str, TextChange] = Field(description="programs whose version is another")
     files: FileChanges = Field(description="emitted files")
+    as_found: AsFound | None = Field(
+        default=None, description="null where `as_found_missing` says why, or of an older gyrotc"
+    )
+    as_found_missing: str = Field(default="", description="why there is no state as found")
+    history: tuple[Calibration, ...] = Field(
+        default=(),
+        description="all calibrations that are known by their chain of `--previous`, this one last",
+    )

@@ -8,7 +8,9 @@ from pydantic import Field
 
 from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
 
-__all__ = ["EvaluatedRun", "Evaluation", "FoundIn", "ModelSizes", "Pooled", "RunStatistics", "Statistics"]
+__all__ = [
+    "EvaluatedRun", "Evaluation", "FigureUncertainty", "FoundIn", "ModelSizes", "Pooled", "RunStatistics", "Statistics",
+]  # fmt: skip
 
 
 class Statistics(Part):
@@ -48,6 +50,14 @@ class EvaluatedRun(Part):
     samples: Count = Field(description="means over `average_s`")
     before: Statistics = Field(description="before compensation")
     after: RunStatistics = Field(description="after compensation")
+
+
+class FigureUncertainty(Part):
+    """How well a figure is known from recordings of this length."""
+
+    standard: Amount = Field(description="1 sigma, in the unit of the figure")
+    freedom: Figure = Field(description="degrees of freedom; null: many")
+    method: str = Field(description="what it rests on")
 
 
 class FoundIn(Part):
@@ -97,6 +107,11 @@ class Evaluation(Result):
     )
     rows_left_out: Count | None = Field(
         default=None, description="rows of training runs that were outliers; null: not known"
+    )
+    uncertainty: dict[str, FigureUncertainty] | None = Field(
+        default=None,
+        description="of the figures that the model is judged by, by the names of limits; without those that the "
+        "recordings are too short for",
     )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:
