@@ -74,7 +74,6 @@ def grid_model(n: int, *, coverage: bool = False) -> Model:
         networks=(network,),
         fallback_dph=0.007,
         hold_blocks=30,
-        stuck_samples=0,
         max_step_c=1.0,
         max_rate_c_per_min=30.0,
         noise_floor_dph=0.0007,

@@ -122,12 +122,13 @@ extern "C" {
 typedef struct {
     const gtc_f32_table_t *table;
     uint_least32_t samples_per_block;
+    uint_least32_t period_us;      /* of the samples */
     uint_least32_t position;       /* samples of the running block so far */
     uint_least32_t valid;          /* valid ones among them */
     uint_least32_t gap;            /* samples since the last believed one */
     uint_least32_t suspects;       /* suspect samples in a row that agree */
     uint_least32_t received;       /* last finite sample, its bits */
-    uint_least32_t repeats;        /* samples before it that were identical */
+    uint_least32_t repeats;        /* for how long it has been the same, microseconds */
     uint_least32_t held_blocks;    /* invalid blocks in a row */
     uint_least32_t filled;         /* blocks in the window since the last restart */
     uint_least32_t window_valid;   /* one bit a block, newest lowest */
@@ -150,6 +151,7 @@ typedef struct {
 typedef struct {
     const gtc_q31_table_t *table;
     uint_least32_t samples_per_block;
+    uint_least32_t period_us;
     uint_least32_t position;
     uint_least32_t valid;
     uint_least32_t gap;

@@ -1,4 +1,4 @@
-/* gtc_table.h - table layout 1: what an emitted table file holds.
+/* gtc_table.h - table layout 2: what an emitted table file holds.
  *
  * Tables are written by `gyrotc emit`, never by hand; docs/FORMAT.md gives every word. A table is
  * one axis of one gyro serial. The order of the members below is the order of the values in the
@@ -17,7 +17,7 @@
 #include "gtc_config.h"
 
 /* A runtime reads exactly this layout; an emitted file refuses to compile against another. */
-#define GTC_TABLE_LAYOUT 1U
+#define GTC_TABLE_LAYOUT 2U
 
 /* First word of a binary image; reads 0x31435447 when the image has the other byte order. */
 #define GTC_IMAGE_MAGIC 0x47544331UL
@@ -46,6 +46,8 @@ typedef union {
 } gtc_word_t;
 
 /* Sizes of the records in the arrays below, in words. */
+#define GTC_SERIAL_WORDS 16U /* the serial in ASCII, four characters a word, the first one lowest; then zeros */
+#define GTC_GUARD_WORDS 8U   /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 #define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
 #define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
 #define GTC_TERM_WORDS 8U    /* kind, channel, then six parameters of the kind */
@@ -60,13 +62,15 @@ typedef struct {
     uint_least32_t quantity;       /* GTC_QUANTITY_... */
     uint_least32_t unit;           /* GTC_UNIT_... */
     uint_least32_t id;             /* CRC-32 of the table's id as text; in the emitted header */
+    uint_least32_t calibrated;     /* date of calibration, yyyymmdd as a decimal number; 0: not known */
+    uint_least32_t block_us;       /* length of a block, microseconds */
     uint_least32_t slope_blocks;   /* window of the slope, 2 ... GTC_MAX_SLOPE_BLOCKS */
-    uint_least32_t hold_blocks;    /* invalid blocks in a row that are bridged; then fallback */
-    uint_least32_t stuck_samples;  /* identical samples that are believed; 0: any number */
+    uint_least32_t lead_blocks;    /* the map is evaluated at T + lead_blocks * slope; 0 or 1 */
     uint_least32_t bias_frac_bits; /* 0 in float32 */
-    gtc_word_t max_step;           /* C: believable change between samples, besides ... */
-    gtc_word_t max_slope;          /* ... C per block, by which it grows with the gap */
-    gtc_word_t fallback;           /* deg/h: constant correction after hold_blocks */
+    gtc_word_t fallback;           /* deg/h: constant correction where the temperature is lost */
+    gtc_word_t authority[2];       /* deg/h: smallest and largest correction that is ever given */
+    gtc_word_t effect[2];          /* deg/h: smallest and largest that all terms together add */
+    gtc_word_t rezero;             /* deg/h: largest shift of the constant in the field; 0: none */
     gtc_word_t scale[3];           /* C, 1/C, block/C: center of T, gain of T, gain of slope */
     gtc_word_t envelope[4];        /* C, C, C/block, C/block: T min, max; slope min, max */
     uint_least32_t n_networks;     /* 1, or more where GTC_WITH_BANK */
@@ -75,16 +79,18 @@ typedef struct {
     uint_least32_t n_terms;        /* 0 ... GTC_MAX_TERMS */
     uint_least32_t coverage_cells[2]; /* cells in T and slope over the envelope; 0, 0: none */
     uint_least32_t sigma_cells[2];    /* the same for the uncertainty; 0, 0: none */
+    uint_least32_t n_sigma;           /* words of the uncertainty, its cells first */
     uint_least32_t n_probes;          /* known answers */
+    const gtc_word_t *serial;      /* [GTC_SERIAL_WORDS], as given by the gyro's maker */
     const gtc_word_t *networks;    /* [n_networks][GTC_NETWORK_WORDS] */
     const gtc_word_t *centers;     /* [n_centers][GTC_CENTER_WORDS] */
+    const gtc_word_t *guards;      /* [n_channels][GTC_GUARD_WORDS], the temperature first */
     const gtc_word_t *terms;       /* [n_terms][GTC_TERM_WORDS] */
     const gtc_word_t *coverage;    /* one bit a cell, T fastest, 32 cells a word, low bit first */
-    const gtc_word_t *sigma;       /* [slope cell][T cell] deg/h, 1 sigma of compensated bias */
+    const gtc_word_t *sigma;       /* [slope cell][T cell] deg/h, 1 sigma of compensated bias; then the rest */
     const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
     uint_least32_t crc;            /* CRC-32 over all of the above */
     const struct gtc_f32_term_code *term_code[GTC_MAX_TERMS]; /* one for each term, else NULL */
-    const char *serial;            /* as given by the gyro's maker; NULL in an opened image */
 } gtc_f32_table_t;
 
 /* Table in fixed point. Words are two's complement 32-bit integers in `bits`. */
@@ -93,13 +99,15 @@ typedef struct {
     uint_least32_t quantity;
     uint_least32_t unit;
     uint_least32_t id;
+    uint_least32_t calibrated;
+    uint_least32_t block_us;
     uint_least32_t slope_blocks;
-    uint_least32_t hold_blocks;
-    uint_least32_t stuck_samples;
+    uint_least32_t lead_blocks;
     uint_least32_t bias_frac_bits; /* bias = integer * 2^-bias_frac_bits deg/h */
-    int_least32_t max_step;        /* 2^-16 C */
-    int_least32_t max_slope;       /* 2^-16 C per block */
-    int_least32_t fallback;        /* 2^-bias_frac_bits deg/h */
+    int_least32_t fallback;        /* 2^-bias_frac_bits deg/h, and so are ... */
+    int_least32_t authority[2];
+    int_least32_t effect[2];
+    int_least32_t rezero;
     int_least32_t scale[3];        /* gains of T and slope onto 16 bits, bits by which squares are
                                       in larger units (docs/numerics.md) */
     int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
@@ -109,16 +117,18 @@ typedef struct {
     uint_least32_t n_terms;
     uint_least32_t coverage_cells[2];
     uint_least32_t sigma_cells[2];
+    uint_least32_t n_sigma;
     uint_least32_t n_probes;
+    const gtc_word_t *serial;
     const gtc_word_t *networks;
     const gtc_word_t *centers;
+    const gtc_word_t *guards;
     const gtc_word_t *terms;
     const gtc_word_t *coverage;
     const gtc_word_t *sigma;
     const gtc_word_t *probes;
     uint_least32_t crc;
     const struct gtc_q31_term_code *term_code[GTC_MAX_TERMS];
-    const char *serial;
 } gtc_q31_table_t;
 
 #endif /* GTC_TABLE_H_INCLUDED */

@@ -16,6 +16,16 @@
 
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
+/* Words of a guard. */
+#define GUARD_STUCK 5U
+#define GUARD_MISSING 6U
+
+/* A time and another, microseconds, as far as can be counted. */
+static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
+{
+    return ((0xFFFFFFFFUL - a) > b) ? (a + b) : 0xFFFFFFFFUL;
+}
+
 /* Lets every term take note that a block of mean temperature state->mean ends. */
 static void FN(step_terms)(STATE *state)
 {
@@ -126,10 +136,10 @@ static void FN(bridge)(STATE *state)
 
     FN(push)(state, 0U);
     FN(step_terms)(state);
-    if (state->held_blocks <= table->hold_blocks) {
+    if (state->held_blocks <= table->guards[GUARD_MISSING].bits) {
         state->held_blocks++;
     }
-    if (state->held_blocks > table->hold_blocks) {
+    if (state->held_blocks > table->guards[GUARD_MISSING].bits) {
         state->bias = MEMBER(table->fallback);
         state->status = GTC_HELD | GTC_FALLBACK;
     } else {
@@ -188,21 +198,21 @@ static void FN(hold)(STATE *state, uint_least32_t count)
     }
 }
 
-/* 1 if x is identical to too many samples before it. */
+/* 1 if x has been the same for too long. */
 static int FN(is_stuck)(STATE *state, NUM x)
 {
     const uint_least32_t bits = FN(bits)(x);
+    const uint_least32_t most = state->table->guards[GUARD_STUCK].bits;
 
     if (bits != state->received) {
         state->repeats = 0U;
-    } else if (state->repeats < state->table->stuck_samples) {
-        state->repeats++;
+    } else if (state->repeats < most) {
+        state->repeats = FN(later)(state->repeats, state->period_us);
     } else {
         /* counted far enough */
     }
     state->received = bits;
-    return ((state->table->stuck_samples != 0U)
-            && (state->repeats >= state->table->stuck_samples)) ? 1 : 0;
+    return ((most != 0U) && (state->repeats >= most)) ? 1 : 0;
 }
 
 /* 1 if x is too far from the last believed sample; counts the suspects that agree. */
@@ -306,7 +316,8 @@ static void FN(start)(STATE *state, const TABLE *table, uint_least32_t samples_p
     uint_least32_t i;
 
     state->table = table;
-    state->step_per_sample = FN(step_per_sample)(table, samples_per_block);
+    state->period_us = (table->block_us + (samples_per_block / 2U)) / samples_per_block;
+    state->step_per_sample = FN(step_per_sample)(table, state->period_us);
     FN(clear)(state, samples_per_block);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         FN(forget)(state, i);
@@ -357,7 +368,7 @@ static int FN(run_missed)(STATE *state, uint_least32_t count)
         return (int)state->status;
     }
     /* After so many blocks nothing changes any more: whole blocks beyond are left out. */
-    most = state->table->hold_blocks + state->table->slope_blocks + 2U;
+    most = state->table->guards[GUARD_MISSING].bits + state->table->slope_blocks + 2U;
     blocks = count / state->samples_per_block;
     if (blocks > most) {
         rest -= (blocks - most) * state->samples_per_block;

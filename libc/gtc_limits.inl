@@ -10,9 +10,9 @@
  * SPDX-License-Identifier: MIT
  */
 
-#define N_WHOLE 16U    /* whole numbers of a table's header ... */
-#define FIRST_COUNT 7U /* ... of which the counts are the last */
-#define N_NUMBERS 10U  /* other numbers of the header */
+#define N_WHOLE 18U    /* whole numbers of a table's header ... */
+#define FIRST_COUNT 8U /* ... of which the counts are the last */
+#define N_NUMBERS 13U  /* other numbers of the header */
 #define N_KINDS 5U     /* of terms */
 
 typedef struct {
@@ -26,9 +26,10 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     RANGE(GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS),     /* quantity */
     RANGE(GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H), /* unit */
     RANGE(0U, 4294967295U,             0U, 4294967295U),             /* id */
+    RANGE(0U, 99991231U,               0U, 99991231U),               /* calibrated */
+    RANGE(1U, 3600000000U,             1U, 3600000000U),             /* block_us */
     RANGE(2U, GTC_MAX_SLOPE_BLOCKS,    2U, GTC_MAX_SLOPE_BLOCKS),    /* slope_blocks */
-    RANGE(1U, 100000U,                 1U, 100000U),                 /* hold_blocks */
-    RANGE(0U, 2147483647U,             0U, 2147483647U),             /* stuck_samples */
+    RANGE(0U, 1U,                      0U, 1U),                      /* lead_blocks */
     RANGE(0U, 0U,                      0U, 60U),                     /* bias_frac_bits */
     RANGE(1U, 16U,                     1U, 16U),                     /* n_networks */
     RANGE(0U, 512U,                    0U, 512U),                    /* n_centers */
@@ -38,14 +39,18 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: slope */
     RANGE(0U, 256U,                    0U, 256U),                    /* sigma_cells: T */
     RANGE(0U, 256U,                    0U, 256U),                    /* sigma_cells: slope */
+    RANGE(0U, 65535U,                  0U, 65535U),                  /* n_sigma */
     RANGE(0U, 4096U,                   0U, 4096U),                   /* n_probes */
 };
 
 /* Numbers between them. */
 static const FN(range_t) FN(number_limits)[N_NUMBERS] = {
-    RANGE(0.0F, 1.0e6F,                0, 2147483647),               /* max_step */
-    RANGE(0.0F, 1.0e8F,                0, 2147483647),               /* max_slope */
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* fallback */
+    RANGE(-1.5e7F, 0.0F,               -2147483647, 0),              /* authority: smallest */
+    RANGE(0.0F, 1.5e7F,                0, 2147483647),               /* authority: largest */
+    RANGE(-1.5e7F, 0.0F,               -2147483647, 0),              /* effect: smallest */
+    RANGE(0.0F, 1.5e7F,                0, 2147483647),               /* effect: largest */
+    RANGE(0.0F, 7.5e6F,                0, 1073741824),               /* rezero */
     RANGE(-200.0F, 400.0F,             0, 2147483647),               /* scale: center of T; q31: gain of T */
     RANGE(0.0F, 1.0e12F,               0, 2147483647),               /* scale: gain of T; q31: gain of slope */
     RANGE(0.0F, 1.0e12F,               0, 32),                       /* scale: gain of slope; q31: bits of narrow squares */
@@ -72,6 +77,20 @@ static const FN(range_t) FN(center_limits)[GTC_CENTER_WORDS] = {
     RANGE(-1.0e9F, 1.0e9F,             0, 65535),                    /* center: slope; q31: s of slope */
     RANGE(0.0F, 1.0e4F,                -2147483647, 2147483647),     /* center: gain of slope; q31: k of slope */
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* center: weight */
+};
+
+/* A guard; the words between its numbers are whole. */
+static const FN(range_t) FN(guard_limits)[4] = {
+    RANGE(-1.0e9F, 1.0e9F,             -2147483647, 2147483647),     /* guard: low */
+    RANGE(-1.0e9F, 1.0e9F,             -2147483647, 2147483647),     /* guard: high */
+    RANGE(0.0F, 1.0e9F,                0, 2147483647),               /* guard: max_step */
+    RANGE(0.0F, 1.0e9F,                0, 2147483647),               /* guard: max_rate */
+};
+
+static const uint_least32_t FN(guard_wholes)[3][2] = {
+    RANGE(0U, 2147483647U,             0U, 2147483647U),             /* guard: agree_us */
+    RANGE(0U, 2147483647U,             0U, 2147483647U),             /* guard: stuck_us */
+    RANGE(1U, 100000U,                 1U, 100000U),                 /* guard: missing_blocks */
 };
 
 /* Parameters of the kinds of terms; kind - 1 is the row. What a kind does not use is 0. */

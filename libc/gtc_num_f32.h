@@ -294,12 +294,12 @@ static inline float FN(unmixed)(const BLEND *blend, float otherwise)
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
-static inline float FN(step_per_sample)(const TABLE *table, uint_least32_t samples_per_block)
+static inline float FN(step_per_sample)(const TABLE *table, uint_least32_t period_us)
 {
-    const float n = (float)samples_per_block;
+    const float period = (float)period_us;
     float step;
 
-    step = table->max_slope.value / n;
+    step = table->guards[3].value * period;
     return step;
 }
 
@@ -311,7 +311,7 @@ static inline int FN(is_near)(const STATE *state, float a, float b, uint_least32
     float distance;
 
     limit = n * state->step_per_sample;
-    limit = state->table->max_step.value + limit;
+    limit = state->table->guards[2].value + limit;
     distance = a - b;
     if (distance < 0.0F) {
         distance = -distance;

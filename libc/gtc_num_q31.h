@@ -396,16 +396,18 @@ static inline int_least32_t FN(unmixed)(const BLEND *blend, int_least32_t otherw
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
-static inline int_least32_t FN(step_per_sample)(const TABLE *table, uint_least32_t samples_per_block)
+static inline int_least32_t FN(step_per_sample)(const TABLE *table, uint_least32_t period_us)
 {
-    return (int_least32_t)FN(divided)(table->max_slope, samples_per_block);
+    const uint_least64_t step = ((uint_least64_t)table->guards[3].bits * period_us) >> 24;
+
+    return (step < 0x7FFFFFFFU) ? (int_least32_t)step : 0x7FFFFFFF;
 }
 
 /* |a - b| <= max_step + samples * step_per_sample */
 static inline int FN(is_near)(const STATE *state, int_least32_t a, int_least32_t b,
                               uint_least32_t samples)
 {
-    const int_least64_t limit = state->table->max_step
+    const int_least64_t limit = state->table->guards[2].integer
                                 + ((int_least64_t)samples * state->step_per_sample);
     const int_least64_t d = (int_least64_t)a - b;
 

@@ -18,8 +18,8 @@
 
 #include "gtc.h"
 
-#if GTC_TABLE_LAYOUT != 1
-#error "these sources read table layout 1: include/ and libc/ are of different versions"
+#if GTC_TABLE_LAYOUT != 2
+#error "these sources read table layout 2: include/ and libc/ are of different versions"
 #endif
 
 /* For what stands in the loop over the centers, and the map itself. Where a product is one instruction, a call costs more

@@ -9,7 +9,7 @@
 /* ---- an image ------------------------------------------------------------------------------------ */
 
 /* Words between the magic and the arrays. */
-#define HEADER_WORDS (2U + 7U + 3U + 3U + 4U + 4U + 5U)
+#define HEADER_WORDS (2U + N_WHOLE + N_NUMBERS)
 
 static uint_least32_t FN(coverage_words)(const TABLE *table)
 {
@@ -19,10 +19,9 @@ static uint_least32_t FN(coverage_words)(const TABLE *table)
 /* Words of all arrays. */
 static uint_least32_t FN(array_words)(const TABLE *table)
 {
-    return (table->n_networks * GTC_NETWORK_WORDS) + (table->n_centers * GTC_CENTER_WORDS)
-           + (table->n_terms * GTC_TERM_WORDS) + FN(coverage_words)(table)
-           + (table->sigma_cells[0] * table->sigma_cells[1])
-           + (table->n_probes * GTC_PROBE_WORDS);
+    return GTC_SERIAL_WORDS + (table->n_networks * GTC_NETWORK_WORDS) + (table->n_centers * GTC_CENTER_WORDS)
+           + (table->n_channels * GTC_GUARD_WORDS) + (table->n_terms * GTC_TERM_WORDS) + FN(coverage_words)(table)
+           + table->n_sigma + (table->n_probes * GTC_PROBE_WORDS);
 }
 
 /* ---- whether this build can use a table ---------------------------------------------------------------------------------- */
@@ -52,17 +51,19 @@ static int FN(is_array)(const gtc_word_t *words, uint_least32_t n)
 }
 
 /* Cells of a grid over the envelope: both counts 0, or none. */
-static int FN(is_grid)(const gtc_word_t *words, const uint_least32_t cells[2])
+static int FN(is_grid)(const uint_least32_t cells[2])
 {
-    return (((cells[0] == 0U) == (cells[1] == 0U)) && FN(is_array)(words, cells[0])) ? 1 : 0;
+    return ((cells[0] == 0U) == (cells[1] == 0U)) ? 1 : 0;
 }
 
 static int FN(arrays_fit)(const TABLE *table)
 {
-    return (FN(is_array)(table->networks, table->n_networks) && FN(is_array)(table->centers, table->n_centers)
+    return (FN(is_array)(table->serial, GTC_SERIAL_WORDS) && FN(is_array)(table->networks, table->n_networks)
+            && FN(is_array)(table->centers, table->n_centers) && FN(is_array)(table->guards, table->n_channels)
             && FN(is_array)(table->terms, table->n_terms) && FN(is_array)(table->probes, table->n_probes)
-            && FN(is_grid)(table->coverage, table->coverage_cells)
-            && FN(is_grid)(table->sigma, table->sigma_cells)) ? 1 : 0;
+            && FN(is_grid)(table->coverage_cells) && FN(is_array)(table->coverage, table->coverage_cells[0])
+            && FN(is_grid)(table->sigma_cells) && FN(is_array)(table->sigma, table->n_sigma)
+            && (table->n_sigma >= (table->sigma_cells[0] * table->sigma_cells[1]))) ? 1 : 0;
 }
 
 /* The whole numbers of the header, in the order of an image. */
@@ -71,19 +72,21 @@ static void FN(wholes)(const TABLE *table, uint_least32_t found[N_WHOLE])
     found[0] = table->quantity;
     found[1] = table->unit;
     found[2] = table->id;
-    found[3] = table->slope_blocks;
-    found[4] = table->hold_blocks;
-    found[5] = table->stuck_samples;
-    found[6] = table->bias_frac_bits;
-    found[7] = table->n_networks;
-    found[8] = table->n_centers;
-    found[9] = table->n_channels;
-    found[10] = table->n_terms;
-    found[11] = table->coverage_cells[0];
-    found[12] = table->coverage_cells[1];
-    found[13] = table->sigma_cells[0];
-    found[14] = table->sigma_cells[1];
-    found[15] = table->n_probes;
+    found[3] = table->calibrated;
+    found[4] = table->block_us;
+    found[5] = table->slope_blocks;
+    found[6] = table->lead_blocks;
+    found[7] = table->bias_frac_bits;
+    found[8] = table->n_networks;
+    found[9] = table->n_centers;
+    found[10] = table->n_channels;
+    found[11] = table->n_terms;
+    found[12] = table->coverage_cells[0];
+    found[13] = table->coverage_cells[1];
+    found[14] = table->sigma_cells[0];
+    found[15] = table->sigma_cells[1];
+    found[16] = table->n_sigma;
+    found[17] = table->n_probes;
 }
 
 /* The other numbers of the header. */
@@ -91,14 +94,17 @@ static void FN(numbers)(const TABLE *table, gtc_word_t found[N_NUMBERS])
 {
     uint_least32_t i;
 
-    ELEMENT(found[0]) = MEMBER(table->max_step);
-    ELEMENT(found[1]) = MEMBER(table->max_slope);
-    ELEMENT(found[2]) = MEMBER(table->fallback);
+    ELEMENT(found[0]) = MEMBER(table->fallback);
+    for (i = 0U; i < 2U; i++) {
+        ELEMENT(found[1U + i]) = MEMBER(table->authority[i]);
+        ELEMENT(found[3U + i]) = MEMBER(table->effect[i]);
+    }
+    ELEMENT(found[5]) = MEMBER(table->rezero);
     for (i = 0U; i < 3U; i++) {
-        ELEMENT(found[3U + i]) = MEMBER(table->scale[i]);
+        ELEMENT(found[6U + i]) = MEMBER(table->scale[i]);
     }
     for (i = 0U; i < 4U; i++) {
-        ELEMENT(found[6U + i]) = MEMBER(table->envelope[i]);
+        ELEMENT(found[9U + i]) = MEMBER(table->envelope[i]);
     }
 }
 
@@ -162,12 +168,52 @@ static int FN(is_readable)(const TABLE *table)
             && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
 }
 
+/* The constant correction is one that the table may give. */
+static int FN(authority_fits)(const TABLE *table)
+{
+    const NUM fallback = MEMBER(table->fallback);
+
+    return ((fallback >= MEMBER(table->authority[0])) && (fallback <= MEMBER(table->authority[1]))) ? 1 : 0;
+}
+
 static int FN(members_fit)(const TABLE *table)
 {
     gtc_word_t found[N_NUMBERS];
 
     FN(numbers)(table, found);
-    return FN(numbers_fit)(found, FN(number_limits), N_NUMBERS) & FN(envelope_fits)(table);
+    return FN(numbers_fit)(found, FN(number_limits), N_NUMBERS) & FN(envelope_fits)(table) & FN(authority_fits)(table);
+}
+
+/* The guard of one channel. The temperature's range keeps to what a sensor can show, so that no difference of
+ * two samples leaves its word. */
+static int FN(guard_fits)(const gtc_word_t *guard, uint_least32_t channel)
+{
+    const NUM low = ELEMENT(guard[0]);
+    const NUM high = ELEMENT(guard[1]);
+    int fit = FN(numbers_fit)(guard, FN(guard_limits), 4U)
+              & FN(numbers_fit)(&guard[7], FN(guard_limits), 1U) & ((low <= high) ? 1 : 0);
+    uint_least32_t i;
+
+    for (i = 0U; i < 3U; i++) {
+        fit &= ((guard[4U + i].bits >= FN(guard_wholes)[i][0]) && (guard[4U + i].bits <= FN(guard_wholes)[i][1]))
+                   ? 1
+                   : 0;
+    }
+    if (channel == 0U) {
+        fit &= ((low >= NUM_PLAUSIBLE_MIN) && (high <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
+    }
+    return fit;
+}
+
+static int FN(guards_fit)(const TABLE *table)
+{
+    int fit = 1;
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_channels; i++) {
+        fit &= FN(guard_fits)(&table->guards[i * GTC_GUARD_WORDS], i);
+    }
+    return fit;
 }
 
 /* The region of one of several networks has a width by which shares can be divided. */
@@ -210,7 +256,6 @@ static int FN(networks_fit)(const TABLE *table)
 /* Parameters of the terms, and the uncertainties, which nothing reads yet. */
 static int FN(rest_fits)(const TABLE *table)
 {
-    const uint_least32_t n = table->sigma_cells[0] * table->sigma_cells[1];
     int fit = 1;
     uint_least32_t i;
 
@@ -219,7 +264,7 @@ static int FN(rest_fits)(const TABLE *table)
 
         fit &= FN(numbers_fit)(&term[2], FN(term_limits)[term[0].bits - 1U], GTC_TERM_WORDS - 2U);
     }
-    for (i = 0U; i < n; i++) {
+    for (i = 0U; i < table->n_sigma; i++) {
         fit &= FN(numbers_fit)(&table->sigma[i], FN(sigma_limits), 1U);
     }
     return fit;
@@ -229,7 +274,7 @@ static int FN(rest_fits)(const TABLE *table)
 static int FN(is_usable)(const TABLE *table)
 {
     return (FN(is_readable)(table) && FN(wholes_fit)(table, 0U) && FN(members_fit)(table)
-            && FN(networks_fit)(table) && FN(rest_fits)(table)) ? 1 : 0;
+            && FN(networks_fit)(table) && FN(guards_fit)(table) && FN(rest_fits)(table)) ? 1 : 0;
 }
 
 /* ---- the self-test ------------------------------------------------------------------------------- */
@@ -261,11 +306,13 @@ static uint_least32_t FN(crc)(const TABLE *table)
 {
     uint_least32_t crc = FN(header_crc)(table);
 
+    crc = gtc_crc_words(crc, table->serial, GTC_SERIAL_WORDS);
     crc = gtc_crc_words(crc, table->networks, table->n_networks * GTC_NETWORK_WORDS);
     crc = gtc_crc_words(crc, table->centers, table->n_centers * GTC_CENTER_WORDS);
+    crc = gtc_crc_words(crc, table->guards, table->n_channels * GTC_GUARD_WORDS);
     crc = gtc_crc_words(crc, table->terms, table->n_terms * GTC_TERM_WORDS);
     crc = gtc_crc_words(crc, table->coverage, FN(coverage_words)(table));
-    crc = gtc_crc_words(crc, table->sigma, table->sigma_cells[0] * table->sigma_cells[1]);
+    crc = gtc_crc_words(crc, table->sigma, table->n_sigma);
     crc = gtc_crc_words(crc, table->probes, table->n_probes * GTC_PROBE_WORDS);
     return crc ^ GTC_CRC_FINAL;
 }
@@ -315,47 +362,52 @@ static int FN(run_check)(const TABLE *table)
 /* Words before the arrays, with the magic; and the CRC behind them. */
 #define BEFORE_ARRAYS (1U + HEADER_WORDS)
 #define AFTER_ARRAYS 1U
+#define SHORTEST 4U /* magic, layout, length, CRC */
 
 /* The members of a table as the image has them; arrays and code of terms are NULL. */
 static void FN(read_header)(volatile TABLE *table, const gtc_word_t *words)
 {
-    const gtc_word_t *const numbers = &words[10];
-    const gtc_word_t *const counts = &words[BEFORE_ARRAYS - 9U];
+    const gtc_word_t *const numbers = &words[3U + FIRST_COUNT];
+    const gtc_word_t *const counts = &numbers[N_NUMBERS];
     uint_least32_t i;
 
     table->layout = words[1].bits & 0xFFFFU;
     table->quantity = words[3].bits;
     table->unit = words[4].bits;
     table->id = words[5].bits;
-    table->slope_blocks = words[6].bits;
-    table->hold_blocks = words[7].bits;
-    table->stuck_samples = words[8].bits;
-    table->bias_frac_bits = words[9].bits;
-    MEMBER(table->max_step) = ELEMENT(numbers[0]);
-    MEMBER(table->max_slope) = ELEMENT(numbers[1]);
-    MEMBER(table->fallback) = ELEMENT(numbers[2]);
+    table->calibrated = words[6].bits;
+    table->block_us = words[7].bits;
+    table->slope_blocks = words[8].bits;
+    table->lead_blocks = words[9].bits;
+    table->bias_frac_bits = words[10].bits;
+    MEMBER(table->fallback) = ELEMENT(numbers[0]);
+    MEMBER(table->rezero) = ELEMENT(numbers[5]);
     for (i = 0U; i < 3U; i++) {
-        MEMBER(table->scale[i]) = ELEMENT(numbers[3U + i]);
+        MEMBER(table->scale[i]) = ELEMENT(numbers[6U + i]);
     }
     for (i = 0U; i < 4U; i++) {
-        MEMBER(table->envelope[i]) = ELEMENT(numbers[6U + i]);
+        MEMBER(table->envelope[i]) = ELEMENT(numbers[9U + i]);
     }
     table->n_networks = counts[0].bits;
     table->n_centers = counts[1].bits;
     table->n_channels = counts[2].bits;
     table->n_terms = counts[3].bits;
     for (i = 0U; i < 2U; i++) {
+        MEMBER(table->authority[i]) = ELEMENT(numbers[1U + i]);
+        MEMBER(table->effect[i]) = ELEMENT(numbers[3U + i]);
         table->coverage_cells[i] = counts[4U + i].bits;
         table->sigma_cells[i] = counts[6U + i].bits;
     }
-    table->n_probes = counts[8].bits;
+    table->n_sigma = counts[8].bits;
+    table->n_probes = counts[9].bits;
 }
 
 /* Counts so small that no sum of words overflows. */
 static int FN(counts_are_sane)(const TABLE *table)
 {
     return ((table->n_networks <= 0xFFFFU) && (table->n_centers <= 0xFFFFU)
-            && (table->n_terms <= 0xFFFFU) && (table->n_probes <= 0xFFFFU)
+            && (table->n_channels <= 0xFFFFU) && (table->n_terms <= 0xFFFFU) && (table->n_sigma <= 0xFFFFU)
+            && (table->n_probes <= 0xFFFFU)
             && ((table->coverage_cells[0] | table->coverage_cells[1]) <= 0xFFFU)
             && ((table->sigma_cells[0] | table->sigma_cells[1]) <= 0xFFFU)) ? 1 : 0;
 }
@@ -373,14 +425,15 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
 {
     const gtc_word_t *next = &words[BEFORE_ARRAYS];
 
+    table->serial = FN(next)(&next, GTC_SERIAL_WORDS);
     table->networks = FN(next)(&next, table->n_networks * GTC_NETWORK_WORDS);
     table->centers = FN(next)(&next, table->n_centers * GTC_CENTER_WORDS);
+    table->guards = FN(next)(&next, table->n_channels * GTC_GUARD_WORDS);
     table->terms = FN(next)(&next, table->n_terms * GTC_TERM_WORDS);
     table->coverage = FN(next)(&next, FN(coverage_words)(table));
-    table->sigma = FN(next)(&next, table->sigma_cells[0] * table->sigma_cells[1]);
+    table->sigma = FN(next)(&next, table->n_sigma);
     table->probes = FN(next)(&next, table->n_probes * GTC_PROBE_WORDS);
     table->crc = next[0].bits;
-    table->serial = NULL;
 }
 
 /* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. */
@@ -416,17 +469,17 @@ static void FN(read_image)(TABLE *table, const gtc_word_t *words)
     FN(find_code)(table);
 }
 
-/* Magic, length and CRC, which every layout has in the same places. */
+/* Magic, length and CRC, which every layout has in the same places; some layouts are shorter than this one. */
 static int FN(is_image)(const gtc_word_t *words, uint_least32_t n_words)
 {
     uint_least32_t length;
     uint_least32_t crc;
 
-    if ((n_words < (BEFORE_ARRAYS + AFTER_ARRAYS)) || (words[0].bits != GTC_IMAGE_MAGIC)) {
+    if ((n_words < SHORTEST) || (words[0].bits != GTC_IMAGE_MAGIC)) {
         return 0;
     }
     length = words[2].bits;
-    if ((length < (BEFORE_ARRAYS + AFTER_ARRAYS)) || (length > n_words)) {
+    if ((length < SHORTEST) || (length > n_words)) {
         return 0;
     }
     crc = gtc_crc_words(GTC_CRC_START, &words[1], length - 2U) ^ GTC_CRC_FINAL;
@@ -446,6 +499,9 @@ static int FN(run_open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_
     }
     if (words[1].bits != (GTC_TABLE_LAYOUT + (ARITHMETIC * 65536UL))) {
         return GTC_E_LAYOUT;
+    }
+    if (words[2].bits < (BEFORE_ARRAYS + AFTER_ARRAYS)) {
+        return GTC_E_IMAGE;
     }
     FN(read_header)(&read, words);
     if (read.id != expected_id) {

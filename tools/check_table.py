@@ -28,11 +28,12 @@ from typing import Any
 MAGIC = 0x47544331
 ARITHMETIC = {1: "f32", 2: "q31"}
 HEAD = [
-    "quantity", "unit", "id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits", "max_step",
-    "max_slope", "fallback", "scale:3", "envelope:4", "n_networks", "n_centers", "n_channels", "n_terms",
-    "coverage_cells:2", "sigma_cells:2", "n_probes",
+    "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits",
+    "fallback", "authority:2", "effect:2", "rezero", "scale:3", "envelope:4", "n_networks", "n_centers",
+    "n_channels", "n_terms", "coverage_cells:2", "sigma_cells:2", "n_sigma", "n_probes",
 ]  # fmt: skip
-NUMBERS = {"max_step", "max_slope", "fallback", "scale", "envelope"}
+NUMBERS = {"fallback", "authority", "effect", "rezero", "scale", "envelope"}
+ARRAYS = ("serial", "networks", "centers", "guards", "terms", "coverage", "sigma", "probes")
 TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 CLAMPED, UNCOVERED = 2, 4
 TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
@@ -109,6 +110,23 @@ class Model:
     def channels(self) -> list[str]:
         return sorted({term["channel"] for term in self.raw["terms"] if term.get("channel")})
 
+    def temperature_guard(self) -> dict[str, float]:
+        raw = self.raw
+        return {
+            "low": -90.0, "high": 200.0, "max_step": raw["max_step_c"], "agree_s": raw["agree_s"],
+            "max_rate_per_min": raw["max_rate_c_per_min"], "stuck_s": raw["stuck_s"],
+            "missing_s": raw["hold_blocks"] * raw["block_s"], "fallback": 0.0,
+        }  # fmt: skip
+
+    def guard(self, channel: str) -> dict[str, float]:
+        if channel in self.raw["guards"]:
+            return dict(self.raw["guards"][channel])
+        reference = next(t["parameters"]["reference"] for t in self.raw["terms"] if t.get("channel") == channel)
+        return {
+            "low": -1e9, "high": 1e9, "max_step": 1e9, "max_rate_per_min": 0.0, "agree_s": 0.0, "stuck_s": 0.0,
+            "missing_s": self.raw["hold_blocks"] * self.raw["block_s"], "fallback": reference,
+        }  # fmt: skip
+
     def term(self, term: dict[str, Any]) -> tuple[int, int, list[float]]:
         """Kind, channel and parameters of a term's record, in the units of docs/FORMAT.md."""
         p, block = term["parameters"], self.raw["block_s"]
@@ -139,8 +157,8 @@ class Image:
     """A table: its words, and the equation that they stand for, in float64."""
 
     def __init__(self, words: list[int], where: str) -> None:
-        if len(words) < 30 or words[0] != MAGIC or words[2] != len(words) or words[1] & 0xFFFF != 1:
-            raise Unreadable(f"{where}: not an image of layout 1")
+        if len(words) < 30 or words[0] != MAGIC or words[2] != len(words) or words[1] & 0xFFFF != 2:
+            raise Unreadable(f"{where}: not an image of layout 2")
         self.where, self.words = where, words
         self.numeric = ARITHMETIC[words[1] >> 16]
         rest = iter(words[3:-1])
@@ -149,10 +167,11 @@ class Image:
             name, _, n = entry.partition(":")
             group = [next(rest) for _ in range(int(n or 1))]
             self.member[name] = [self.number(w) for w in group] if name in NUMBERS else group
-        cells, sigma = self.member["coverage_cells"], self.member["sigma_cells"]
-        sizes = {"networks": 8 * self.one("n_networks"), "centers": 5 * self.one("n_centers"),
-                 "terms": 8 * self.one("n_terms"), "coverage": (cells[0] * cells[1] + 31) // 32,
-                 "sigma": sigma[0] * sigma[1], "probes": 4 * self.one("n_probes")}  # fmt: skip
+        cells = self.member["coverage_cells"]
+        sizes = {"serial": 16, "networks": 8 * self.one("n_networks"), "centers": 5 * self.one("n_centers"),
+                 "guards": 8 * self.one("n_channels"), "terms": 8 * self.one("n_terms"),
+                 "coverage": (cells[0] * cells[1] + 31) // 32,
+                 "sigma": self.one("n_sigma"), "probes": 4 * self.one("n_probes")}  # fmt: skip
         self.array = {name: [next(rest) for _ in range(n)] for name, n in sizes.items()}
         if next(rest, None) is not None:
             raise Unreadable(f"{where}: more words than its counts say")
@@ -268,7 +287,7 @@ def source_words(text: str, numeric: str) -> list[int]:
         raise Unreadable(f"no {numeric} table in the C source")
     members = dict(re.findall(r"^\s*\.(\w+) = (.*?),?$", struct_text[1], re.M))
     words = [word for entry in HEAD for word in constants(members[entry.partition(":")[0]])]
-    for name in ("networks", "centers", "terms", "coverage", "sigma", "probes"):
+    for name in ARRAYS:
         if members[name] != "NULL":
             array = re.search(rf"gtc_word_t {members[name]}\[(\d+)\] = \{{(.*?)\n\}};", text, re.S)
             if array is None or len(constants(array[2])) != int(array[1]):
@@ -301,13 +320,19 @@ def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
         yield "the Intel HEX file is not the image"
 
 
+def calibrated(meta: dict[str, Any]) -> int:
+    found = re.match(r"(\d{4})-(\d\d)-(\d\d)", str(meta.get("calibrated_on", "")))
+    return int("".join(found.groups())) if found else 0
+
+
 def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
     raw, unit = model.raw, 1.0 if image.numeric == "f32" else 65536.0
     result_unit = 1.0 if image.numeric == "f32" else 2.0 ** image.one("bias_frac_bits")
     expected = {
         "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))],
-        "slope_blocks": [raw["slope_blocks"]], "hold_blocks": [raw["hold_blocks"]],
-        "stuck_samples": [raw["stuck_samples"]], "n_networks": [len(raw["networks"])],
+        "calibrated": [calibrated(raw["meta"])], "block_us": [round(raw["block_s"] * 1e6)],
+        "slope_blocks": [raw["slope_blocks"]], "lead_blocks": [raw["lead_blocks"]],
+        "n_networks": [len(raw["networks"])],
         "n_channels": [1 + len(model.channels())], "n_terms": [len(raw["terms"])],
         "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
         "sigma_cells": (raw["uncertainty_dph"] or {"cells": [0, 0]})["cells"],
@@ -316,9 +341,8 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
         if image.member[key] != list(value):
             yield f"{key} is {image.member[key]}, the model says {list(value)}"
     numbers = {
-        "max_step": [raw["max_step_c"] * unit],
-        "max_slope": [raw["max_rate_c_per_min"] * model.per_block * unit],
         "fallback": [(raw["fallback_dph"] - model.shift) * result_unit],
+        "rezero": [raw["rezero_dph"] * result_unit],
         "envelope": [
             *(t * unit for t in model.t_range),
             *(r * model.per_block * unit for r in model.r_range),
@@ -329,6 +353,9 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
             room = 0.5000001 if image.numeric == "q31" else abs(want) * 2.0**-24 * 1.000001
             if abs(got - min(want, 2**31 - 1)) > room:
                 yield f"{key} is {got}, the model says {want}"
+    if struct.pack("<16I", *image.array["serial"]).rstrip(b"\0").decode("latin-1") != raw["serial"]:
+        yield "the serial is not the model's"
+    yield from check_guards(model, image)
     cells = "".join((raw["coverage"] or {"rows": []})["rows"])
     bits = "".join(f"{word:032b}"[::-1] for word in image.array["coverage"])
     if bits[: len(cells)] != cells or "1" in bits[len(cells) :]:
@@ -339,6 +366,24 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
             abs(want) * 2.0**-24, 0.51 / result_unit * (unit > 1)
         ):
             yield f"an uncertainty is {image.to_dph(image.number(got))}, the model says {want}"
+
+
+def check_guards(model: Model, image: Image) -> Iterator[str]:
+    """Records of the channels, the temperature first; in fixed point what 32 bits do not hold is the most they do."""
+    f32, block_us = image.numeric == "f32", model.raw["block_s"] * 1e6
+    scales = (1.0, 1.0, 1.0, 1.0, 1.0) if f32 else (2.0**16, 2.0**16, 2.0**16, 2.0**40, 2.0**16)
+    for k, guard in enumerate([model.temperature_guard(), *map(model.guard, model.channels())]):
+        record = image.array["guards"][8 * k : 8 * k + 8]
+        wanted = [guard[n] for n in ("low", "high", "max_step", "max_rate_per_min", "fallback")]
+        wanted[3] /= 60e6
+        for word, want, scale in zip((*record[:4], record[7]), wanted, scales, strict=True):
+            got, most = image.number(word), (math.inf if f32 else 2**31 - 1)
+            room = abs(want) * 2.0**-24 * 1.000001 if f32 else 0.5000001
+            if abs(got - min(max(want * scale, -most), most)) > room:
+                yield f"guard of channel {k}: {got}, the model says {want}"
+        times = [guard["agree_s"] * 1e6, guard["stuck_s"] * 1e6, guard["missing_s"] * 1e6 / block_us]
+        if any(abs(w - t) > 0.5000001 for w, t in zip(record[4:7], times, strict=True)):
+            yield f"guard of channel {k}: times {record[4:7]}, the model says {times}"
 
 
 def check_regions(model: Model, image: Image) -> Iterator[str]:

@@ -1,7 +1,7 @@
 /* gtc_rlg_0042.c - bias table of gyro RLG-0042. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 3a1d04c46810450057e0c6c72e7ff517857928ac6b3d5846b106b6b3fe4c19d7
+ * Model:       sha256 f4a8697c2183a704aa5df4f4abb05911b97f6f74d995bd6355095ccff5f139ce
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -9,14 +9,21 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 1
-#error "gtc_rlg_0042.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_rlg_0042.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
 /* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x2d474c52UL), B(0x32343030UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[8] = {
@@ -35,6 +42,11 @@ static const gtc_word_t f32_centers[50] = {
     V(0.435255051F), V(77.1773071F), V(-0.415244102F), V(3.68802929F), V(0.0034676108F), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
     V(0.73853302F), V(134.191986F), V(-0.196117401F), V(5.6845088F), V(0.0017929693F), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
     V(0.943508148F), V(97.7552109F), V(-0.196278572F), V(6.46356249F), V(0.00183206401F), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[8] = {
+    V(-90.0F), V(200.0F), V(1.0F), V(4.99999999e-07F), B(0xf4240UL), B(0x0UL), B(0x1eUL), V(0.0F), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -56,17 +68,19 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_rlg_0042_f32 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xcf4eb7abUL,
+    .calibrated = 20260307UL,
+    .block_us = 10000000UL,
     .slope_blocks = 10UL,
-    .hold_blocks = 30UL,
-    .stuck_samples = 0UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
-    .max_step = V(1.0F),
-    .max_slope = V(5.0F),
     .fallback = V(0.00726183504F),
+    .authority = { V(-15000000.0F), V(15000000.0F) },
+    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .rezero = V(0.0F),
     .scale = { V(17.595499F), V(0.0198339894F), V(2.54609966F) },
     .envelope = { V(-32.8230019F), V(68.0139999F), V(-0.392757595F), V(0.392727345F) },
     .n_networks = 1UL,
@@ -75,19 +89,28 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .n_terms = 0UL,
     .coverage_cells = { 32UL, 12UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
+    .guards = f32_guards,
     .terms = NULL,
     .coverage = f32_coverage,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x69ab790aUL,
+    .crc = 0x4e51f94bUL,
     .term_code = { NULL },
-    .serial = "RLG-0042",
 };
 
 /* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x2d474c52UL), B(0x32343030UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
@@ -106,6 +129,11 @@ static const gtc_word_t q31_centers[50] = {
     B(0x00004d2dUL), B(0xc89dfd49UL), B(0x000003b0UL), B(0xfeebfd6dUL), B(0x038d025cUL), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
     B(0x00008631UL), B(0x8b5a5cccUL), B(0x000005afUL), B(0xfdb72986UL), B(0x01d603e3UL), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
     B(0x000061c1UL), B(0xa1020e4eUL), B(0x00000677UL), B(0xfd66e7deUL), B(0x01e04e64UL), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[8] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00010000UL), B(0x0008637cUL), B(0xf4240UL), B(0x0UL), B(0x1eUL), B(0x00000000UL), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -127,17 +155,19 @@ static const gtc_word_t q31_probes[32] = {
 };
 
 const gtc_q31_table_t gtc_rlg_0042_q31 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xcf4eb7abUL,
+    .calibrated = 20260307UL,
+    .block_us = 10000000UL,
     .slope_blocks = 10UL,
-    .hold_blocks = 30UL,
-    .stuck_samples = 0UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 34UL,
-    .max_step = 65536L,
-    .max_slope = 327680L,
     .fallback = 124757378L,
+    .authority = { -2147483647L, 2147483647L },
+    .effect = { -2147483647L, 2147483647L },
+    .rezero = 0L,
     .scale = { 1331036L, 170870916L, 4L },
     .envelope = { -2151088L, 4457366L, -25740L, 25738L },
     .n_networks = 1UL,
@@ -146,15 +176,17 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .n_terms = 0UL,
     .coverage_cells = { 32UL, 12UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
+    .guards = q31_guards,
     .terms = NULL,
     .coverage = q31_coverage,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x0ea95a54UL,
+    .crc = 0xf4f423ccUL,
     .term_code = { NULL },
-    .serial = "RLG-0042",
 };
 

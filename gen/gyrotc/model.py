@@ -37,6 +37,7 @@ __all__ = [
     "Coverage",
     "DataFile",
     "Envelope",
+    "Guard",
     "Model",
     "Network",
     "Scale",
@@ -166,6 +167,31 @@ class Term(_Frozen):
         return table
 
 
+class Guard(_Frozen):
+    """What is believed of an auxiliary channel, in its unit; times in s.
+
+    Beyond `low` ... `high` the edge is taken. A change is believed up to `max_step`, and `max_rate_per_min` for the
+    time since the last reading that was believed; anything else must agree with itself for `agree_s`, and so must the
+    first readings. A reading that stays the same for `stuck_s` is none (0: never). After `missing_s` without enough
+    readings `fallback` stands for the channel.
+    """
+
+    low: Annotated[float, Field(ge=-1e9, le=1e9)]
+    high: Annotated[float, Field(ge=-1e9, le=1e9)]
+    max_step: Annotated[float, Field(ge=0.0, le=1e9)]
+    max_rate_per_min: Annotated[float, Field(ge=0.0, le=1e9)]
+    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)]
+    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)]
+    missing_s: Annotated[float, Field(gt=0.0, le=1e6)]
+    fallback: Annotated[float, Field(ge=-1e9, le=1e9)]
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Guard:
+        if not self.low <= self.fallback <= self.high:
+            raise ValueError("low, fallback and high are not in this order")
+        return self
+
+
 class DataFile(_Frozen):
     """One recording, or a span of one, that the model was fitted to (or that was left for the exam)."""
 
@@ -184,16 +210,20 @@ class Model(_Frozen):
     method: Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,31}$")]
     block_s: Annotated[float, Field(gt=0.0, le=3600.0)]
     slope_blocks: Annotated[int, Field(ge=2, le=20)]
+    lead_blocks: Annotated[int, Field(ge=0, le=1)] = 0
     scale: Scale
     envelope: Envelope
     coverage: Coverage | None
     networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)]
     terms: Annotated[tuple[Term, ...], Field(max_length=4)] = ()
     fallback_dph: Dph
+    rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
     hold_blocks: Annotated[int, Field(ge=1, le=100000)]
-    stuck_samples: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
+    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
     max_step_c: Positive
     max_rate_c_per_min: Positive
+    guards: dict[str, Guard] = {}
     noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None
     noise_floor_source: Literal["estimated"] | None
     average_s: Annotated[float, Field(gt=0.0, le=1e6)] = 100.0

@@ -5,6 +5,20 @@
 #define WINDOW 4
 #define STEP C(0.015625) /* per sample: 1/16 C per block */
 
+/* The test table with another guard of its temperature. */
+static table_t guarded(gtc_word_t guard[GTC_GUARD_WORDS], uint_least32_t at, uint_least32_t bits)
+{
+    table_t table = TABLE;
+
+    memcpy(guard, TABLE.guards, GTC_GUARD_WORDS * sizeof guard[0]);
+    guard[at].bits = bits;
+    table.guards = guard;
+    return table;
+}
+
+#define STUCK_US 5U
+#define MISSING_BLOCKS 6U
+
 TEST(before_the_first_sample_the_correction_is_zero_and_held)
 {
     state_t state = started();
@@ -99,12 +113,12 @@ TEST(a_window_with_too_many_holes_warms_again)
 
 TEST(a_long_window_needs_half_of_its_blocks)
 {
-    table_t table = TABLE;
+    gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, MISSING_BLOCKS, 9U);
     state_t state;
     int k;
 
     table.slope_blocks = 8U;
-    table.hold_blocks = 9U;
     CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
     (void)feed(&state, C(15.0), 5);
     (void)feed(&state, C(15.25), 4);
@@ -123,10 +137,10 @@ TEST(a_long_window_needs_half_of_its_blocks)
 
 TEST(the_gap_is_counted_no_further_than_65535)
 {
-    table_t table = TABLE;
+    gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, MISSING_BLOCKS, 100000UL);
     state_t state;
 
-    table.hold_blocks = 100000UL;
     CHECK_INT(GTC_OK, FN(init)(&state, &table, 1U));
     (void)feed(&state, C(15.0), 1);
     CHECK((FN(missed)(&state, 70000UL) & GTC_HELD) != 0);
@@ -215,10 +229,10 @@ TEST(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says)
 
 TEST(a_table_that_believes_any_number_of_identical_samples)
 {
-    table_t table = TABLE;
+    gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, STUCK_US, 0U);
     state_t state;
 
-    table.stuck_samples = 0U;
     CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
     CHECK_INT(GTC_OK, feed(&state, C(10.0), 100));
 }
@@ -257,14 +271,16 @@ TEST(a_table_that_this_build_cannot_use_is_refused)
         CHECK((status == GTC_E_LAYOUT) || (status == GTC_E_IMAGE));  \
     } while (0)
 
-    REFUSED(table.layout = 2U);
+    REFUSED(table.layout = 1U);
     REFUSED(table.quantity = 1U);
     REFUSED(table.unit = 1U);
     REFUSED(table.slope_blocks = 1U);
     REFUSED(table.slope_blocks = GTC_MAX_SLOPE_BLOCKS + 1U);
-    REFUSED(table.hold_blocks = 0U);
-    REFUSED(table.hold_blocks = 100001UL);
-    REFUSED(table.stuck_samples = 0x80000000UL);
+    REFUSED(table.lead_blocks = 2U);
+    REFUSED(table.block_us = 0U);
+    REFUSED(table.serial = NULL);
+    REFUSED(table.guards = NULL);
+    REFUSED(table.n_sigma = 0U);
     REFUSED(table.n_networks = 0U);
     REFUSED(table.n_networks = 17U);
     REFUSED(table.networks = NULL);

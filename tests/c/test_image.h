@@ -60,13 +60,17 @@ static inline uint_least32_t image_of(const table_t *table, gtc_word_t *image)
     image[n++].bits = table->quantity;
     image[n++].bits = table->unit;
     image[n++].bits = table->id;
+    image[n++].bits = table->calibrated;
+    image[n++].bits = table->block_us;
     image[n++].bits = table->slope_blocks;
-    image[n++].bits = table->hold_blocks;
-    image[n++].bits = table->stuck_samples;
+    image[n++].bits = table->lead_blocks;
     image[n++].bits = table->bias_frac_bits;
-    image[n++].bits = MEMBER_WORD(table->max_step);
-    image[n++].bits = MEMBER_WORD(table->max_slope);
     image[n++].bits = MEMBER_WORD(table->fallback);
+    image[n++].bits = MEMBER_WORD(table->authority[0]);
+    image[n++].bits = MEMBER_WORD(table->authority[1]);
+    image[n++].bits = MEMBER_WORD(table->effect[0]);
+    image[n++].bits = MEMBER_WORD(table->effect[1]);
+    image[n++].bits = MEMBER_WORD(table->rezero);
     for (i = 0U; i < 3U; i++) {
         image[n++].bits = MEMBER_WORD(table->scale[i]);
     }
@@ -81,12 +85,15 @@ static inline uint_least32_t image_of(const table_t *table, gtc_word_t *image)
     image[n++].bits = table->coverage_cells[1];
     image[n++].bits = table->sigma_cells[0];
     image[n++].bits = table->sigma_cells[1];
+    image[n++].bits = table->n_sigma;
     image[n++].bits = table->n_probes;
+    n = put(image, n, table->serial, 16U);
     n = put(image, n, table->networks, table->n_networks * 8U);
     n = put(image, n, table->centers, table->n_centers * 5U);
+    n = put(image, n, table->guards, table->n_channels * 8U);
     n = put(image, n, table->terms, table->n_terms * 8U);
     n = put(image, n, table->coverage, ((table->coverage_cells[0] * table->coverage_cells[1]) + 31U) / 32U);
-    n = put(image, n, table->sigma, table->sigma_cells[0] * table->sigma_cells[1]);
+    n = put(image, n, table->sigma, table->n_sigma);
     n = put(image, n, table->probes, table->n_probes * 4U);
     n++;
     image[2].bits = n;

@@ -1,7 +1,7 @@
 /* test_limits.c - images with a right CRC whose words lie outside their ranges: refused, however they came about. */
 #include "test_image.h"
 
-#define NETWORK 29U /* word of an image at which its networks begin */
+#define NETWORK 50U /* word of an image at which its networks begin */
 
 static gtc_word_t image[IMAGE_MAX];
 
@@ -48,7 +48,7 @@ static uint_least32_t centers_at(const table_t *table)
 #if GTC_OPEN_TERMS
 static uint_least32_t terms_at(const table_t *table)
 {
-    return centers_at(table) + (table->n_centers * GTC_CENTER_WORDS);
+    return centers_at(table) + (table->n_centers * GTC_CENTER_WORDS) + (table->n_channels * GTC_GUARD_WORDS);
 }
 #endif
 
@@ -75,20 +75,74 @@ static float infinite(void)
 
 TEST(members_keep_to_their_ranges)
 {
-    REFUSED(TABLE, 10U, -1.0F, -1L);
-    REFUSED(TABLE, 10U, 1.1e6F, -2147483647L);
-    REFUSED(TABLE, 11U, 1.1e8F, -1L);
-    REFUSED(TABLE, 12U, 7.6e6F, 1073741825L);
-    REFUSED(TABLE, 12U, -7.6e6F, -1073741825L);
-    REFUSED(TABLE, 13U, -201.0F, -1L);
-    REFUSED(TABLE, 14U, 1.1e12F, -1L);
-    REFUSED(TABLE, 15U, -1.0F, 33L);
-    REFUSED(TABLE, 15U, -1.0F, -1L);
-    REFUSED(TABLE, 16U, -201.0F, -13107201L);
-    REFUSED(TABLE, 17U, 401.0F, 26214401L);
-    OPENED(TABLE, 10U, 1.0e6F, 2147483647L);
-    OPENED(TABLE, 10U, 0.0F, 0L);
-    OPENED(TABLE, 12U, 7.5e6F, -1073741824L);
+    REFUSED(TABLE, 11U, 7.6e6F, 1073741825L);
+    REFUSED(TABLE, 11U, -7.6e6F, -1073741825L);
+    REFUSED(TABLE, 12U, -1.6e7F, 1L);
+    REFUSED(TABLE, 12U, 1.0e-9F, GTC_TEMP_MISSING);
+    REFUSED(TABLE, 13U, -1.0e-9F, -1L);
+    REFUSED(TABLE, 14U, 1.0e-9F, 1L);
+    REFUSED(TABLE, 15U, -1.0e-9F, -1L);
+    REFUSED(TABLE, 16U, -1.0e-9F, -1L);
+    REFUSED(TABLE, 17U, -201.0F, -1L);
+    REFUSED(TABLE, 18U, 1.1e12F, -1L);
+    REFUSED(TABLE, 19U, -1.0F, 33L);
+    REFUSED(TABLE, 19U, -1.0F, -1L);
+    REFUSED(TABLE, 20U, -201.0F, -13107201L);
+    REFUSED(TABLE, 21U, 401.0F, 26214401L);
+    OPENED(TABLE, 16U, 7.5e6F, 1073741824L);
+    OPENED(TABLE, 16U, 0.0F, 0L);
+}
+
+/* The constant correction is one that the table may give. */
+TEST(a_fallback_beyond_the_authority_is_refused)
+{
+    image_of(&TABLE, image);
+    OPENED(TABLE, 13U, image[11].value, image[11].integer);
+    REFUSED(TABLE, 13U, 0.0F, 0L);
+}
+
+/* A guard of the test table's only channel. */
+TEST(guards_keep_to_their_ranges)
+{
+    const uint_least32_t guard = centers_at(&TABLE) + (TABLE.n_centers * GTC_CENTER_WORDS);
+    gtc_word_t word;
+
+    REFUSED(TABLE, guard, -90.1F, (-90L * 65536L) - 1L);
+    REFUSED(TABLE, guard, 201.0F, 201L * 65536L);
+    REFUSED(TABLE, guard + 1U, 200.1F, (200L * 65536L) + 1L);
+    REFUSED(TABLE, guard + 2U, -1.0F, -1L);
+    REFUSED(TABLE, guard + 2U, 1.1e9F, -2147483647L);
+    REFUSED(TABLE, guard + 3U, -1.0F, -1L);
+    OPENED(TABLE, guard + 2U, 1.0e9F, 2147483647L);
+    OPENED(TABLE, guard + 2U, 0.0F, 0L);
+    word.bits = 0x80000000UL;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, guard + 4U, word));
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, guard + 5U, word));
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, guard + 6U, word));
+    word.bits = 0U;
+    CHECK_INT(GTC_OK, status_with(&TABLE, guard + 4U, word));
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, guard + 6U, word));
+    word.bits = 100001UL;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, guard + 6U, word));
+}
+
+TEST(whole_numbers_keep_to_their_ranges)
+{
+    gtc_word_t word;
+
+    word.bits = 0U;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, 7U, word));
+    CHECK_INT(GTC_OK, status_with(&TABLE, 6U, word));
+    word.bits = 3600000001UL;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, 7U, word));
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, 6U, word));
+    word.bits = 2U;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, 9U, word));
+    word.bits = 1U;
+    CHECK_INT(GTC_OK, status_with(&TABLE, 9U, word));
+    /* fewer words of the uncertainty than cells of it */
+    word.bits = 200U;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&TABLE, 30U, word));
 }
 
 #if !TEST_Q31
@@ -96,7 +150,7 @@ TEST(what_is_no_number_is_refused)
 {
     uint_least32_t at;
 
-    for (at = 10U; at < 20U; at++) {
+    for (at = 11U; at < 24U; at++) {
         REFUSED(TABLE, at, not_a_number(), 0L);
         REFUSED(TABLE, at, infinite(), 0L);
         REFUSED(TABLE, at, -infinite(), 0L);
@@ -111,22 +165,22 @@ TEST(what_is_no_number_is_refused)
 /* 8 half ranges are the farthest that normalised inputs reach. */
 TEST(inputs_beyond_the_normalised_range_are_refused)
 {
-    REFUSED(TABLE, 14U, 1.0F, 0L);
-    REFUSED(TABLE, 15U, 100.0F, 0L);
-    REFUSED(TABLE, 15U, infinite(), 0L);
-    REFUSED(TABLE, 13U, 400.0F, 0L);
-    REFUSED(TABLE, 18U, -1.0e5F, 0L);
+    REFUSED(TABLE, 18U, 1.0F, 0L);
+    REFUSED(TABLE, 19U, 100.0F, 0L);
+    REFUSED(TABLE, 19U, infinite(), 0L);
+    REFUSED(TABLE, 17U, 400.0F, 0L);
+    REFUSED(TABLE, 22U, -1.0e5F, 0L);
 }
 #else
 /* An envelope spans 26 bits and its positions end with 65535. */
 TEST(positions_beyond_the_last_are_refused)
 {
-    REFUSED(TABLE, 13U, 0.0F, 2147483647L);
-    REFUSED(TABLE, 14U, 0.0F, 2147483647L);
-    OPENED(TABLE, 13U, 0.0F, 0L);
-    REFUSED(TABLE, 18U, 0.0F, -1073741824L);
-    REFUSED(TABLE, 18U, 0.0F, 32769L);
-    REFUSED(TABLE, 18U, 0.0F, 1073741824L);
+    REFUSED(TABLE, 17U, 0.0F, 2147483647L);
+    REFUSED(TABLE, 18U, 0.0F, 2147483647L);
+    OPENED(TABLE, 17U, 0.0F, 0L);
+    REFUSED(TABLE, 22U, 0.0F, -1073741824L);
+    REFUSED(TABLE, 22U, 0.0F, 32769L);
+    REFUSED(TABLE, 22U, 0.0F, 1073741824L);
 }
 
 /* s x + k keeps to 32 bits over all positions, its negative too. */
@@ -166,6 +220,7 @@ TEST(a_sum_of_weights_that_could_overflow_is_refused)
 TEST(weights_and_gains_keep_to_their_ranges)
 {
     const uint_least32_t center = centers_at(&TABLE);
+    const uint_least32_t sigma = center + (TABLE.n_centers * GTC_CENTER_WORDS) + GTC_GUARD_WORDS + 1U;
 
     REFUSED(TABLE, NETWORK + 1U, 7.6e6F, 1073741825L);
     REFUSED(TABLE, NETWORK + 2U, -7.6e6F, -1073741825L);
@@ -175,8 +230,8 @@ TEST(weights_and_gains_keep_to_their_ranges)
     REFUSED(TABLE, center + 1U, -1.0F, 0L);
     REFUSED(TABLE, center + 1U, 1.1e4F, 0L);
 #endif
-    REFUSED(TABLE, centers_at(&TABLE) + (TABLE.n_centers * GTC_CENTER_WORDS) + 1U, 7.6e6F, -1L); /* sigma */
-    REFUSED(TABLE, centers_at(&TABLE) + (TABLE.n_centers * GTC_CENTER_WORDS) + 2U, -1.0F, -2147483647L);
+    REFUSED(TABLE, sigma, 7.6e6F, -1L);
+    REFUSED(TABLE, sigma + 1U, -1.0F, -2147483647L);
 }
 
 /* A table that is linked, with its checksum mended. */
@@ -185,7 +240,7 @@ TEST(a_linked_table_keeps_to_the_ranges_too)
     table_t table = TABLE;
     state_t state;
 
-    table.stuck_samples = 0x80000000UL;
+    table.calibrated = 0x80000000UL;
     table.crc = image[image_of(&table, image) - 1U].bits;
     CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
     CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
@@ -193,8 +248,8 @@ TEST(a_linked_table_keeps_to_the_ranges_too)
 
 TEST(an_envelope_of_one_value_is_one)
 {
-    OPENED(TABLE, 17U, -20.0F, -1310720L);
-    REFUSED(TABLE, 17U, -20.0F - 1.0F, -1310720L - 1L);
+    OPENED(TABLE, 21U, -20.0F, -1310720L);
+    REFUSED(TABLE, 21U, -20.0F - 1.0F, -1310720L - 1L);
 }
 
 TEST(a_region_that_is_reversed_is_refused)
@@ -273,6 +328,9 @@ TEST(terms_read_the_channels_that_are_theirs)
 int main(void)
 {
     RUN(members_keep_to_their_ranges);
+    RUN(a_fallback_beyond_the_authority_is_refused);
+    RUN(guards_keep_to_their_ranges);
+    RUN(whole_numbers_keep_to_their_ranges);
 #if TEST_Q31
     RUN(positions_beyond_the_last_are_refused);
     RUN(arguments_beyond_their_word_are_refused);

@@ -5,7 +5,7 @@
 #define LAYOUT_WORD 1
 #define LENGTH_WORD 2
 #define ID_WORD 5
-#define FIRST_COUNT 20
+#define FIRST_COUNT 24
 
 static gtc_word_t image[MOST_WORDS];
 static uint_least32_t n_image;
@@ -58,11 +58,13 @@ static void make_image(void)
     put(GTC_IMAGE_MAGIC);
     put(t->layout + (65536UL * (1U + TEST_Q31)));
     put(0U);
-    put_words((const gtc_word_t *)(const void *)&t->quantity, 26U);
+    put_words((const gtc_word_t *)(const void *)&t->quantity, 31U);
+    put_words(t->serial, GTC_SERIAL_WORDS);
     put_words(t->networks, t->n_networks * GTC_NETWORK_WORDS);
     put_words(t->centers, t->n_centers * GTC_CENTER_WORDS);
+    put_words(t->guards, t->n_channels * GTC_GUARD_WORDS);
     put_words(t->coverage, 1U);
-    put_words(t->sigma, t->sigma_cells[0] * t->sigma_cells[1]);
+    put_words(t->sigma, t->n_sigma);
     put_words(t->probes, t->n_probes * GTC_PROBE_WORDS);
     put(0U);
     image[LENGTH_WORD].bits = n_image;
@@ -100,7 +102,9 @@ TEST(an_opened_table_gives_the_same_bits_as_the_compiled_one)
     CHECK_INT(GTC_OK, opened(&table, n_image));
     CHECK_INT(GTC_OK, FN(check)(&table));
     CHECK_INT(TABLE.crc, table.crc);
-    CHECK((table.serial == NULL) && (table.term_code[0] == NULL) && (table.terms == NULL));
+    CHECK((table.term_code[0] == NULL) && (table.terms == NULL));
+    CHECK((memcmp(table.serial, TABLE.serial, GTC_SERIAL_WORDS * sizeof table.serial[0]) == 0)
+          && (table.calibrated == TABLE.calibrated));
     CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
     for (i = 0; i < 400; i++) {
         const num_t temp = (num_t)(C(-30) + ((C(1) / 4) * (num_t)i));
@@ -194,13 +198,31 @@ static int changed(uint_least32_t word, uint_least32_t bits)
 TEST(foreign_images_are_refused)
 {
     CHECK_INT(GTC_E_ID, changed(ID_WORD, GTC_TEST_1_ID ^ 1U));
-    CHECK_INT(GTC_E_LAYOUT, changed(LAYOUT_WORD, 2U + (65536UL * (1U + TEST_Q31))));
-    CHECK_INT(GTC_E_LAYOUT, changed(LAYOUT_WORD, 1U + (65536UL * (2U - TEST_Q31))));
+    CHECK_INT(GTC_E_LAYOUT, changed(LAYOUT_WORD, 3U + (65536UL * (1U + TEST_Q31))));
+    CHECK_INT(GTC_E_LAYOUT, changed(LAYOUT_WORD, 2U + (65536UL * (2U - TEST_Q31))));
     CHECK_INT(GTC_E_LAYOUT, changed(LAYOUT_WORD, 0U));
     CHECK_INT(GTC_E_LAYOUT, changed(3U, 1U)); /* quantity */
     CHECK_INT(GTC_E_LAYOUT, changed(4U, 1U)); /* unit */
-    CHECK_INT(GTC_E_LAYOUT, changed(6U, GTC_MAX_SLOPE_BLOCKS + 1U));
-    CHECK_INT(GTC_E_LAYOUT, changed(6U, 0U));
+    CHECK_INT(GTC_E_LAYOUT, changed(8U, GTC_MAX_SLOPE_BLOCKS + 1U));
+    CHECK_INT(GTC_E_LAYOUT, changed(8U, 0U));
+}
+
+/* Other layouts may be shorter than this one. */
+TEST(a_short_image_of_another_layout_is_told_as_one)
+{
+    table_t table;
+
+    n_image = 0U;
+    put(GTC_IMAGE_MAGIC);
+    put(1U + (65536UL * (1U + TEST_Q31)));
+    put(5U);
+    put(0U);
+    put(0U);
+    seal();
+    CHECK_INT(GTC_E_LAYOUT, opened(&table, n_image));
+    image[LAYOUT_WORD].bits = GTC_TABLE_LAYOUT + (65536UL * (1U + TEST_Q31));
+    seal();
+    CHECK_INT(GTC_E_IMAGE, opened(&table, n_image));
 }
 
 /* Counts that do not make up the length, up to products and sums that wrap, with a right CRC. */
@@ -212,10 +234,10 @@ TEST(sizes_must_make_up_the_length)
     uint_least32_t count;
     uint_least32_t i;
 
-    for (count = 0; count < 9U; count++) {
+    for (count = 0; count < 10U; count++) {
         for (i = 0; i < 8U; i++) {
             make_image();
-            if ((count != 2U) && (image[FIRST_COUNT + count].bits != wrong[i])) { /* not n_channels */
+            if (((count < 6U) || (count > 7U)) && (image[FIRST_COUNT + count].bits != wrong[i])) { /* not cells of sigma */
                 CHECK_INT(GTC_E_IMAGE, changed(FIRST_COUNT + count, wrong[i]));
             }
         }
@@ -262,6 +284,7 @@ int main(void)
     RUN(truncated_images_are_refused);
     RUN(the_other_byte_order_is_refused);
     RUN(foreign_images_are_refused);
+    RUN(a_short_image_of_another_layout_is_told_as_one);
     RUN(sizes_must_make_up_the_length);
     RUN(what_was_not_compiled_in_is_refused);
     RUN(null_pointers_are_refused);

@@ -42,7 +42,7 @@ TEST(more_terms_than_there_is_room_for_are_refused)
         image[i] = image[i - 8U];
     }
     image[2].bits = n;
-    image[23].bits = TERMS.n_terms + 1U;
+    image[27].bits = TERMS.n_terms + 1U;
     CHECK_INT(GTC_E_LAYOUT, try_open(n));
 }
 

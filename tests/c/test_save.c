@@ -206,7 +206,7 @@ TEST(bad_arguments_are_refused)
 
     saved(&state, words);
     none.table = NULL;
-    unusable.layout = 2U;
+    unusable.layout = 1U;
     CHECK_INT(GTC_E_ARG, FN(save)(NULL, words));
     CHECK_INT(GTC_E_ARG, FN(save)(&state, NULL));
     CHECK_INT(GTC_E_ARG, FN(save)(&none, words));

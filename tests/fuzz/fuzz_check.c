@@ -1,7 +1,7 @@
 /* fuzz_check.c - gtc_<n>_check() of tables that are spoiled in values and settings: none passes. */
 #include "fuzz.h"
 
-#define COPIES 6
+#define COPIES 8
 
 /* Copies of the arrays of a table, to spoil. */
 static gtc_word_t arrays[COPIES][IMAGE_MAX];
@@ -26,8 +26,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     table.centers = copied(1, from->centers, from->n_centers * 5U);
     table.terms = copied(2, from->terms, from->n_terms * 8U);
     table.coverage = copied(3, from->coverage, ((from->coverage_cells[0] * from->coverage_cells[1]) + 31U) / 32U);
-    table.sigma = copied(4, from->sigma, from->sigma_cells[0] * from->sigma_cells[1]);
+    table.sigma = copied(4, from->sigma, from->n_sigma);
     table.probes = copied(5, from->probes, from->n_probes * 4U);
+    table.guards = copied(6, from->guards, from->n_channels * 8U);
+    table.serial = copied(7, from->serial, 16U);
     n = image_of(&table, before);
     if (k < COPIES) {
         spoil(&in, arrays[k], 8U);
@@ -35,8 +37,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         /* what is no count: counts say where arrays end, and nothing can check them */
         table.id ^= (k & 1U) * next_word(&in);
         table.slope_blocks ^= ((k >> 1) & 1U) * next_word(&in);
-        table.hold_blocks ^= ((k >> 2) & 1U) * next_word(&in);
-        table.stuck_samples ^= ((k >> 3) & 1U) * next_word(&in);
+        table.block_us ^= ((k >> 2) & 1U) * next_word(&in);
+        table.calibrated ^= ((k >> 3) & 1U) * next_word(&in);
         table.bias_frac_bits ^= ((k >> 4) & 1U) * next_word(&in);
         table.quantity ^= ((k >> 5) & 1U) * next_word(&in);
         table.layout ^= ((k >> 6) & 1U) * next_word(&in);

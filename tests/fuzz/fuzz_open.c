@@ -41,7 +41,7 @@ static uint_least32_t made(stream_t *in, gtc_word_t *words, uint_least32_t *id)
 
         spoil(in, words, n);
         n -= (cut < n) ? (cut / 8U) : 0U;
-        if ((kind == 2U) && (words[2].bits >= 33U) && (words[2].bits <= n)) {
+        if ((kind == 2U) && (words[2].bits >= 4U) && (words[2].bits <= n)) {
             seal(words, words[2].bits);
         }
     }
@@ -72,7 +72,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         read_all(table.centers, table.n_centers * GTC_CENTER_WORDS);
         read_all(table.terms, table.n_terms * GTC_TERM_WORDS);
         read_all(table.coverage, ((table.coverage_cells[0] * table.coverage_cells[1]) + 31U) / 32U);
-        read_all(table.sigma, table.sigma_cells[0] * table.sigma_cells[1]);
+        read_all(table.sigma, table.n_sigma);
+        read_all(table.guards, table.n_channels * GTC_GUARD_WORDS);
+        read_all(table.serial, GTC_SERIAL_WORDS);
         read_all(table.probes, table.n_probes * GTC_PROBE_WORDS);
     }
     free(image);

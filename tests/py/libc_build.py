@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.reference.table import ARRAYS, Table, Words
+from gyrotc.reference.table import ARRAYS, LAYOUT, Table, Words
 
 ROOT = Path(__file__).resolve().parents[2]
 _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing-declarations shadow error"
@@ -30,15 +30,15 @@ def _table_struct() -> type[ctypes.Structure]:
     """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
     integers = (
-        "layout quantity unit id slope_blocks hold_blocks stuck_samples bias_frac_bits "
-        "max_step max_slope fallback"
+        "layout quantity unit id calibrated block_us slope_blocks lead_blocks bias_frac_bits fallback"
     )
     fields: list[Any] = [(name, u32) for name in integers.split()]
+    fields += [("authority", u32 * 2), ("effect", u32 * 2), ("rezero", u32)]
     fields += [("scale", u32 * 3), ("envelope", u32 * 4)]
     fields += [(name, u32) for name in ("n_networks", "n_centers", "n_channels", "n_terms")]
-    fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_probes", u32)]
+    fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_sigma", u32), ("n_probes", u32)]
     fields += [(name, pointer) for name in ARRAYS]
-    fields += [("crc", u32), ("term_code", pointer * 4), ("serial", ctypes.c_char_p)]
+    fields += [("crc", u32), ("term_code", pointer * 4)]
     return type("TableStruct", (ctypes.Structure,), {"_fields_": fields})
 
 
@@ -98,19 +98,20 @@ class Runtime:
     def struct(self, table: Table) -> tuple[ctypes.Structure, list[Any]]:
         """The C struct of a table, and what must be kept alive with it."""
         struct = _table_struct()()
-        struct.layout, struct.crc, struct.serial = 1, table.crc, table.serial.encode()
-        for name in ("id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits"):
+        struct.layout, struct.crc = LAYOUT, table.crc
+        for name in ("id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits"):
             setattr(struct, name, getattr(table, name))
-        for name in ("max_step", "max_slope", "fallback", "n_channels"):
+        struct.n_channels, struct.n_sigma = table.n_channels, table.sigma.size
+        for name in ("fallback", "rezero"):
             setattr(struct, name, getattr(table, name))
-        for name in ("scale", "envelope", "coverage_cells", "sigma_cells"):
+        for name in ("authority", "effect", "scale", "envelope", "coverage_cells", "sigma_cells"):
             getattr(struct, name)[:] = getattr(table, name)
         keep = []
         for name, width in ARRAYS.items():
             words = np.ascontiguousarray(getattr(table, name), dtype=np.uint32)
             keep.append(words)
             setattr(struct, name, words.ctypes.data if words.size else None)
-            if width:
+            if width and name != "guards":
                 setattr(struct, f"n_{name}", words.size // width)
         for i, kind in enumerate(table.terms[:: ARRAYS["terms"]].tolist()):
             name = linked(f"gtc_{table.numeric}_term_{TERMS[kind]}")

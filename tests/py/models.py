@@ -46,7 +46,7 @@ def random_model(seed: int, **changes: Any) -> Model:
         ),
         "fallback_dph": float(rng.normal(0.0, 0.01)),
         "hold_blocks": int(rng.integers(1, 6)),
-        "stuck_samples": int(rng.choice([0, 0, 3, 20])),
+        "stuck_s": float(rng.choice([0.0, 0.0, 6.0, 40.0])),
         "max_step_c": float(rng.uniform(0.05, 1.0)),
         "max_rate_c_per_min": 6.0 * r,
         "noise_floor_dph": None,

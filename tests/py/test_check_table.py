@@ -116,12 +116,24 @@ def _coverage_inverted(table: Table) -> Table:
     return replace(table, coverage=_words(table, "coverage") ^ np.uint32(1))
 
 
-def _slope_per_minute(table: Table) -> Table:
-    factor = round(60.0 / table.block_s)
+def _rate_per_block(table: Table) -> Table:
+    words, factor = _words(table, "guards"), 1e-6 * table.block_us
     if table.numeric == "f32":
-        value = np.uint32(table.max_slope).view(np.float32) * np.float32(factor)
-        return replace(table, max_slope=int(value.view(np.uint32)))
-    return replace(table, max_slope=table.max_slope * factor)
+        words[3:4] = (words[3:4].view(np.float32) * np.float32(factor)).view(np.uint32)
+    else:
+        words[3] = round(int(words[3]) * factor)
+    return replace(table, guards=words)
+
+
+def _guard(column: int, change: Callable[[int], int]) -> Callable[[Table], Table]:
+    """Changes one word of the temperature's guard."""
+
+    def fault(table: Table) -> Table:
+        words = _words(table, "guards")
+        words[column] = change(int(words[column])) & 0xFFFFFFFF
+        return replace(table, guards=words)
+
+    return fault
 
 
 FAULTS: dict[str, Callable[[Table], Table]] = {
@@ -137,8 +149,13 @@ FAULTS: dict[str, Callable[[Table], Table]] = {
     "a Gaussian lost": _first_center_dropped,
     "T and slope swapped": _inputs_swapped,
     "one bit of the coverage": _coverage_inverted,
-    "limit of the slope per minute": _slope_per_minute,
-    "hold_blocks off by one": lambda t: replace(t, hold_blocks=t.hold_blocks + 1),
+    "limit of the rate per block": _rate_per_block,
+    "largest step": _guard(2, lambda w: w ^ (1 << 12)),
+    "time of agreement off by a microsecond": _guard(4, lambda w: w + 1),
+    "time until it is missing off by a block": _guard(6, lambda w: w + 1),
+    "block off by a microsecond": lambda t: replace(t, block_us=t.block_us + 1),
+    "a letter of the serial": lambda t: replace(t, serial=_words(t, "serial") ^ np.uint32(1)),
+    "date of calibration": lambda t: replace(t, calibrated=t.calibrated ^ 1),
     "slope_blocks off by one": lambda t: replace(t, slope_blocks=t.slope_blocks + 1),
     "fallback": lambda t: replace(t, fallback=(t.fallback ^ (1 << 20))),
     "id": lambda t: replace(t, id=t.id ^ 1),
@@ -174,7 +191,7 @@ EXTENDED_FAULTS: dict[str, Callable[[Table], Table]] = {
     "first parameter of a term": _array("terms", 2, lambda w: w + 2),
     "second parameter of a term": _array("terms", 3, lambda w: w + 2),
     "a parameter that the term has not": _array("terms", 7, lambda w: w + 1),
-    "channels": lambda t: replace(t, n_channels=t.n_channels + 1),
+    "channels": lambda t: replace(t, guards=np.concatenate([_words(t, "guards"), _words(t, "guards")[:8]])),
 }
 
 
@@ -223,7 +240,7 @@ def test_one_flipped_bit_of_source_image_hex_or_answers_is_seen(tmp_path: Path) 
     folder = emitted(tmp_path / "image")
     path = folder / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())
-    data[200] ^= 1
+    data[260] ^= 1
     path.write_bytes(data)
     assert _check(folder).returncode == 1
 

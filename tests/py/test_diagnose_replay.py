@@ -117,7 +117,6 @@ def _model(model_dict: dict[str, Any], front: FrontEnd, terms: list[dict[str, An
             "block_s": front.block_s,
             "slope_blocks": front.slope_blocks,
             "hold_blocks": front.hold_blocks,
-            "stuck_samples": front.stuck_samples,
             "max_step_c": front.max_step_c,
             "max_rate_c_per_min": front.max_rate_c_per_min,
             "terms": terms,

@@ -105,7 +105,6 @@ def test_a_bank_has_three_regions_and_blends_as_the_model_does() -> None:
             "networks": [dict(n) for n in found.networks],
             "fallback_dph": found.fallback_dph,
             "hold_blocks": 30,
-            "stuck_samples": 0,
             "max_step_c": 1.0,
             "max_rate_c_per_min": 30.0,
             "noise_floor_dph": found.noise_floor_dph,

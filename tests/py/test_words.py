@@ -17,14 +17,13 @@ from models import bank_with_channels, random_model, random_terms
 LAYOUT, SELF_TEST = -2, -3
 SCALARS = (
     "slope_blocks",
-    "hold_blocks",
-    "stuck_samples",
+    "lead_blocks",
+    "calibrated",
+    "block_us",
     "bias_frac_bits",
-    "max_step",
-    "max_slope",
     "fallback",
+    "rezero",
 )
-SCALARS += ("n_channels",)
 EDGES = [0, 1, 2, 0xFFFF, 0x10000, 0x3FFFFFFF, 0x40000000, 0x7FFFFFFF, 0x80000000, 0x80000001, 0xFFFFFFFF]
 EDGES += [0x7F800000, 0x7FC00000, 0x4E6E6B28, 0x42C80000, 0x3F800000, 0xBF800000, 0x4AE4E1C0]
 
@@ -42,17 +41,17 @@ def _word(rng: np.random.Generator, old: int) -> int:
 
 def _spoiled(rng: np.random.Generator, table: Table) -> Table:
     """The table with one word changed; kinds of terms stay, because a linked table comes with their code."""
-    at = int(rng.integers(10))
+    at = int(rng.integers(14))
     if at < 2:
         name = str(rng.choice(SCALARS))
         return replace(table, **{name: _word(rng, getattr(table, name))})
-    if at < 5:
-        name = ("scale", "envelope", "envelope")[at - 2]
+    if at < 7:
+        name = ("scale", "envelope", "envelope", "authority", "effect")[at - 2]
         words = list(getattr(table, name))
         k = int(rng.integers(len(words)))
         words[k] = _word(rng, words[k])
         return replace(table, **{name: tuple(words)})
-    names = [n for n in ("networks", "centers", "terms", "sigma") if getattr(table, n).size]
+    names = [n for n in ("networks", "centers", "guards", "guards", "terms", "sigma") if getattr(table, n).size]
     name = str(rng.choice(names))
     array = getattr(table, name).copy()
     k = int(rng.integers(array.size))

@@ -6,20 +6,27 @@ import struct
 from dataclasses import dataclass
 
 from ..model import Model
-from ..reference.table import LAYOUT, Table
+from ..quantise.terms import channel_names
+from ..reference.table import LAYOUT, SERIAL_WORDS, Table
 from ..terms.recursion import TableKind
 from ..texts import CText, c_code
 
 __all__ = ["TableText", "table_text"]
 
-_INTEGERS = ("quantity", "unit", "id", "slope_blocks", "hold_blocks", "stuck_samples", "bias_frac_bits")
-_NUMBERS = ("max_step", "max_slope", "fallback")
-_COUNTS = ("n_networks", "n_centers", "n_channels", "n_terms", "coverage_cells", "sigma_cells", "n_probes")
-_RECORDS = {"networks": 8, "centers": 5, "terms": 8, "probes": 4}
+_INTEGERS = (
+    "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits",
+)  # fmt: skip
+_NUMBERS = {"fallback": 1, "authority": 2, "effect": 2, "rezero": 1, "scale": 3, "envelope": 4}
+_COUNTS = (
+    "n_networks", "n_centers", "n_channels", "n_terms", "coverage_cells", "sigma_cells", "n_sigma", "n_probes",
+)  # fmt: skip
+_RECORDS = {"networks": 8, "centers": 5, "guards": 8, "terms": 8, "probes": 4}
 _TITLES = {"f32": "float32", "q31": "fixed point"}
 _ARRAY_COMMENTS = {
     "networks": "centers, w0, linear in T and slope, region: T min, max, slope min, max",
     "centers": "T: center, gain; slope: center, gain; weight",
+    "serial": "four characters of the serial a word, the first one lowest",
+    "guards": "low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback",
     "terms": "kind, channel, parameters",
     "coverage": "one bit for each cell of T (fastest) and slope, low bit first",
     "sigma": "1 sigma of the compensated bias, a row for each cell of slope",
@@ -64,15 +71,14 @@ def table_text(table: Table, model: Model) -> TableText:  # long: member after m
     """Decodes the image's words into named members; the order is that of gtc_table.h."""
     comments = _row_comments(model)
     words = iter(table.words[_HEAD_WORDS:])
-    sizes = {"scale": 3, "envelope": 4}
     counts: dict[str, list[int]] = {}
     members = [_member("layout", str(LAYOUT))]
     for name in _INTEGERS:
         word = next(words)
         members.append(_member(name, f"0x{word:08x}UL" if name == "id" else f"{word}UL"))
-    for name in (*_NUMBERS, "scale", "envelope"):
-        group = [_number(table.numeric, next(words)) for _ in range(sizes.get(name, 1))]
-        members.append(_member(name, f"{{ {', '.join(group)} }}" if name in sizes else group[0]))
+    for name, size in _NUMBERS.items():
+        group = [_number(table.numeric, next(words)) for _ in range(size)]
+        members.append(_member(name, f"{{ {', '.join(group)} }}" if size > 1 else group[0]))
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
         text = ", ".join(f"{n}UL" for n in counts[name])
@@ -100,13 +106,15 @@ def _member(name: str, text: str) -> _Member:
 
 
 def _array_lengths(counts: dict[str, list[int]]) -> dict[str, int]:
-    cells, sigma = counts["coverage_cells"], counts["sigma_cells"]
+    cells = counts["coverage_cells"]
     return {
+        "serial": SERIAL_WORDS,
         "networks": counts["n_networks"][0] * _RECORDS["networks"],
         "centers": counts["n_centers"][0] * _RECORDS["centers"],
+        "guards": counts["n_channels"][0] * _RECORDS["guards"],
         "terms": counts["n_terms"][0] * _RECORDS["terms"],
         "coverage": (cells[0] * cells[1] + 31) // 32,
-        "sigma": sigma[0] * sigma[1],
+        "sigma": counts["n_sigma"][0],
         "probes": counts["n_probes"][0] * _RECORDS["probes"],
     }
 
@@ -118,7 +126,8 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
         for n in model.networks
         for (t, r), (d_t, d_r), w in zip(n.centers, n.widths, n.weights, strict=True)
     ]
-    return {"centers": centers, "terms": [term.id for term in model.terms]}
+    channels = ["temperature_c", *channel_names(model)]
+    return {"centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
 
 
 def _width(width: float | None) -> str:
@@ -128,7 +137,7 @@ def _width(width: float | None) -> str:
 def _array(
     numeric: str, name: str, body: list[int], counts: dict[str, list[int]], comments: list[str]
 ) -> _Array:
-    width = _RECORDS.get(name, counts["sigma_cells"][0] if name == "sigma" else 6)
+    width = _RECORDS.get(name, (counts["sigma_cells"][0] or 6) if name == "sigma" else 6)
     rows = []
     for start in range(0, len(body), width):
         cells = [
@@ -142,7 +151,8 @@ def _array(
 def _is_integer(name: str, column: int) -> bool:
     """Words of a float32 table that are integers all the same."""
     return (
-        name == "coverage"
+        name in ("serial", "coverage")
+        or (name == "guards" and 4 <= column < 7)
         or (name == "networks" and column == 0)
         or (name == "terms" and column < 2)
         or (name == "probes" and column == 3)

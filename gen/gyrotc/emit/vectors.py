@@ -259,7 +259,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # l
         for alone in (n // 2 + 1, n // 2, 2 * n + 3):
             yield replace(ramp(alone, t, noise=40), kind="ALONE")
             yield ramp(3 * n - alone % n, t, noise=40)
-    if model.stuck_samples:
-        yield ramp(min(model.stuck_samples + 3 * n, 4000), t)
+    if model.stuck_s:
+        yield ramp(min(round(model.stuck_s / model.block_s * n) + 3 * n, 4000), t)
         yield ramp(window, t, noise=40)
     yield ramp(window, t, max(step // 7, 1), noise=2)

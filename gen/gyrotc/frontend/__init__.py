@@ -14,7 +14,14 @@ from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow,
 from .numbers import F32, Q31, Arithmetic
 from .screen import departing_rows
 from .stream import Stream
-from .training import Blocks, blocks_since_power_on, missed_before, run_blocks, samples_per_block
+from .training import (
+    Blocks,
+    blocks_since_power_on,
+    missed_before,
+    period_us,
+    run_blocks,
+    samples_per_block,
+)
 
 __all__ = [
     "BELIEVED",
@@ -36,6 +43,7 @@ __all__ = [
     "expand_missed",
     "follow",
     "missed_before",
+    "period_us",
     "positions",
     "run_blocks",
     "samples_per_block",

@@ -41,9 +41,10 @@ class Settings:
     samples_per_block: int
     slope_blocks: int
     hold_blocks: int
-    stuck_samples: int
+    period_us: int  # of the samples
+    stuck_us: int
     max_step: Any
-    max_slope: Any  # per block
+    max_rate: Any  # per microsecond; in fixed point 2^-40 C
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +114,9 @@ def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.int64]
 
 def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     """Follows samples x, shape (n,), from the start of a state on."""
-    step = arithmetic.step_per_sample(settings.max_slope, settings.samples_per_block)
-    verdict = believe(
-        arithmetic, x, max_step=settings.max_step, step=step, stuck_samples=settings.stuck_samples
-    )
+    step = arithmetic.step_per_sample(settings.max_rate, settings.period_us)
+    stuck_samples = -(-settings.stuck_us // settings.period_us)
+    verdict = believe(arithmetic, x, max_step=settings.max_step, step=step, stuck_samples=stuck_samples)
     valid, mean = _block_means(arithmetic, x, verdict, settings.samples_per_block)
     restarts, fallback = _restarts(verdict, valid, settings)
     # A block closes when the next sample arrives.

@@ -14,6 +14,7 @@ __all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
 _MISSING_Q31 = -(2**31)
+_LARGEST = 2**31 - 1
 
 
 class Arithmetic(Protocol):
@@ -29,7 +30,7 @@ class Arithmetic(Protocol):
 
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]: ...
 
-    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any: ...
+    def step_per_sample(self, max_rate: Any, period_us: int) -> Any: ...
 
     def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
         """|a - b| <= max_step + samples * step."""
@@ -57,8 +58,8 @@ class _F32:
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
         return ~np.isfinite(x)
 
-    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any:
-        return np.float32(max_slope) / np.float32(samples_per_block)
+    def step_per_sample(self, max_rate: Any, period_us: int) -> Any:
+        return np.float32(max_rate) * np.float32(period_us)
 
     def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
         limit = np.float32(samples) * step
@@ -118,8 +119,8 @@ class _Q31:
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
         return np.asarray(x == _MISSING_Q31)
 
-    def step_per_sample(self, max_slope: Any, samples_per_block: int) -> Any:
-        return divided(max_slope, samples_per_block)
+    def step_per_sample(self, max_rate: Any, period_us: int) -> Any:
+        return min((int(max_rate) * period_us) >> 24, _LARGEST)
 
     def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
         return np.abs(a - b) <= max_step + samples * step

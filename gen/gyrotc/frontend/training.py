@@ -17,7 +17,7 @@ from .stream import Stream
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
 
-__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks", "samples_per_block"]
+__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "period_us", "run_blocks", "samples_per_block"]
 
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1
@@ -56,6 +56,11 @@ def samples_per_block(block_s: float, row_period_s: float) -> int:
     return max(1, round(block_s / row_period_s))
 
 
+def period_us(block_us: int, samples_per_block: int) -> int:
+    """Sample period of a target with so many samples in a block, microseconds; at least 1."""
+    return max(1, (block_us + samples_per_block // 2) // samples_per_block)
+
+
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
     """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
     gaps = np.diff(time_s)
@@ -81,7 +86,7 @@ def run_blocks(  # long: one line for each field of the result
     slope_blocks: int,
     max_step_c: float,
     max_rate_c_per_min: float,
-    stuck_samples: int = 0,
+    stuck_s: float = 0.0,
     hold_blocks: int = 30,
 ) -> Blocks:
     """Runs the float32 front end over a recording.
@@ -93,21 +98,22 @@ def run_blocks(  # long: one line for each field of the result
         slope_blocks: Window of dT/dt, blocks.
         max_step_c: Believable change between two samples, C, besides ...
         max_rate_c_per_min: ... this rate times the time since the last believed one.
-        stuck_samples: Identical samples that are believed; 0: any number.
+        stuck_s: Time after which a reading that stays the same is none, s; 0: never.
         hold_blocks: Invalid blocks in a row that are bridged before the fallback.
     """
+    n = samples_per_block(block_s, run.row_period_s)
     settings = Settings(
-        samples_per_block=samples_per_block(block_s, run.row_period_s),
+        samples_per_block=n,
         slope_blocks=slope_blocks,
         hold_blocks=hold_blocks,
-        stuck_samples=stuck_samples,
+        period_us=period_us(round(block_s * 1e6), n),
+        stuck_us=round(stuck_s * 1e6),
         max_step=np.float32(max_step_c),
-        max_slope=np.float32(max_rate_c_per_min * block_s / 60.0),
+        max_rate=np.float32(max_rate_c_per_min / 60e6),
     )
     missed = missed_before(rows.time_s, run.row_period_s)
     stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
     steps = follow(F32, stream.samples, settings)
-    n = settings.samples_per_block
     n_blocks = steps.valid.size
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)

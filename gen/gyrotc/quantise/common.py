@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import itertools
+import re
 import zlib
 from typing import Any, TypedDict
 
 import numpy as np
 
 from ..model import Model
-from ..reference.table import Words
+from ..reference.table import SERIAL_WORDS, Words
 
-__all__ = ["STEEPEST", "Shared", "coverage_words", "max_slope_c", "shared"]
+__all__ = ["STEEPEST", "Shared", "coverage_words", "shared"]
 
 #: Largest derivative of exp(-x²): at x = 1/√2.
 STEEPEST = 0.8577638849607068
@@ -20,16 +21,15 @@ STEEPEST = 0.8577638849607068
 class Shared(TypedDict):
     """Members of a table that are integers in every arithmetic."""
 
-    serial: str
     name: str
     id: int
-    block_s: float
+    calibrated: int
+    block_us: int
     slope_blocks: int
-    hold_blocks: int
-    stuck_samples: int
-    n_channels: int
+    lead_blocks: int
     coverage_cells: tuple[int, int]
     sigma_cells: tuple[int, int]
+    serial: Words
     coverage: Words
 
 
@@ -37,16 +37,15 @@ def shared(model: Model) -> Shared:
     """The members that need no rounding."""
     coverage, sigma = model.coverage, model.uncertainty_dph
     return Shared(
-        serial=model.serial,
         name=model.id,
         id=zlib.crc32(model.id.encode("ascii")),
-        block_s=model.block_s,
+        calibrated=_date(model),
+        block_us=max(1, round(model.block_s * 1e6)),
         slope_blocks=model.slope_blocks,
-        hold_blocks=model.hold_blocks,
-        stuck_samples=model.stuck_samples,
-        n_channels=1 + len({t.channel for t in model.terms if t.channel}),
+        lead_blocks=model.lead_blocks,
         coverage_cells=coverage.cells if coverage else (0, 0),
         sigma_cells=sigma.cells if sigma else (0, 0),
+        serial=_serial_words(model.serial),
         coverage=coverage_words(model),
     )
 
@@ -62,6 +61,13 @@ def coverage_words(model: Model) -> Words:
     return np.asarray(np.bitwise_or.reduce(words, axis=1), dtype=np.uint32)
 
 
-def max_slope_c(model: Model) -> float:
-    """Largest believable change of temperature in a block, C."""
-    return model.max_rate_c_per_min * model.block_s / 60.0
+def _serial_words(serial: str) -> Words:
+    """Four characters a word, the first one lowest; zeros behind the end."""
+    octets = serial.encode("ascii").ljust(4 * SERIAL_WORDS, b"\0")
+    return np.frombuffer(octets, dtype="<u4").astype(np.uint32)
+
+
+def _date(model: Model) -> int:
+    """Date of calibration as a decimal number yyyymmdd; 0 where `[meta]` has none in ISO 8601."""
+    found = re.match(r"(\d{4})-(\d{2})-(\d{2})", str(model.meta.get("calibrated_on", "")))
+    return int("".join(found.groups())) if found else 0

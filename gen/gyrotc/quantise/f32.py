@@ -16,8 +16,9 @@ from ..errors import CheckFailed
 from ..model import Envelope, Model, Network
 from ..reference.table import Table, Words, f32_words
 from .bank import Axis, handover_error_dph, regions
-from .common import STEEPEST, max_slope_c, shared
+from .common import STEEPEST, shared
 from .gradient import largest_gradient
+from .guards import guard_words
 from .terms import f32_terms
 
 __all__ = ["table_of"]
@@ -54,13 +55,15 @@ def table_of(model: Model) -> Table:
         numeric="f32",
         **shared(model),
         bias_frac_bits=0,
-        max_step=_word(model.max_step_c),
-        max_slope=_word(max_slope_c(model)),
         fallback=_word(model.fallback_dph),
+        authority=(_word(-1.5e7), _word(1.5e7)),
+        effect=(_word(-1.5e7), _word(1.5e7)),
+        rezero=_word(model.rezero_dph),
         scale=tuple(scale.tolist()),
         envelope=tuple(envelope.tolist()),
         networks=np.concatenate(heads),
         centers=np.concatenate(centers).view(np.uint32).reshape(-1),
+        guards=guard_words(model, "f32"),
         terms=f32_terms(model),
         sigma=f32_words(model.uncertainty_dph.rows if model.uncertainty_dph else []),
         probes=np.zeros(0, dtype=np.uint32),

@@ -19,7 +19,8 @@ from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
 from ..reference.table import Table
 from .bank import Axis, handover_error_dph, regions
-from .common import max_slope_c, shared
+from .common import shared
+from .guards import guard_words
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
 from .solve import gram, solve
 from .terms import q31_terms, term_size_dph
@@ -238,13 +239,15 @@ def _table(
         numeric="q31",
         **shared(model),
         bias_frac_bits=frac_bits,
-        max_step=_word(min(round(model.max_step_c * _INPUT), 2**31 - 1)),
-        max_slope=_word(min(round(max_slope_c(model) * _INPUT), 2**31 - 1)),
         fallback=_word(round(model.fallback_dph * unit)),
+        authority=(_word(1 - 2**31), 2**31 - 1),
+        effect=(_word(1 - 2**31), 2**31 - 1),
+        rezero=_word(round(model.rezero_dph * unit)),
         scale=(inputs[0].gain, inputs[1].gain, narrow),
         envelope=tuple(_word(v) for v in envelope),
         networks=_words(heads),
         centers=_words(np.concatenate(records)),
+        guards=guard_words(model, "q31"),
         terms=q31_terms(model, frac_bits),
         sigma=_words(np.rint(np.array(model.uncertainty_dph.rows) * unit) if model.uncertainty_dph else []),
         probes=np.zeros(0, dtype=np.uint32),

@@ -23,10 +23,11 @@ __all__ = ["outside"]
 
 _ROW = re.compile(r"RANGE\((.*?)\),(?:\s*/\* ([^*]*?) \*/)?$")
 _NAME = re.compile(r"^#define (GTC_\w+) (\d+)U?\b", re.MULTILINE)
-_N_WHOLE, _N_NUMBERS = 16, 10
+_N_WHOLE, _N_NUMBERS, _FIRST_COUNT = 18, 13, 8
 _REACH = np.float32(8.0)  # half ranges to which a normalised input may go
 _WIDTH = np.float32(2.0**-100)
 _SUM = 2**30
+_PLAUSIBLE = {"f32": (-90.0, 200.0), "q31": (-90 * 65536, 200 * 65536)}
 _SPAN = 2**26 - 1
 _LAST_POSITION = 65535
 _LARGEST = 2**31 - 1
@@ -40,12 +41,19 @@ def outside(table: Table) -> str | None:
 
 
 def _refused(table: Table) -> Iterator[str]:
-    whole, numbers, network, center, term, sigma = _limits(table.numeric)
-    header = table.header[2:]
-    yield from _beyond(header[:7] + header[17:], whole)
-    if table.networks.size == 0:
+    limits = _limits(table.numeric)
+    whole, numbers, network, center, guard, guard_whole, term, sigma = limits
+    header, ends = table.header[2:], _FIRST_COUNT + _N_NUMBERS
+    yield from _beyond(header[:_FIRST_COUNT] + header[ends:], whole)
+    if table.networks.size == 0 or table.n_channels == 0:
         return
-    yield from _beyond(table.numbers(header[7:17]), numbers)
+    yield from _beyond(table.numbers(header[_FIRST_COUNT:ends]), numbers)
+    low, high = table.numbers(table.authority)
+    if not low <= table.numbers([table.fallback])[0] <= high:
+        yield "fallback is beyond the authority"
+    if table.sigma.size < table.sigma_cells[0] * table.sigma_cells[1]:
+        yield "sigma has fewer words than cells"
+    yield from _guards(table, guard, guard_whole)
     records = table.networks.reshape(-1, ARRAYS["networks"])
     if int(records[:, 0].sum(dtype=np.uint64)) != table.n_centers:
         yield "networks that do not share out the centers"
@@ -66,6 +74,17 @@ def _beyond(found: Any, limits: Limits) -> Iterator[str]:
 def _each(table: Table, records: NDArray[np.uint32], limits: Limits) -> Iterator[str]:
     for record in records:
         yield from _beyond(table.numbers(record), limits)
+
+
+def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
+    for channel, record in enumerate(table.guards.reshape(-1, ARRAYS["guards"])):
+        numbers = table.numbers(record)
+        yield from _beyond(numbers[:4], limits)
+        yield from _beyond(record[4:7], wholes)
+        yield from _beyond(numbers[7:], [("guard: fallback", *limits[0][1:])])
+        low, high = (_PLAUSIBLE[table.numeric]) if channel == 0 else (numbers[0], numbers[1])
+        if not low <= numbers[0] <= numbers[1] <= high:
+            yield "range of a guard is reversed, or wider than that of a temperature"
 
 
 def _terms(table: Table, limits: Limits) -> Iterator[str]:
@@ -124,8 +143,8 @@ def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
 
 
 @functools.cache
-def _limits(numeric: str) -> tuple[Limits, Limits, Limits, Limits, Limits, Limits]:
-    """Rows of libc/gtc_limits.inl for one arithmetic: whole numbers, numbers, network, center, terms, sigma."""
+def _limits(numeric: str) -> tuple[Limits, ...]:
+    """Rows of libc/gtc_limits.inl for one arithmetic: whole numbers, numbers, network, center, guard, terms, sigma."""
     include, libc = runtime_folders()
     headers = [(include / name).read_text(encoding="ascii") for name in ("gtc_config.h", "gtc_table.h")]
     names = dict(_NAME.findall("".join(headers)))
@@ -135,11 +154,12 @@ def _limits(numeric: str) -> tuple[Limits, Limits, Limits, Limits, Limits, Limit
         if match := _ROW.search(line):
             values = [_number(text, names) for text in match[1].split(",")]
             rows.append((match[2] or "what a term does not use", values[first], values[first + 1]))
-    sizes = [_N_WHOLE, _N_NUMBERS, ARRAYS["networks"] - 1, ARRAYS["centers"], 5 * (ARRAYS["terms"] - 2), 1]
+    sizes = [
+        _N_WHOLE, _N_NUMBERS, ARRAYS["networks"] - 1, ARRAYS["centers"], 4, 3, 5 * (ARRAYS["terms"] - 2), 1,
+    ]  # fmt: skip
     ends = np.cumsum(sizes).tolist()
     assert ends[-1] == len(rows), "libc/gtc_limits.inl has other rows than a table has words"
-    parts = [rows[end - size : end] for size, end in zip(sizes, ends, strict=True)]
-    return parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
+    return tuple(rows[end - size : end] for size, end in zip(sizes, ends, strict=True))
 
 
 def _number(text: str, names: dict[str, str]) -> float:

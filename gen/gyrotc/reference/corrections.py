@@ -12,26 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import status as status_bits
-from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream
+from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream, period_us
 from ..frontend.numbers import Numbers
 from ..terms.recursion import Outcome
 from .maps import evaluate_map
 from .operations import recursions
-from .table import Table, Words
+from .table import ARRAYS, Table, Words
 
 __all__ = ["arithmetic_of", "corrections", "settings_of"]
 
 
 def settings_of(table: Table, samples_per_block: int) -> Settings:
     """Members of a table that the front end uses."""
-    number = table.numbers([table.max_step, table.max_slope])
+    guard = table.guards[: ARRAYS["guards"]]
+    number = table.numbers(guard)
     return Settings(
         samples_per_block=samples_per_block,
         slope_blocks=table.slope_blocks,
-        hold_blocks=table.hold_blocks,
-        stuck_samples=table.stuck_samples,
-        max_step=number[0],
-        max_slope=number[1],
+        hold_blocks=int(guard[6]),
+        period_us=period_us(table.block_us, samples_per_block),
+        stuck_us=int(guard[5]),
+        max_step=number[2],
+        max_rate=number[3],
     )
 
 

@@ -1,4 +1,4 @@
-"""Table layout 1 as Python data: the words of one table, in the order of its binary image.
+"""Table layout 2 as Python data: the words of one table, in the order of its binary image.
 
 Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
 every word; `reference` computes with a `Table`, `quantise` makes one, `emit` prints it.
@@ -18,6 +18,7 @@ __all__ = [
     "LAYOUT",
     "MAGIC",
     "MISSING_Q31",
+    "SERIAL_WORDS",
     "Numeric",
     "Table",
     "Words",
@@ -25,14 +26,17 @@ __all__ = [
     "f32_words",
 ]
 
-LAYOUT = 1
+LAYOUT = 2
 MAGIC = 0x47544331
 MISSING_Q31 = -(2**31)
 _ARITHMETIC = {"f32": 1, "q31": 2}
 _INPUT_BITS = 16  # q31: temperatures in 2^-16 C
 
 #: Arrays of a table in the order of the image, with the words of one record (0: not in records).
-ARRAYS = {"networks": 8, "centers": 5, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4}
+ARRAYS = {
+    "serial": 0, "networks": 8, "centers": 5, "guards": 8, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4,
+}  # fmt: skip
+SERIAL_WORDS = 16
 
 Numeric = Literal["f32", "q31"]
 Words = NDArray[np.uint32]
@@ -59,29 +63,30 @@ def _widened(words: Words) -> NDArray[np.float64]:
 class Table:
     """One table: what `emit` prints and `reference` computes with. Every number is a 32-bit word.
 
-    Scalars have the names and the order of the members of gtc_<n>_table_t; `scale` and `envelope` are
-    tuples of words, `coverage_cells` and `sigma_cells` pairs. Arrays are flat.
+    Scalars have the names and the order of the members of gtc_<n>_table_t; `authority`, `effect`, `scale` and
+    `envelope` are tuples of words, `coverage_cells` and `sigma_cells` pairs. Arrays are flat.
     """
 
     numeric: Numeric
-    serial: str
     name: str  # id of the table as text
     id: int  # CRC-32 of it
-    block_s: float
+    calibrated: int  # yyyymmdd as a decimal number
+    block_us: int
     slope_blocks: int
-    hold_blocks: int
-    stuck_samples: int
+    lead_blocks: int
     bias_frac_bits: int
-    max_step: int
-    max_slope: int
     fallback: int
+    authority: tuple[int, ...]
+    effect: tuple[int, ...]
+    rezero: int
     scale: tuple[int, ...]
     envelope: tuple[int, ...]
-    n_channels: int
     coverage_cells: tuple[int, int]
     sigma_cells: tuple[int, int]
+    serial: Words
     networks: Words
     centers: Words
+    guards: Words
     terms: Words
     coverage: Words
     sigma: Words
@@ -94,14 +99,22 @@ class Table:
         return self.centers.size // ARRAYS["centers"]
 
     @property
+    def n_channels(self) -> int:
+        return self.guards.size // ARRAYS["guards"]
+
+    @property
+    def block_s(self) -> float:
+        return self.block_us * 1e-6
+
+    @property
     def header(self) -> list[int]:
         """The words between magic and arrays: layout and arithmetic, length, members."""
         counts = [getattr(self, a).size // ARRAYS[a] for a in ("networks", "centers")]
         members = [
-            0, 0, self.id, self.slope_blocks, self.hold_blocks, self.stuck_samples, self.bias_frac_bits,
-            self.max_step, self.max_slope, self.fallback, *self.scale, *self.envelope,
+            0, 0, self.id, self.calibrated, self.block_us, self.slope_blocks, self.lead_blocks, self.bias_frac_bits,
+            self.fallback, *self.authority, *self.effect, self.rezero, *self.scale, *self.envelope,
             *counts, self.n_channels, self.terms.size // ARRAYS["terms"],
-            *self.coverage_cells, *self.sigma_cells, self.probes.size // ARRAYS["probes"],
+            *self.coverage_cells, *self.sigma_cells, self.sigma.size, self.probes.size // ARRAYS["probes"],
         ]  # fmt: skip
         arrays = sum(getattr(self, a).size for a in ARRAYS)
         length = 3 + len(members) + arrays + 1
@@ -127,9 +140,9 @@ class Table:
     @property
     def read_only_bytes(self) -> int:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
-        pointers = len(ARRAYS) + 4 + 1  # arrays, code of terms, serial
+        pointers = len(ARRAYS) + 4  # arrays, code of terms
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
-        return 4 * (len(self.header) - 1 + pointers + 1 + arrays) + len(self.serial) + 1
+        return 4 * (len(self.header) - 1 + pointers + 1 + arrays)
 
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""

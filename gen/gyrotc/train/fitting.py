@@ -92,7 +92,7 @@ class FrontEnd:
     max_step_c: float
     max_rate_c_per_min: float
     hold_blocks: int
-    stuck_samples: int = 0
+    stuck_s: float = 0.0
 
     def blocks(self, run: Run) -> Blocks:
         return run_blocks(
@@ -102,7 +102,7 @@ class FrontEnd:
             slope_blocks=self.slope_blocks,
             max_step_c=self.max_step_c,
             max_rate_c_per_min=self.max_rate_c_per_min,
-            stuck_samples=self.stuck_samples,
+            stuck_s=self.stuck_s,
             hold_blocks=self.hold_blocks,
         )
 
@@ -285,7 +285,7 @@ def model_of(  # long: one line for each field of model.json
             "networks": [_snapped(n, fitted.scale) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
-            "stuck_samples": front.stuck_samples,
+            "stuck_s": front.stuck_s,
             "max_step_c": front.max_step_c,
             "max_rate_c_per_min": front.max_rate_c_per_min,
             "noise_floor_dph": fitted.noise_floor_dph,

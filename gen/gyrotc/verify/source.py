@@ -43,7 +43,6 @@ _TABLE_C = (
     r"extern const struct gtc_<n>_term_code gtc_\1_term_[a-z_]{{1,16}};",
     r"const gtc_<n>_table_t gtc_{symbol}_\1 = \{{",
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
-    r'    \.serial = "<serial>",',
     r"\}};",
 )
 _TABLE_H = (

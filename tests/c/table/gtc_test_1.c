@@ -1,7 +1,7 @@
 /* gtc_test_1.c - bias table of gyro TEST-1. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 f68b9baa4528dcaebdda8da77596e4744b2d348c40108c9809db48ae82642cbb
+ * Model:       sha256 acd674e94c93162ac8418fd848837f3745499f37cf7fd6328865cb3ba36e897e
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -9,14 +9,21 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 1
-#error "gtc_test_1.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_test_1.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
 /* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x54534554UL), B(0x312dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[8] = {
@@ -28,6 +35,11 @@ static const gtc_word_t f32_centers[15] = {
     V(-0.75F), V(32.0299301F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[8] = {
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -53,17 +65,19 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_test_1_f32 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x362c9816UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
-    .max_step = V(0.5F),
-    .max_slope = V(1.0F),
     .fallback = V(0.375F),
+    .authority = { V(-15000000.0F), V(15000000.0F) },
+    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
@@ -72,19 +86,28 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 2UL,
     .n_probes = 8UL,
+    .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
+    .guards = f32_guards,
     .terms = NULL,
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x8331c924UL,
+    .crc = 0xed4e1a23UL,
     .term_code = { NULL },
-    .serial = "TEST-1",
 };
 
 /* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x54534554UL), B(0x312dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
@@ -96,6 +119,11 @@ static const gtc_word_t q31_centers[15] = {
     B(0x0000801fUL), B(0xeffc6070UL), B(0x00002670UL), B(0xe994133bUL), B(0x0bfffedeUL), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
     B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xebffeaedUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x04fff6daUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[8] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -121,17 +149,19 @@ static const gtc_word_t q31_probes[32] = {
 };
 
 const gtc_q31_table_t gtc_test_1_q31 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x362c9816UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 28UL,
-    .max_step = 32768L,
-    .max_slope = 65536L,
     .fallback = 100663296L,
+    .authority = { -2147483647L, 2147483647L },
+    .effect = { -2147483647L, 2147483647L },
+    .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -140,15 +170,17 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 2UL,
     .n_probes = 8UL,
+    .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
+    .guards = q31_guards,
     .terms = NULL,
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x798ec2fcUL,
+    .crc = 0x49036185UL,
     .term_code = { NULL },
-    .serial = "TEST-1",
 };
 

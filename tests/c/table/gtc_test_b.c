@@ -1,7 +1,7 @@
 /* gtc_test_b.c - bias table of gyro TEST-B. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 0374aec108631ddcb9a02445533048310f123884a4bd4516573b7ad2a976a4e3
+ * Model:       sha256 dcc215d641de70a2721834cf0e1844298e506f248bdf29cf9cbd8b0933b8abbe
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -9,14 +9,21 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 1
-#error "gtc_test_b.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_test_b.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
 /* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x54534554UL), B(0x422dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[24] = {
@@ -33,6 +40,11 @@ static const gtc_word_t f32_centers[30] = {
     V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[8] = {
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -58,17 +70,19 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_test_b_f32 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xc44e9858UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
-    .max_step = V(0.5F),
-    .max_slope = V(1.0F),
     .fallback = V(0.375F),
+    .authority = { V(-15000000.0F), V(15000000.0F) },
+    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 3UL,
@@ -77,19 +91,28 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 2UL,
     .n_probes = 8UL,
+    .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
+    .guards = f32_guards,
     .terms = NULL,
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x49649a71UL,
+    .crc = 0xbe39d9a6UL,
     .term_code = { NULL },
-    .serial = "TEST-B",
 };
 
 /* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x54534554UL), B(0x422dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[24] = {
@@ -106,6 +129,11 @@ static const gtc_word_t q31_centers[30] = {
     B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[8] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -131,17 +159,19 @@ static const gtc_word_t q31_probes[32] = {
 };
 
 const gtc_q31_table_t gtc_test_b_q31 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xc44e9858UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 27UL,
-    .max_step = 32768L,
-    .max_slope = 65536L,
     .fallback = 50331648L,
+    .authority = { -2147483647L, 2147483647L },
+    .effect = { -2147483647L, 2147483647L },
+    .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 3UL,
@@ -150,15 +180,17 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 2UL,
     .n_probes = 8UL,
+    .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
+    .guards = q31_guards,
     .terms = NULL,
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x40ca99f3UL,
+    .crc = 0xbf87b81bUL,
     .term_code = { NULL },
-    .serial = "TEST-B",
 };
 

@@ -1,7 +1,7 @@
 /* gtc_test_h.c - bias table of gyro TEST-H. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 adf08e9dfa037bbd373289000f492c464a10333a630974ff949247a647933cf2
+ * Model:       sha256 204bc523ab74cab53a3cfe2ee34cc6d8504fcb4b034a1958ddce7b7c09c60df3
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -9,14 +9,21 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 1
-#error "gtc_test_h.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_test_h.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
 /* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x54534554UL), B(0x482dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[8] = {
@@ -27,6 +34,11 @@ static const gtc_word_t f32_networks[8] = {
 static const gtc_word_t f32_centers[10] = {
     V(-0.75F), V(480.448975F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.020, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[8] = {
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* kind, channel, parameters */
@@ -52,17 +64,19 @@ extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
 extern const struct gtc_f32_term_code gtc_f32_term_memory;
 
 const gtc_f32_table_t gtc_test_h_f32 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x249b7146UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
-    .max_step = V(0.5F),
-    .max_slope = V(1.0F),
     .fallback = V(0.375F),
+    .authority = { V(-15000000.0F), V(15000000.0F) },
+    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
@@ -71,19 +85,28 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .n_terms = 2UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
+    .guards = f32_guards,
     .terms = f32_terms,
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x90ea6734UL,
+    .crc = 0xdd0fd933UL,
     .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
-    .serial = "TEST-H",
 };
 
 /* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x54534554UL), B(0x482dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
@@ -94,6 +117,11 @@ static const gtc_word_t q31_networks[8] = {
 static const gtc_word_t q31_centers[10] = {
     B(0x0000781dUL), B(0xf0fc9c69UL), B(0x00000267UL), B(0xfe994134UL), B(0x00c000baUL), /* -10.00 C, +0.500 C/min; widths 0.020, 1.000; +7.500e-01 deg/h */
     B(0x00000401UL), B(0xfdff820dUL), B(0x00000000UL), B(0x00000000UL), B(0xfec001b9UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[8] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* kind, channel, parameters */
@@ -119,17 +147,19 @@ extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
 extern const struct gtc_q31_term_code gtc_q31_term_memory;
 
 const gtc_q31_table_t gtc_test_h_q31 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x249b7146UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 12UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
-    .max_step = 32768L,
-    .max_slope = 65536L,
     .fallback = 6291456L,
+    .authority = { -2147483647L, 2147483647L },
+    .effect = { -2147483647L, 2147483647L },
+    .rezero = 0L,
     .scale = { 1677721L, 134217727L, 8L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -138,15 +168,17 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .n_terms = 2UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
+    .guards = q31_guards,
     .terms = q31_terms,
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x20798aabUL,
+    .crc = 0x6e084c8fUL,
     .term_code = { &gtc_q31_term_harmonic, &gtc_q31_term_memory },
-    .serial = "TEST-H",
 };
 

@@ -1,7 +1,7 @@
 /* gtc_test_t.c - bias table of gyro TEST-T. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 379713d8493773e9cc1e583e62b525aeaa89b20647ae49fc604454fa192bfdcd
+ * Model:       sha256 76d1e06a4b32d7ba6ba843112261145bce3252e75a5ab682d337a4491a69fec7
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -9,14 +9,21 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 1
-#error "gtc_test_t.c was written for table layout 1: emit it again with the gyrotc of this runtime"
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_test_t.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
 /* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x54534554UL), B(0x542dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[8] = {
@@ -28,6 +35,12 @@ static const gtc_word_t f32_centers[15] = {
     V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[16] = {
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x0UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(-1e+09F), V(1e+09F), V(1e+09F), V(0.0F), B(0x0UL), B(0x0UL), B(0x2UL), V(12.0F), /* supply_v */
 };
 
 /* kind, channel, parameters */
@@ -59,17 +72,19 @@ extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
 extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
 
 const gtc_f32_table_t gtc_test_t_f32 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x309a2d09UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 0UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
-    .max_step = V(0.5F),
-    .max_slope = V(1.0F),
     .fallback = V(0.375F),
+    .authority = { V(-15000000.0F), V(15000000.0F) },
+    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
@@ -78,19 +93,28 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
+    .guards = f32_guards,
     .terms = f32_terms,
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xbdb281f8UL,
+    .crc = 0x9c0e61caUL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
-    .serial = "TEST-T",
 };
 
 /* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x54534554UL), B(0x542dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
@@ -102,6 +126,12 @@ static const gtc_word_t q31_centers[15] = {
     B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x017fff90UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfd7ffd56UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x009ffec0UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[16] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x0UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0x80000001UL), B(0x7fffffffUL), B(0x7fffffffUL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x2UL), B(0x000c0000UL), /* supply_v */
 };
 
 /* kind, channel, parameters */
@@ -133,17 +163,19 @@ extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
 extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
 
 const gtc_q31_table_t gtc_test_t_q31 = {
-    .layout = 1,
+    .layout = 2,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x309a2d09UL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
     .slope_blocks = 4UL,
-    .hold_blocks = 2UL,
-    .stuck_samples = 0UL,
+    .lead_blocks = 0UL,
     .bias_frac_bits = 25UL,
-    .max_step = 32768L,
-    .max_slope = 65536L,
     .fallback = 12582912L,
+    .authority = { -2147483647L, 2147483647L },
+    .effect = { -2147483647L, 2147483647L },
+    .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -152,15 +184,17 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 0UL, 0UL },
+    .n_sigma = 0UL,
     .n_probes = 8UL,
+    .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
+    .guards = q31_guards,
     .terms = q31_terms,
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0xd17a465eUL,
+    .crc = 0x7126275cUL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
-    .serial = "TEST-T",
 };
 
