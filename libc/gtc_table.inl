@@ -56,14 +56,18 @@ static int FN(is_grid)(const uint_least32_t cells[2])
     return ((cells[0] == 0U) == (cells[1] == 0U)) ? 1 : 0;
 }
 
+static int FN(grids_fit)(const TABLE *table)
+{
+    return (FN(is_grid)(table->coverage_cells) && FN(is_array)(table->coverage, table->coverage_cells[0])
+            && FN(is_grid)(table->sigma_cells) && FN(is_array)(table->sigma, table->n_sigma)
+            && (table->n_sigma >= (table->sigma_cells[0] * table->sigma_cells[1]))) ? 1 : 0;
+}
+
 static int FN(arrays_fit)(const TABLE *table)
 {
     return (FN(is_array)(table->serial, GTC_SERIAL_WORDS) && FN(is_array)(table->networks, table->n_networks)
             && FN(is_array)(table->centers, table->n_centers) && FN(is_array)(table->guards, table->n_channels)
-            && FN(is_array)(table->terms, table->n_terms) && FN(is_array)(table->probes, table->n_probes)
-            && FN(is_grid)(table->coverage_cells) && FN(is_array)(table->coverage, table->coverage_cells[0])
-            && FN(is_grid)(table->sigma_cells) && FN(is_array)(table->sigma, table->n_sigma)
-            && (table->n_sigma >= (table->sigma_cells[0] * table->sigma_cells[1]))) ? 1 : 0;
+            && FN(is_array)(table->terms, table->n_terms) && FN(is_array)(table->probes, table->n_probes)) ? 1 : 0;
 }
 
 /* The whole numbers of the header, in the order of an image. */
@@ -165,7 +169,7 @@ static int FN(terms_fit)(const TABLE *table)
 static int FN(is_readable)(const TABLE *table)
 {
     return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
-            && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
+            && FN(grids_fit)(table) && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
 }
 
 /* The constant correction is one that the table may give. */

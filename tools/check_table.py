@@ -121,7 +121,9 @@ class Model:
     def guard(self, channel: str) -> dict[str, float]:
         if channel in self.raw["guards"]:
             return dict(self.raw["guards"][channel])
-        reference = next(t["parameters"]["reference"] for t in self.raw["terms"] if t.get("channel") == channel)
+        reference = next(
+            t["parameters"]["reference"] for t in self.raw["terms"] if t.get("channel") == channel
+        )
         return {
             "low": -1e9, "high": 1e9, "max_step": 1e9, "max_rate_per_min": 0.0, "agree_s": 0.0, "stuck_s": 0.0,
             "missing_s": self.raw["hold_blocks"] * self.raw["block_s"], "fallback": reference,

@@ -29,9 +29,7 @@ def linked(name: str) -> str:
 def _table_struct() -> type[ctypes.Structure]:
     """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
-    integers = (
-        "layout quantity unit id calibrated block_us slope_blocks lead_blocks bias_frac_bits fallback"
-    )
+    integers = "layout quantity unit id calibrated block_us slope_blocks lead_blocks bias_frac_bits fallback"
     fields: list[Any] = [(name, u32) for name in integers.split()]
     fields += [("authority", u32 * 2), ("effect", u32 * 2), ("rezero", u32)]
     fields += [("scale", u32 * 3), ("envelope", u32 * 4)]

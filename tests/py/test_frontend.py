@@ -68,7 +68,7 @@ def test_a_gap_in_time_is_missing_samples() -> None:
 
 
 def test_a_long_gap_is_shortened_by_whole_blocks() -> None:
-    settings = Settings(4, 3, 2, 0, np.float32(1.0), np.float32(1.0))
+    settings = Settings(4, 3, 2, 1, 0, np.float32(1.0), np.float32(1.0))
     assert expand_missed(np.array([0, 3, 31, 32, 35, 10**9 + 3]), settings).tolist() == [0, 3, 31, 28, 31, 31]
 
 

@@ -57,12 +57,12 @@ def test_an_unknown_arithmetic_is_refused() -> None:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_the_words_are_those_of_layout_1(numeric: str) -> None:
+def test_the_words_are_those_of_layout_2(numeric: str) -> None:
     model = random_model(4)
     table = quantise(model, numeric)
     words = table.words
     assert words[0] == MAGIC
-    assert words[1] == 1 + 65536 * {"f32": 1, "q31": 2}[numeric]
+    assert words[1] == 2 + 65536 * {"f32": 1, "q31": 2}[numeric]
     assert words[2] == len(words)
     assert words[5] == table.id == zlib.crc32(b"rlg_4")
     assert words[-1] == zlib.crc32(np.array(words[1:-1], dtype="<u4").tobytes())

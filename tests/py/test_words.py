@@ -51,7 +51,9 @@ def _spoiled(rng: np.random.Generator, table: Table) -> Table:
         k = int(rng.integers(len(words)))
         words[k] = _word(rng, words[k])
         return replace(table, **{name: tuple(words)})
-    names = [n for n in ("networks", "centers", "guards", "guards", "terms", "sigma") if getattr(table, n).size]
+    names = [
+        n for n in ("networks", "centers", "guards", "guards", "terms", "sigma") if getattr(table, n).size
+    ]
     name = str(rng.choice(names))
     array = getattr(table, name).copy()
     k = int(rng.integers(array.size))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import CheckFailed
 from ..model import Envelope, Model, Network
 from ..reference.table import Table, Words, f32_words
+from .authority import unbounded
 from .bank import Axis, handover_error_dph, regions
 from .common import STEEPEST, shared
 from .gradient import largest_gradient
@@ -56,8 +57,7 @@ def table_of(model: Model) -> Table:
         **shared(model),
         bias_frac_bits=0,
         fallback=_word(model.fallback_dph),
-        authority=(_word(-1.5e7), _word(1.5e7)),
-        effect=(_word(-1.5e7), _word(1.5e7)),
+        **unbounded("f32"),
         rezero=_word(model.rezero_dph),
         scale=tuple(scale.tolist()),
         envelope=tuple(envelope.tolist()),

@@ -18,6 +18,7 @@ from ..errors import CheckFailed
 from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
 from ..reference.table import Table
+from .authority import unbounded
 from .bank import Axis, handover_error_dph, regions
 from .common import shared
 from .guards import guard_words
@@ -240,8 +241,7 @@ def _table(
         **shared(model),
         bias_frac_bits=frac_bits,
         fallback=_word(round(model.fallback_dph * unit)),
-        authority=(_word(1 - 2**31), 2**31 - 1),
-        effect=(_word(1 - 2**31), 2**31 - 1),
+        **unbounded("q31"),
         rezero=_word(round(model.rezero_dph * unit)),
         scale=(inputs[0].gain, inputs[1].gain, narrow),
         envelope=tuple(_word(v) for v in envelope),

@@ -37,20 +37,24 @@ static void any_members(void)
 {
     unsigned i;
     any.layout = GTC_TABLE_LAYOUT;
-    any.slope_blocks = ANY_WHOLE(3);
-    any.hold_blocks = ANY_WHOLE(4);
-    any.stuck_samples = ANY_WHOLE(5);
-    any.bias_frac_bits = ANY_WHOLE(6);
-    MEMBER_OF(any.max_step) = ANY_IN(NAME(number_limits)[0]);
-    MEMBER_OF(any.max_slope) = ANY_IN(NAME(number_limits)[1]);
-    MEMBER_OF(any.fallback) = ANY_IN(NAME(number_limits)[2]);
+    any.block_us = ANY_WHOLE(4);
+    any.slope_blocks = ANY_WHOLE(5);
+    any.lead_blocks = ANY_WHOLE(6);
+    any.bias_frac_bits = ANY_WHOLE(7);
+    MEMBER_OF(any.fallback) = ANY_IN(NAME(number_limits)[0]);
+    /*@ loop unroll 2; */
+    for (i = 0; i < 2U; i++) {
+        MEMBER_OF(any.authority[i]) = ANY_IN(NAME(number_limits)[1U + i]);
+        MEMBER_OF(any.effect[i]) = ANY_IN(NAME(number_limits)[3U + i]);
+    }
+    MEMBER_OF(any.rezero) = ANY_IN(NAME(number_limits)[5]);
     /*@ loop unroll 3; */
     for (i = 0; i < 3U; i++) {
-        MEMBER_OF(any.scale[i]) = ANY_IN(NAME(number_limits)[3U + i]);
+        MEMBER_OF(any.scale[i]) = ANY_IN(NAME(number_limits)[6U + i]);
     }
     /*@ loop unroll 4; */
     for (i = 0; i < 4U; i++) {
-        MEMBER_OF(any.envelope[i]) = ANY_IN(NAME(number_limits)[6U + i]);
+        MEMBER_OF(any.envelope[i]) = ANY_IN(NAME(number_limits)[9U + i]);
     }
 }
 

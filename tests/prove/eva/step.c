@@ -43,8 +43,9 @@ static void any_state(uint_least32_t least_valid, uint_least32_t most_valid)
     state.gap = Frama_C_unsigned_long_interval(0, 65535);
     state.suspects = Frama_C_unsigned_long_interval(0, 2);
     state.received = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    state.repeats = Frama_C_unsigned_long_interval(0, THE_TABLE.stuck_samples);
-    state.held_blocks = Frama_C_unsigned_long_interval(0, THE_TABLE.hold_blocks + 1U);
+    state.period_us = Frama_C_unsigned_long_interval(1, 0xFFFFFFFFUL);
+    state.repeats = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    state.held_blocks = Frama_C_unsigned_long_interval(0, THE_TABLE.guards[6].bits + 1U);
     state.filled = Frama_C_unsigned_long_interval(0, THE_TABLE.slope_blocks);
     state.window_valid = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     state.status = Frama_C_interval(0, 31);
@@ -71,8 +72,7 @@ static void invariant_holds(void)
     //@ check state.table == &THE_TABLE;
     //@ check 1 <= state.samples_per_block <= MAX_BLOCK;
     //@ check state.suspects <= 2;
-    //@ check state.repeats <= THE_TABLE.stuck_samples;
-    //@ check state.held_blocks <= THE_TABLE.hold_blocks + 1;
+    //@ check state.held_blocks <= THE_TABLE.guards[6].bits + 1;
     //@ check state.filled <= THE_TABLE.slope_blocks;
     //@ check 0 <= state.status <= 31;
     //@ check LOWEST <= state.last <= HIGHEST;
