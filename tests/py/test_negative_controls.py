@@ -121,7 +121,7 @@ def test_a_table_of_another_layout_is_refused_at_run_time(folder: Path, numeric:
 
 
 def test_a_table_of_another_layout_is_refused_by_the_compiler(folder: Path) -> None:
-    spoil(folder / "c" / "gtc.h", r"#define GTC_TABLE_LAYOUT 1", "#define GTC_TABLE_LAYOUT 2")
+    spoil(folder / "c" / "gtc.h", r"#define GTC_TABLE_LAYOUT 2", "#define GTC_TABLE_LAYOUT 3")
     for entry in _contents(job_of(folder), with_flags("host-gcc-O2")):
         assert entry["status"] == "fail" and "layout" in entry["error"]
 

@@ -73,7 +73,7 @@ TAMPERED: dict[str, tuple[str, Spoil]] = {
     "envelope in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", "68.01 C", "98.01 C")),
     "block in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", "Block:       10", "Block: 20")),
     "bound in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", r"<= 1\.\d+e-0", "<= 1.00e-1")),
-    "serial in table": ("gtc_rlg_0042.c", lambda c: spoil(c / "gtc_rlg_0042.c", '"RLG-0042"', '"RLG-0043"')),
+    "serial in table": ("gtc_rlg_0042.c", lambda c: spoil(c / "gtc_rlg_0042.c", "0x32343030UL", "0x33343030UL")),
     "main": ("main.c", lambda c: spoil(c / "main.c", "return 1;", "return 0;")),
     "vectors made fewer": ("vectors_rlg_0042.h", lambda c: spoil(c / "vectors_rlg_0042.h", "20000UL", "2UL")),
     "open accepts anything": ("gtc.c", _at_start("open", "return GTC_OK;")),
