@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from .problems import Problems
@@ -23,10 +24,13 @@ _TOLERANCE = 2.0**-22  # relative; rows are compared as float32
 
 @dataclass(frozen=True, slots=True)
 class _Span:
-    """Time (s), temperature and rate of a run's file as they were recorded, NaN outside the run."""
+    """Time (s), temperature and rate of a run's file as they were recorded, NaN outside the run.
+
+    Two of them are in memory at once, so values are what they are compared as.
+    """
 
     time_s: Floats
-    values: tuple[Floats, Floats]
+    values: tuple[NDArray[np.float32], ...]
 
 
 def shared_rows(
@@ -41,7 +45,7 @@ def shared_rows(
     for j, other in enumerate(runs):
         for i, one in enumerate(runs[: j + 1]):
             windows = windows_that_repeat(prints[j]) if i == j else windows_in_common(prints[j], prints[i])
-            for shared in _stretches(other, one, windows) if windows else ():
+            for shared in _stretches(other, one, windows) if len(windows) else ():
                 if one.role == other.role:
                     found.append(shared)
                 else:
@@ -74,16 +78,17 @@ def _refused(shared: SharedRows) -> InputError:
     )
 
 
-def _stretches(one: Run, other: Run, windows: Sequence[tuple[int, int, int]]) -> Iterator[SharedRows]:
+def _stretches(one: Run, other: Run, windows: NDArray[np.int64]) -> Iterator[SharedRows]:
     """Windows in common, each as far as the rows go on being the same."""
     first, second = _span(one), _span(other)
-    found: list[tuple[int, int, int]] = []
-    for a, b, rows in windows:
-        if any(start <= a < start + n and b - a == at - start for start, at, n in found):
-            continue
+    for _ in range(_MOST):
+        if len(windows) == 0:
+            return
+        a, b, rows = windows[0].tolist()
         before = _alike(first, second, a, b, -1)
         after = max(_alike(first, second, a, b, 1), rows)
-        found.append((a - before, b - before, before + after))
+        inside = (windows[:, 0] < a + after) & (windows[:, 1] - windows[:, 0] == b - a)
+        windows = windows[~inside]
         yield SharedRows(
             file=one.file,
             rows=(a - before + 1, a + after),
@@ -92,16 +97,16 @@ def _stretches(one: Run, other: Run, windows: Sequence[tuple[int, int, int]]) ->
             other_rows=(b - before + 1, b + after),
             other_span_s=_times(second.time_s, b - before, b + after, other.row_period_s),
         )
-        if len(found) == _MOST:
-            return
 
 
 def _span(run: Run) -> _Span:
     reader = run.reader
     rows = replace(reader, earth=None, applied=None)() if isinstance(reader, Reader) else run.rows()
     inside = run.in_span(rows.time_s)
-    temperature, rate = (np.where(inside, v, np.nan) for v in (rows.temperature_c, rows.rate_dph))
-    return _Span(rows.time_s, (temperature, rate))
+    values = [rows.temperature_c.astype(np.float32), rows.rate_dph.astype(np.float32)]
+    for of_run in values:
+        of_run[~inside] = np.nan
+    return _Span(rows.time_s, tuple(values))
 
 
 def _times(time_s: Floats, first: int, end: int, period_s: float) -> tuple[float, float]:

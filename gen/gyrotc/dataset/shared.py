@@ -40,11 +40,11 @@ _SKETCH = 128
 
 @dataclass(frozen=True, slots=True)
 class Fingerprints:
-    """What is kept of a recording's rows: hashes of windows, shape (n,), with first row, last row and their times."""
+    """What is kept of a recording's rows: increasing hashes of windows, shape (n,), first and last row, their times."""
 
     hash: Words
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
+    first: NDArray[np.int32]
+    last: NDArray[np.int32]
     first_s: Floats
     last_s: Floats
 
@@ -67,10 +67,20 @@ def fingerprints_of(time_s: Floats, temperature_c: Floats, rates: Sequence[Float
             own = first < _PART
             found.append((hashes[own], first[own] + start, last[own] + start))
     hashes, first, last = (np.concatenate(column) for column in zip(*found, strict=True))
-    _, which, often = np.unique(hashes, return_inverse=True, return_counts=True)
-    rare = often[which.reshape(-1)] < _PATTERN
-    first, last = first[rare], last[rare]
-    return Fingerprints(hashes[rare], first, last, time_s[first], time_s[last])
+    order = np.lexsort((first, hashes))
+    hashes = hashes[order]
+    often = np.diff(np.flatnonzero(np.r_[_new(hashes), True]))
+    rare = np.repeat(often < _PATTERN, often)
+    hashes, order = hashes[rare], order[rare]
+    first, last = first[order], last[order]
+    return Fingerprints(hashes, first.astype(np.int32), last.astype(np.int32), time_s[first], time_s[last])
+
+
+def _new(ordered: Words) -> NDArray[np.bool_]:
+    """Which of ordered words differ from the one before."""
+    new = np.ones(len(ordered), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=new[1:])
+    return new
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,20 +156,24 @@ def _unexpected(before: Words, rate: Words) -> NDArray[np.float32]:
     return np.asarray(told, dtype=np.float32)
 
 
-def windows_in_common(mine: Fingerprints, its: Fingerprints) -> list[tuple[int, int, int]]:
-    """First row of each window that two runs have, in the one and in the other, and its rows; in order."""
-    _, a, b = np.intersect1d(mine.hash, its.hash, return_indices=True)
-    found = zip(mine.first[a].tolist(), its.first[b].tolist(), mine.last[a].tolist(), strict=True)
-    return sorted((first, other, last - first + 1) for first, other, last in found)
+def windows_in_common(mine: Fingerprints, its: Fingerprints) -> NDArray[np.int64]:
+    """First row of each window that two runs have, in the one and in the other, and its rows; (n, 3), in order."""
+    a = np.flatnonzero(_new(mine.hash))
+    b = np.minimum(np.searchsorted(its.hash, mine.hash[a]), len(its.hash) - 1)
+    same = its.hash[b] == mine.hash[a] if len(its.hash) else np.zeros(len(a), dtype=bool)
+    return _windows(mine, a[same], its.first[b[same]])
 
 
-def windows_that_repeat(mine: Fingerprints) -> list[tuple[int, int, int]]:
+def windows_that_repeat(mine: Fingerprints) -> NDArray[np.int64]:
     """As `windows_in_common`, of a run with itself: a window that comes again, where it was first, its rows."""
-    order = np.lexsort((mine.first, mine.hash))
-    again = np.flatnonzero(mine.hash[order][1:] == mine.hash[order][:-1])
-    later, before = order[again + 1], order[again]
-    rows = (mine.last - mine.first + 1)[later].tolist()
-    return sorted(zip(mine.first[later].tolist(), mine.first[before].tolist(), rows, strict=True))
+    before = np.flatnonzero(~_new(mine.hash)) - 1
+    return _windows(mine, before + 1, mine.first[before])
+
+
+def _windows(mine: Fingerprints, at: NDArray[np.int64], other: NDArray[np.int32]) -> NDArray[np.int64]:
+    first, last = mine.first[at].astype(np.int64), mine.last[at]
+    found = np.column_stack([first, other, last - first + 1])
+    return np.asarray(found[np.lexsort((found[:, 1], first))])
 
 
 def sketch(fingerprints: Sequence[Fingerprints]) -> tuple[int, ...]:
