@@ -51,7 +51,26 @@ def _stuck(c: Columns) -> Columns:
 
 
 def _gap(c: Columns) -> Columns:
-    return c | {"time_s": c["time_s"] + np.where(np.arange(len(c["time_s"])) >= 50, 200.0, 0.0)}
+    return {name: np.delete(values, np.arange(50, 70)) for name, values in c.items()}
+
+
+def _clock_set(c: Columns) -> Columns:
+    return c | {"time_s": c["time_s"] + np.where(np.arange(len(c["time_s"])) >= 50, 3600.0, 0.0)}
+
+
+def _slower(c: Columns) -> Columns:
+    """The logger's clock loses two per cent in the second half."""
+    n = len(c["time_s"])
+    return c | {"time_s": np.cumsum(np.where(np.arange(n) < n // 2, 10.0, 9.8)) - 10.0}
+
+
+def _whole_seconds(c: Columns) -> Columns:
+    """Rows of 1.4 s stamped in whole seconds."""
+    return c | {"time_s": np.floor(np.arange(len(c["time_s"])) * 1.4)}
+
+
+def _few_bits(c: Columns) -> Columns:
+    return c | {"rate_dph": np.round(c["rate_dph"] / 0.01 + 0.3) * 0.01}
 
 
 def _holds(c: Columns) -> Columns:
@@ -68,6 +87,10 @@ DOUBTS: dict[str, Callable[[Columns], Mapping[str, np.ndarray]]] = {
     "rate_outliers": _spike,
     "stuck_rate": _stuck,
     "gaps": _gap,
+    "time_jumps": _clock_set,
+    "time_drifts": _slower,
+    "coarse_time": _whole_seconds,
+    "coarse_rate": _few_bits,
     "time_since_epoch": lambda c: c | {"time_s": c["time_s"] + 1.7e9},
     "small_rates": lambda c: c | {"rate_dph": c["rate_dph"] / 3600.0**2},
 }

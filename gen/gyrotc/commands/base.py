@@ -41,7 +41,7 @@ DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or 
 OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
 
 
-def _json_place(path: Path | None) -> Path | None:
+def written_place(path: Path | None) -> Path | None:
     """Before the work: what stands there was written by gyrotc."""
     if path is not None:
         check_replaceable(path)
@@ -50,7 +50,7 @@ def _json_place(path: Path | None) -> Path | None:
 
 JsonOption = Annotated[
     Path | None,
-    typer.Option("--json", callback=_json_place, help="Write the machine-readable result here."),
+    typer.Option("--json", callback=written_place, help="Write the machine-readable result here."),
 ]
 AxisOption = Annotated[
     str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")

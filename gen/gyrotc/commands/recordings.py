@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,6 +19,7 @@ from .base import (
     progress,
     tell,
     write_json,
+    written_place,
 )
 
 
@@ -65,12 +67,23 @@ def check(
     ] = None,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
+    previous: Annotated[
+        Path | None,
+        typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?"),
+    ] = None,
+    plots: Annotated[
+        Path | None,
+        typer.Option(
+            "--plots", callback=written_place, help="Write a page with a picture of every finding here."
+        ),
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Tell everything that is wrong or doubtful about recordings, at once; also while they still grow.
 
-    Example: gyrotc check recordings
+    Example: gyrotc check recordings --plots check.html
     """
+    from ..judge.changes import earlier_models
     from ..judge.check import check as run
     from ..judge.check import envelope_of
     from ..quantise.applied import applied_of
@@ -81,7 +94,12 @@ def check(
         envelope=envelope_of(envelope) if envelope is not None else None,
         applied=applied_of(applied) if applied else None,
         trust_units=trust_units,
+        earlier=earlier_models(previous) if previous else None,
     )
+    if plots is not None:
+        from ..pages.check_page import write_check_page
+
+        write_check_page(plots, dataset, result)
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line)

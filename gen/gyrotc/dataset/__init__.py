@@ -7,15 +7,18 @@ after a problem and tells all of them. What a folder may hold is written in docs
 from .earth import earth_rate_warning
 from .facts import Jump, Outlier, RunFacts, facts_of
 from .load import axes_of, load, survey
-from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Rows, Run, SharedRows
+from .reading import open_file
+from .records import Applied, Curve, Dataset, DeclaredNoise, EarthRate, Exclusion, Mark, Rows, Run, SharedRows
 
 __all__ = [
     "Applied",
+    "Curve",
     "Dataset",
     "DeclaredNoise",
     "EarthRate",
     "Exclusion",
     "Jump",
+    "Mark",
     "Outlier",
     "Rows",
     "Run",
@@ -25,5 +28,6 @@ __all__ = [
     "earth_rate_warning",
     "facts_of",
     "load",
+    "open_file",
     "survey",
 ]

@@ -121,6 +121,8 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:  # long: one line for each fact
     rate = _those(rows.rate_dph, finite)
     step = np.diff(time)
     gaps = step > _GAP_PERIODS * run.row_period_s
+    if not inside.all():
+        gaps &= np.diff(np.flatnonzero(inside)) == 1  # what was excluded is no gap
     levels = np.unique(temperature[_changes(temperature)])
     resolution = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
     measured = np.where(np.isfinite(rows.rate_dph), rows.rate_dph, rate.mean() if len(rate) else 0.0)

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..inputs import refuse_above
 from .columns import arrange
 from .consistency import check_description, check_spans, common_channels, in_entry, of_axis, place_of
+from .curves import curves_of
 from .earth import earth_rate
 from .overlap import shared_rows
 from .problems import Problems
@@ -96,7 +97,7 @@ def survey(  # long: a reader is told everything that it needs, by name
     if not recordings:
         return None
     channels, warnings = common_channels(recordings)
-    runs = []
+    runs_by_entry: dict[int, Run] = {}
     for index, entry in enumerate(description.run):
         if entry.file in recordings and index in with_rows:
             recording = recordings[entry.file]
@@ -111,7 +112,8 @@ def survey(  # long: a reader is told everything that it needs, by name
                 applied=applied,
                 row_period_s=recording.row_period_s,
             )
-            runs.append(_run(folder, entry, recording, reader))
+            runs_by_entry[index] = _run(folder, entry, recording, reader)
+    runs = list(runs_by_entry.values())
     warnings += [
         f"{r.file.name}: the last line is unfinished and is left out: {r.file.torn[:60]!r}"
         for r in recordings.values()
@@ -127,6 +129,7 @@ def survey(  # long: a reader is told everything that it needs, by name
         dataset,
         shared=shared_rows(runs, recordings, problems),
         sketch=sketch([r.fingerprints for r in recordings.values()]),
+        curves=curves_of(description, runs_by_entry, recordings),
     )
 
 

@@ -49,8 +49,8 @@ def shared_rows(
                 if one.role == other.role:
                     found.append(shared)
                 else:
-                    exam_first = other.role == "exam"
-                    problems.add(_refused(shared if exam_first else _turned(shared)))
+                    of_exam = shared if other.role == "exam" else _turned(shared)
+                    problems.add(_refused(of_exam), *of_exam.marks)
     return tuple(found)
 
 

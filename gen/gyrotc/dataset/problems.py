@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import InputError
+from .records import Mark
 
 __all__ = ["Problems"]
 
@@ -17,9 +18,10 @@ class Problems:
     def __init__(self, *, collect: bool) -> None:
         self._collect = collect
         self.found: list[InputError] = []
+        self.marks: dict[str, tuple[Mark, ...]] = {}
 
-    def add(self, problem: InputError) -> None:
-        """Keeps the problem.
+    def add(self, problem: InputError, *marks: Mark) -> None:
+        """Keeps the problem, and by its text the rows that it is about.
 
         Raises:
             InputError: The problem itself, if problems are not collected.
@@ -27,6 +29,7 @@ class Problems:
         if not self._collect:
             raise problem
         self.found.append(problem)
+        self.marks[str(problem)] = marks
 
     def __len__(self) -> int:
         return len(self.found)

@@ -14,7 +14,7 @@ from .csvfile import CsvFile
 from .evidence import Evidence
 from .parquetfile import ParquetFile
 from .problems import Problems
-from .records import Applied, EarthRate, Floats, Rows
+from .records import Applied, EarthRate, Floats, Mark, Rows
 from .schema import Columns
 from .shared import Fingerprints, fingerprints_of
 from .source import Source
@@ -205,7 +205,8 @@ def _checked(
         )
     for fault in found:
         place = lines[fault.row] if lines else file.place(fault.row)
-        problems.add(_problem(file, fault, place, units.get(fault.column)))
+        mark = Mark(file.name, (fault.row + 1, fault.row + 1), column=fault.column)
+        problems.add(_problem(file, fault, place, units.get(fault.column)), mark)
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
     rows = len(time)

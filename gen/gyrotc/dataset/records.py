@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Applied",
+    "Curve",
     "Dataset",
     "DeclaredNoise",
     "EarthRate",
     "Exclusion",
     "Floats",
+    "Mark",
     "Role",
     "Rows",
     "Run",
@@ -175,6 +177,52 @@ class SharedRows:
     other_rows: tuple[int, int]
     other_span_s: tuple[float, float]
 
+    @property
+    def marks(self) -> tuple[Mark, Mark]:
+        """Both stretches."""
+        return (
+            Mark(self.file, self.rows, self.span_s),
+            Mark(self.other_file, self.other_rows, self.other_span_s),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Rows that something is told of.
+
+    Attributes:
+        file: Their file.
+        rows: First and last of them, counted from 1.
+        span_s: Their times on its clock, s: first row, row after the last; None where times are in disorder.
+        column: The column, where it is about one.
+    """
+
+    file: str
+    rows: tuple[int, int] | None = None
+    span_s: tuple[float, float] | None = None
+    column: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """Mean rates of a run at each degree.
+
+    Attributes:
+        file: Its file.
+        axes: Axes of the file; none where it has one rate.
+        temperature_c: Temperatures, C, shape (p,).
+        rates_dph: Mean rates as they were recorded, deg/h, shape (p, axes).
+        cells: How many means of equal length are behind each, shape (p,).
+        earth_dph: Earth's rate along each axis, deg/h, where it is to be computed.
+    """
+
+    file: str
+    axes: tuple[str, ...]
+    temperature_c: Floats
+    rates_dph: Floats
+    cells: NDArray[np.int64]
+    earth_dph: tuple[float, ...] | None
+
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
@@ -197,6 +245,7 @@ class Dataset:
         sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
         shared: Rows that runs of one role have in common, or that a run has twice.
         sketch: Hashes of rows by which gyros of a fleet are compared (`shared.sketch`).
+        curves: Mean rates over temperature, of every axis of every run.
     """
 
     folder: Path
@@ -215,3 +264,4 @@ class Dataset:
     sources: tuple[dict[str, Any], ...] = ()
     shared: tuple[SharedRows, ...] = ()
     sketch: tuple[int, ...] = ()
+    curves: tuple[Curve, ...] = ()

@@ -6,7 +6,7 @@ envelope is the drift of the gyro, of its thermometer or of the procedure, and b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from ..results.manifest import Manifest
 from .as_found import as_found, history_of
 from .limits import Limits
 
-__all__ = ["Earlier", "changes_since", "load_earlier"]
+__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "refuse_another"]
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +67,32 @@ def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
     if (old.serial, old.axis) != (serial, axis):
         raise InputError(f"--previous {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
     return earlier
+
+
+def earlier_models(folder: Path) -> dict[str, Model]:
+    """Models of an earlier result by axis, "" where it has one rate.
+
+    Raises:
+        InputError: There is none, or one cannot be read.
+    """
+    places = [folder, *(folder / axis for axis in ("x", "y", "z"))]
+    models = [load_model(place / "model.json") for place in places if (place / "model.json").is_file()]
+    if not models:
+        raise InputError(f"--previous {folder}", "has no model.json", "a folder that gyrotc build wrote")
+    return {model.axis or "": model for model in models}
+
+
+def refuse_another(models: Mapping[str, Model], serial: str) -> None:
+    """An earlier result is of the same gyro.
+
+    Raises:
+        InputError: It is not.
+    """
+    for model in models.values():
+        if model.serial != serial:
+            raise InputError(
+                "--previous", f"is of {_name(model.serial, model.axis)}", _name(serial, model.axis)
+            )
 
 
 def changes_since(

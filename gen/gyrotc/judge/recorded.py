@@ -10,10 +10,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..dataset import Dataset, Rows, Run, RunFacts, SharedRows
+from ..dataset import Dataset, Mark, Rows, Run, RunFacts, SharedRows
 
 __all__ = [
+    "coarse_rate_findings",
     "copied_channel_findings",
     "exclude_line",
     "shared_rows_findings",
@@ -32,6 +34,11 @@ _STUCK_S, _STUCK_ROWS = (
     60,
 )  # where half of the rows differ from the one before, 60 alike come once in 2^60
 _FEWEST_VALUES = 10  # a channel of fewer values says nothing
+
+
+_COARSE_ROWS = 2**17  # rows that the resolution is told from
+_REPEATS = 0.6  # share of rows that repeat the one before: the noise is below a third of a step
+_ONE_STEP = 1.5
 
 
 def exclude_line(from_s: float, to_s: float, reason: str) -> str:
@@ -136,5 +143,46 @@ def stuck_temperature_findings(run: Run, rows: Rows) -> Iterator[Finding]:
             f"({length[k]} rows), where it otherwise changes from row to row: the thermometer was stuck. Look at its "
             f"wiring; to leave the stretch out: {line}"
         ),
-        "evidence": {"file": run.file, "from_s": run.from_s, "span_s": [first, last], "rows": int(length[k])},
+        "evidence": {
+            "file": run.file,
+            "from_s": run.from_s,
+            "span_s": [first, last],
+            "rows": int(length[k]),
+        },
+        "marks": (Mark(run.file, _rows_of(inside, starts[k], length[k]), (first, last + run.row_period_s)),),
+    }
+
+
+def _rows_of(inside: NDArray[np.bool_], first: int, count: int) -> tuple[int, int]:
+    """First and last row of the file, from 1, of a stretch of the rows inside the run."""
+    at = np.flatnonzero(inside)
+    return int(at[first]) + 1, int(at[first + count - 1]) + 1
+
+
+def coarse_rate_findings(run: Run, rows: Rows) -> Iterator[Finding]:
+    """Rates whose steps are far above the noise: what lies between two steps cannot be learnt by averaging.
+
+    Counted pulses carry what is left over into the next row, and pass.
+    """
+    if run.pulse_weight_arcsec is not None:
+        return
+    rate = rows.rate_dph[run.in_span(rows.time_s)][:_COARSE_ROWS]
+    rate = rate[np.isfinite(rate)]
+    move = np.abs(np.diff(rate))
+    moved = move[move > 0.0]
+    if len(moved) < _STUCK_ROWS or len(moved) > (1.0 - _REPEATS) * len(move):
+        return
+    levels = np.unique(rate)
+    step = float(np.median(np.diff(levels)))
+    if float(np.median(moved)) > _ONE_STEP * step:
+        return
+    yield {
+        "id": "coarse_rate",
+        "text": (
+            f"the rate comes in steps of {step:.4g} deg/h, far above its noise: {1.0 - len(moved) / len(move):.0%} of "
+            f"the rows repeat the one before, and means can be off by up to {0.5 * step:.2g} deg/h, which no averaging "
+            f"mends"
+        ),
+        "evidence": {"file": run.file, "from_s": run.from_s},
+        "marks": (),
     }

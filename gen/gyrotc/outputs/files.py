@@ -14,6 +14,7 @@ from .lock import Lock
 __all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
 _MOST_BYTES = 2**30
+_PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
 
 unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""
@@ -64,7 +65,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """A file that `--json` names must not be one that gyrotc did not write: it would be lost.
+    """A file that `--json` or `--plots` names must not be one that gyrotc did not write: it would be lost.
 
     Raises:
         InputError: There is such a file, or a folder.
@@ -76,6 +77,9 @@ def check_replaceable(path: Path) -> None:
             return
         if not path.is_file():
             raise InputError(str(path), "is a folder", "the name of a file")
+        with path.open("rb") as stream:
+            if _PAGE in stream.read(_HEAD):
+                return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:
         return

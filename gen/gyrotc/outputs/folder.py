@@ -113,7 +113,7 @@ def result_folder(
 
 
 def write_result(path: Path, text: str) -> None:
-    """Writes a JSON result where the user asked for it; in a result folder it becomes one of its files.
+    """Writes a JSON result or a page where the user asked for it; in a result folder it becomes one of its files.
 
     Raises:
         InputError: As `check_replaceable`.

@@ -24,10 +24,11 @@ from ..results.changes import Changes
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
-from ..results.training import Training
+from ..results.training import LeftOutRows, Training
 from ..results.verification import Verification
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
+from ..train.outliers import exclude_text
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 
 __all__ = ["page_environment", "page_from", "write_page", "write_report"]
@@ -68,6 +69,7 @@ def write_report(folder: Path) -> Path:
                 training=training,
                 judged=_judged(evaluation),
                 pictures=pictures,
+                left_out=_left_out(training),
                 **beside,
             )
         )
@@ -117,6 +119,16 @@ def page_from(source: Path) -> Iterator[None]:
         raise InputError(
             str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them"
         ) from error
+
+
+def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], str]]:
+    """Files of which rows were left out of training: stretches, and the line that leaves them out of all figures."""
+    outliers = training.outliers if training else None
+    stretches = outliers.stretches if outliers else ()
+    of_file = {
+        name: [s for s in stretches if s.file == name] for name in dict.fromkeys(s.file for s in stretches)
+    }
+    return [(name, mine, exclude_text(mine)) for name, mine in of_file.items()]
 
 
 def _judged(evaluation: Evaluation) -> tuple[str, Pooled | None]:

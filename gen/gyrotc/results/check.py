@@ -8,7 +8,15 @@ from pydantic import Field
 
 from .base import Count, Figure, Part, Result
 
-__all__ = ["Checked", "CheckedRun", "Doubted", "Problem"]
+__all__ = ["Checked", "CheckedRun", "Doubted", "MarkedRows", "Problem"]
+
+
+class MarkedRows(Part):
+    """Rows that something is told of."""
+
+    file: str = Field(description="as in `dataset.toml`")
+    rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not told")
+    span_s: tuple[float, float] | None = Field(description="their times on the file's clock, s")
 
 
 class Problem(Part):
@@ -17,6 +25,7 @@ class Problem(Part):
     where: str = Field(description="file, line and column")
     found: str = Field(description="what stands there")
     expected: str = Field(description="what should stand there; empty where `found` says it all")
+    rows: tuple[MarkedRows, ...] = Field(description="rows that it is about")
 
 
 class Doubted(Part):
@@ -25,6 +34,8 @@ class Doubted(Part):
     id: str = Field(description="stable name of the doubt")
     where: str = Field(description="file, or `data set`")
     text: str = Field(description="what is doubtful")
+    next: str = Field(description="what to do next; empty where `text` says it")
+    rows: tuple[MarkedRows, ...] = Field(description="rows that it is about, the first ones")
 
 
 class CheckedRun(Part):

@@ -11,7 +11,7 @@ from ..dataset import Run
 from ..results.training import LeftOutRows, Outliers
 from .data import TrainingData
 
-__all__ = ["outliers_of", "stretches_left_out"]
+__all__ = ["exclude_text", "outliers_of", "stretches_left_out"]
 
 _JOINED = 10  # rows between two that make them one stretch
 _LISTED = 200  # stretches; beyond, they are counted only
@@ -43,3 +43,9 @@ def outliers_of(stretches: Sequence[LeftOutRows], data: TrainingData) -> Outlier
     rows = sum(stretch.rows for stretch in stretches)
     kept = float(data.weight.sum())
     return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))
+
+
+def exclude_text(stretches: Sequence[LeftOutRows]) -> str:
+    """The line of a run's entry in dataset.toml that leaves stretches of its file out of every figure."""
+    each = (f'{{from_s = {s.from_s!r}, to_s = {s.to_s!r}, reason = "outlier"}}' for s in stretches)
+    return f"exclude = [{', '.join(each)}]"
