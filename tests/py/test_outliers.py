@@ -116,3 +116,22 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
     assert check(tmp_path / "R").problems == ()
     [run_of] = load(tmp_path / "R").runs
     assert len(run_of.rows()) == ROWS - 4
+
+
+def test_the_report_lists_what_was_left_out_with_the_line_to_paste(
+    tmp_path: Path,
+) -> None:
+    from gyrotc.jobs.build import build
+
+    table = cycle()
+    table["rate_dph"][[5000, 9000]] += 5.0
+    write_csv(tmp_path / "R" / "a.csv", table)
+    (tmp_path / "R" / "dataset.toml").write_text(toml(RUN), "utf-8")
+    build(tmp_path / "R", tmp_path / "out", FitOptions(), numerics=["f32"])
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Rows left out of training" in page
+    lines = (
+        "exclude = [{from_s = 5000.0, to_s = 5000.5, reason = &#34;outlier&#34;}, "
+        "{from_s = 9000.0, to_s = 9000.5, reason = &#34;outlier&#34;}]"
+    )
+    assert lines in page
