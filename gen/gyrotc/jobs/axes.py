@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..model import Model, load_model
-from ..outputs import write_atomically
+from ..outputs import scratch_folder, write_atomically
 from ..pages.report import page_environment
 from ..reference.runtime import runtime_folders
 from ..results.base import read_result
@@ -132,8 +131,8 @@ def verify_axes(
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:
     target = all_targets()[_HOST]
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        program = Path(work) / "main"
+    with scratch_folder() as work:
+        program = work / "main"
         compile_c(
             target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c
         )

@@ -12,6 +12,7 @@ from .interrupts import Interrupted, deferred, die_of, raise_on_signals
 from .jsontext import canonical_json, json_text
 from .lock import Lock
 from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
+from .scratch import scratch_folder
 
 __all__ = [
     "KINDS",
@@ -32,6 +33,7 @@ __all__ = [
     "raise_on_signals",
     "read_marker",
     "result_folder",
+    "scratch_folder",
     "sha256",
     "write_atomically",
     "write_result",

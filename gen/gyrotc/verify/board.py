@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed
 from ..model import Model
+from ..outputs import scratch_folder
 from ..reference.table import Table
 from ..results.verification import Cost, FunctionCost, VerifiedTarget
 from .boardlog import BoardOutput, compare, read_output
@@ -46,8 +46,8 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
         return [
             VerifiedTarget(name=target.name, status="missing", numeric=n, package=package) for n in numerics
         ]
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        return list(_entries(job, target, numerics, Path(work)))
+    with scratch_folder() as work:
+        return list(_entries(job, target, numerics, work))
 
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:

@@ -63,6 +63,10 @@ def confined(
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                with suppress(BrokenPipeError):  # what was still to be written to it
+                    pipe.close()
 
 
 def run_to_end(command: Sequence[str], folder: Path, what: str, stdin: Stream = subprocess.DEVNULL) -> Run:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +19,7 @@ from typing import Any
 
 from ..errors import CheckFailed, GyrotcError
 from ..model import Model
+from ..outputs import scratch_folder
 from ..reference.q31 import exp2_table
 from ..reference.table import Table
 from .confined import confined
@@ -74,8 +74,8 @@ def visit_all(
         GyrotcError: There is no host compiler.
     """
     target = _host()
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        program = _compiled(target, c_folder, model, Path(work), trusted=trusted)
+    with scratch_folder() as work:
+        program = _compiled(target, c_folder, model, work, trusted=trusted)
         parts = os.cpu_count() or 1
         lines = list(_numbers(model, table))
         done = _Counter(progress or (lambda _: None))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..model import Model
+from ..outputs import scratch_folder
 from ..reference.table import Table
 from ..texts import c_environment
 from .source import checked_sources, table_files
@@ -44,10 +44,10 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
         .get_template("footprint.c.j2")
         .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        source = Path(work) / "footprint.c"
+    with scratch_folder() as work:
+        source = work / "footprint.c"
         source.write_text(text, encoding="ascii")
-        c = checked_sources(c_folder, Path(work), table_files(model), trusted=trusted)
+        c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
         return _measured(target, c, [c / "gtc.c", c / f"gtc_{model.id}.c"], source)
 
 

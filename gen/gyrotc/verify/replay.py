@@ -6,7 +6,6 @@ file of the emulator's host), and so come the results out.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from ..dataset import Rows, Run
 from ..errors import CheckFailed, InputError
 from ..frontend import blocks_since_power_on, missed_before, samples_per_block
 from ..model import Model
+from ..outputs import scratch_folder
 from ..quantise.applied import channels_of
 from ..reference import Replay, replay
 from ..reference.table import Table, Words
@@ -94,11 +94,11 @@ def replay_program(
         .get_template("replay.c.j2")
         .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
     )
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        source = Path(work) / "replay.c"
+    with scratch_folder() as work:
+        source = work / "replay.c"
         source.write_text(text, encoding="ascii")
-        program = Path(work) / "replay"
-        c = checked_sources(c_folder, Path(work), table_files(model), trusted=trusted)
+        program = work / "replay"
+        c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
         sources = [source, c / "gtc.c", c / f"gtc_{model.id}.c"]
         compile_c(target, sources, program, include=c)
         yield program

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import CheckFailed, InputError
 from ..inputs import read_toml
+from ..outputs import scratch_folder
 from .confined import Run, run_to_end
 
 __all__ = [
@@ -220,11 +221,11 @@ def _command(target: Target, command: list[str], folder: Path) -> None:
 @functools.cache
 def _links(target: Target) -> bool:
     """Whether an empty program can be built: a compiler may lack the C library of the target."""
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        source = Path(work) / "empty.c"
+    with scratch_folder() as work:
+        source = work / "empty.c"
         source.write_text("int main(void)\n{\n    return 0;\n}\n", encoding="ascii")
         try:
-            compile_c(target, [source], Path(work) / "empty", include=Path(work))
+            compile_c(target, [source], work / "empty", include=work)
         except CheckFailed:
             return False
     return True
