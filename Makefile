@@ -127,9 +127,9 @@ bench-import:
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
 
-## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results/kills.json
+## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results.md
 kills: setup
-	@$(PYTHON) -m tests.kills.run --json docs/results/kills.json $${SET_SEED:+"--seed=$$SET_SEED"}
+	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup

@@ -26,6 +26,8 @@ ACTIONS = {
     "ENOSPC": -errno.ENOSPC,
 }
 SHIM = Path(__file__).with_name("shim.c")
+_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of linux/prctl.h
+_PATIENCE_S = 120.0
 Job = Callable[[], None]
 
 
@@ -38,6 +40,27 @@ def compiled_shim(folder: Path) -> Path:
 
 
 @dataclass(frozen=True)
+class Blow:
+    """What happens to a job.
+
+    Attributes:
+        action: One of `ACTIONS`; "" lets the job run undisturbed.
+        at: Its number of the calls that change a file.
+        after_s: Or after this time, instead.
+        workers: It happens to each process that the job starts, not to the job's own.
+    """
+
+    action: str = ""
+    at: int = 0
+    after_s: float | None = None
+    workers: bool = False
+
+    def __str__(self) -> str:
+        when = f"call {self.at}" if self.after_s is None else f"{self.after_s:.3f} s"
+        return f"{self.action} at {when}{' of a worker' if self.workers else ''}"
+
+
+@dataclass(frozen=True)
 class End:
     """How a job ended: its exit status (-n: by signal n), its calls that change files, what it told."""
 
@@ -46,20 +69,27 @@ class End:
     told: str
 
 
-def run(job: Job, below: Path, action: str = "", at: int = 0, after_s: float | None = None) -> End:
-    """Runs a job; at its `at`-th call below a folder, or after a time, what is asked for happens."""
+def adopt_orphans() -> None:
+    """Processes that a killed job leaves become children of this one, which can then wait for their end."""
+    if ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError("this system has no PR_SET_CHILD_SUBREAPER")
+
+
+def run(job: Job, below: Path, blow: Blow = Blow()) -> End:
+    """Runs a job, to the end of the last process that it started."""
     errors, counter = os.memfd_create("errors"), os.memfd_create("calls")
     pid = os.fork()
     if pid == 0:
-        _child(job, below, ACTIONS.get(action, 0), at, errors, counter)
+        _child(job, below, blow, errors, counter)
     timer = None
-    if after_s is not None:
-        timer = threading.Timer(after_s, _end, [pid, ACTIONS[action]])
+    if blow.after_s is not None:
+        timer = threading.Timer(blow.after_s, _end, [pid, ACTIONS[blow.action]])
         timer.start()
     _, status = os.waitpid(pid, 0)
     if timer:
         timer.cancel()
         timer.join()
+    _wait_for_orphans()
     told = os.pread(errors, 2**20, 0).decode(errors="replace")
     calls = int.from_bytes(os.pread(counter, 8, 0), "little")
     os.close(errors)
@@ -72,15 +102,34 @@ def _end(pid: int, number: int) -> None:
         os.kill(pid, number)
 
 
-def _child(job: Job, below: Path, action: int, at: int, errors: int, counter: int) -> None:
+def _wait_for_orphans() -> None:
+    """Nobody writes any more when this returns.
+
+    Raises:
+        RuntimeError: A process that a dead job started does not end.
+    """
+    begun = time.monotonic()
+    with contextlib.suppress(ChildProcessError):
+        while time.monotonic() - begun < _PATIENCE_S:
+            pid, _ = os.waitpid(-1, os.WNOHANG)
+            if pid == 0:
+                time.sleep(0.005)
+        raise RuntimeError(f"a process outlives its job by {_PATIENCE_S} s")
+
+
+def _child(job: Job, below: Path, blow: Blow, errors: int, counter: int) -> None:
     """Never returns."""
     os.dup2(errors, 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     shim = ctypes.CDLL(None)
     exit_code, number = 70, 0
+    action = ACTIONS.get(blow.action, 0)
     try:
         raise_on_signals()
-        shim.shim_arm(os.fsencode(f"{below}/"), ctypes.c_long(at), action)
+        if blow.workers:  # the shim arms itself in every program that is started with these
+            os.environ.update(SHIM_BELOW=f"{below}/", SHIM_AT=str(blow.at), SHIM_ACTION=str(action))
+            action = 0
+        shim.shim_arm(os.fsencode(f"{below}/"), ctypes.c_long(blow.at), action)
         job()
         exit_code = 0
     except GyrotcError as error:

@@ -1,11 +1,14 @@
-"""Jobs to be killed: each kind of writing by itself, and the commands as users type them."""
+"""Jobs to be killed: each kind of writing by itself, and the commands as users type them.
+
+A job takes the number of a version: with another number it writes something else, with the same number the same.
+"""
 
 from __future__ import annotations
 
-import itertools
 import json
+import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,35 +16,64 @@ from gyrotc.outputs import MARKER, faults, read_marker, result_folder, write_ato
 
 from .driver import Job
 
-_version = itertools.count()
+Content = dict[str, bytes]
+Versioned = Callable[[int], None]
+
+
+def _nothing(_version: int) -> None:
+    pass
 
 
 @dataclass(frozen=True)
 class Case:
-    """A job, the results that it writes, and what must be there besides."""
+    """What is killed, and what it writes.
+
+    Attributes:
+        write: The job; it is killed.
+        results: Folders and files, each of which is at every moment as before or as the job leaves it.
+        prepare: Called before the job, undisturbed.
+        disagree: What is wrong with what the job writes besides.
+        worker_calls: Calls that change a file in each process that the job starts; 0: it is not a target by itself.
+    """
 
     name: str
-    job: Job
+    write: Versioned
     results: tuple[Path, ...]
+    prepare: Versioned = _nothing
+    disagree: Callable[[], list[str]] = list
+    worker_calls: int = 0
+
+    def job(self, version: int) -> Job:
+        """The job that writes a version."""
+        return lambda: self.write(version)
+
+    def contents(self) -> tuple[Content, ...]:
+        """What its results hold now."""
+        return tuple(content(result) for result in self.results)
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    """Every file of a folder but the markers."""
+def content(result: Path) -> Content:
+    """Every file of a result but the markers; nothing if it is not there."""
+    if result.is_file():
+        return {"": result.read_bytes()}
     return {
-        p.relative_to(folder).as_posix(): p.read_bytes()
-        for p in sorted(folder.rglob("*"))
+        p.relative_to(result).as_posix(): p.read_bytes()
+        for p in sorted(result.rglob("*"))
         if p.is_file() and p.name != MARKER
     }
 
 
 def wrong(result: Path) -> list[str]:
-    """What keeps a result from being complete, the earlier one or the new."""
-    if result.suffix == ".json":
-        try:
-            return [] if json.loads(result.read_bytes())["whole"] is True else ["not whole"]
-        except (OSError, ValueError, KeyError) as error:
-            return [repr(error)]
-    return faults(result) if result.is_dir() else ["is not there"]
+    """What keeps a result that is there from being complete."""
+    if result.is_dir():
+        return faults(result)
+    try:
+        json.loads(result.read_bytes())
+    except FileNotFoundError:
+        return []
+    except ValueError as error:
+        return [repr(error)]
+    return []
 
 
 def left_beside(folder: Path, expected: set[str]) -> set[str]:
@@ -58,41 +90,37 @@ def writing(root: Path) -> list[Case]:
     """The ways in which commands write, without their work: every call can be tried."""
     out, alone = root / "out", root / "alone.json"
 
-    def build() -> None:
+    def build(version: int) -> None:
         with result_folder(out, "build") as stage:
-            _fill(stage.folder / "c", "table.c", "table.h")
-            write_atomically(stage.folder / "model.json", _text())
+            _fill(version, stage.folder / "c", "table.c", "table.h")
+            write_atomically(stage.folder / "model.json", f"{version}\n")
             with result_folder(stage.folder / "diagnosis", "diagnose") as part:
-                _fill(part.folder, "diagnose.json")
+                _fill(version, part.folder, "diagnose.json")
 
-    def emit() -> None:
+    def emit(version: int) -> None:
         with result_folder(out, "emit", entries=["c"]) as stage:
-            _fill(stage.folder / "c", "table.c", "table.h")
+            _fill(version, stage.folder / "c", "table.c", "table.h")
 
-    def verify() -> None:
+    def verify(version: int) -> None:
         with result_folder(out, "verify", entries=["verify.json"]) as stage:
-            _fill(stage.folder, "verify.json")
+            _fill(version, stage.folder, "verify.json")
 
-    def evaluate() -> None:
+    def evaluate(version: int) -> None:
         with result_folder(out, "evaluate", entries=["evaluate.json", "trace"]) as stage:
-            _fill(stage.folder / "trace", "run-01.csv")
-            _fill(stage.folder, "evaluate.json")
+            _fill(version, stage.folder / "trace", "run-01.csv")
+            _fill(version, stage.folder, "evaluate.json")
 
-    def single() -> None:
-        write_result(alone, json.dumps({"schema": "gyrotc.plan/1", "text": _text(), "whole": True}))
+    def single(version: int) -> None:
+        write_result(alone, json.dumps({"schema": "gyrotc.plan/1", "version": version}))
 
     folders = [Case(job.__name__, job, (out,)) for job in (build, emit, verify, evaluate)]
     return [*folders, Case("json", single, (alone,))]
 
 
-def _text() -> str:
-    return f"version {next(_version)}\n"
-
-
-def _fill(folder: Path, *names: str) -> None:
+def _fill(version: int, folder: Path, *names: str) -> None:
     folder.mkdir(exist_ok=True)
     for name in names:
-        (folder / name).write_text(_text())
+        (folder / name).write_text(f"version {version}\n")
 
 
 SCENARIO = """extends = "paper"
@@ -110,29 +138,58 @@ profiles = ["ramp", "ramp"]
 
 def commands(root: Path) -> list[Case]:
     """Commands on small recordings; `root` gets what they need."""
-    scenario = root / "short.toml"
+    scenario, data, out, apart = root / "short.toml", root / "data", root / "out", root / "apart"
     scenario.write_text(SCENARIO, encoding="utf-8")
-    data, out, apart = root / "data", root / "out", root / "apart"
-    typed: dict[str, tuple[Sequence[object], tuple[Path, ...]]] = {
-        "simulate": (["simulate", scenario, "--seed", 3, "--out", data], (data,)),
-        "build": (["build", data, "--out", out, "--numeric", "f32"], (out,)),
-        "fit": (["fit", data, "--out", root / "fitted", "--json", root / "fit.json"], (root / "fitted",)),
-        "emit": (["emit", out / "model.json", "--out", apart], (apart,)),
-        "verify": (["verify", apart, "--target", "host-gcc-O2"], (apart,)),
-        "evaluate": (["evaluate", apart, data, "--trace", apart / "trace"], (apart,)),
-        "report": (["report", out], (out,)),
-        "compare": (["compare", data, "--out", root / "compared"], (root / "compared",)),
-        "diagnose": (["diagnose", data, "--out", root / "diagnosed"], (root / "diagnosed",)),
-        "plan": (["plan", scenario, "--out", root / "planned"], (root / "planned",)),
-    }
-    return [Case(name, _command(*arguments), results) for name, (arguments, results) in typed.items()]
+    keys = [_key(root / f"key-{k}.pem") for k in range(2)]
+    subprocess.run(
+        [*GYROTC, "simulate", scenario, "--seed", "3", "--out", data], check=True, stdout=subprocess.DEVNULL
+    )
+
+    def case(name: str, line: Callable[[int], Sequence[object]], *results: Path) -> Case:
+        return Case(name, lambda version: command(name, *line(version)), results)
+
+    targets, numerics = ("host-gcc-O2", "host-clang-O2"), ("f32", "q31")
+    return [
+        case("simulate", lambda v: [scenario, "--seed", v, "--out", root / "made"], root / "made"),
+        case("build", lambda v: [data, "--out", out, "--numeric", "f32", "--seed", v], out),
+        case("fit", lambda v: [data, "--out", root / "fitted", "--seed", v, "--json", root / "fit.json"],
+             root / "fitted", root / "fit.json"),
+        case("emit", lambda v: [out / "model.json", "--out", apart, "--numeric", numerics[v % 2]], apart),
+        case("verify", lambda v: [apart, "--target", targets[v % 2]], apart),
+        case("evaluate", lambda v: [apart, data, "--trace", apart / "trace", "--average-s", 100 + v], apart),
+        case("sign", lambda v: [apart, "--key", keys[v % 2]], apart),
+        case("report", lambda _: [out], out),
+        case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
+        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v], root / "diagnosed"),
+        case("plan", lambda v: [scenario, "--out", root / "planned", "--seed", v], root / "planned"),
+        case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
+             root / "imported"),
+        case("check", lambda _: [data, "--json", root / "check.json"], root / "check.json"),
+        _stamp(root, out / "model.json"),
+    ]  # fmt: skip
 
 
-def _command(*arguments: object) -> Job:
-    def job() -> None:
-        from gyrotc.cli import _status
+def _stamp(root: Path, model: Path) -> Case:
+    """A model that was changed by hand, and the command that enters its checksum."""
+    changed = root / "changed.json"
 
-        sys.argv = ["gyrotc", *(str(a) for a in arguments)]
-        raise SystemExit(_status())  # `main` leaves at once: the calls could not be counted
+    def change(version: int) -> None:
+        changed.write_text(json.dumps(json.loads(model.read_text()) | {"seed": version}))
 
-    return job
+    return Case("stamp", lambda _: command("stamp", changed), (changed,), prepare=change)
+
+
+GYROTC = (sys.executable, "-c", "from gyrotc.cli import main; main()")
+
+
+def _key(path: Path) -> Path:
+    subprocess.run(["openssl", "genpkey", "-algorithm", "ed25519", "-out", path], check=True)
+    return path
+
+
+def command(*arguments: object) -> None:
+    """A command line, in this process."""
+    from gyrotc.cli import _status
+
+    sys.argv = ["gyrotc", *(str(a) for a in arguments)]
+    raise SystemExit(_status())  # `main` leaves at once: the calls could not be counted

@@ -1,13 +1,16 @@
 """300 jobs and more killed or let down by the disk: afterwards the earlier result or the new one, nothing besides.
 
-usage: python -m tests.kills.run [--commands N] [--only NAME ...] [--every K] [--seed S] [--json FILE]
+usage: python -m tests.kills.run [--commands N] [--only NAME ...] [--every K] [--seed S] [--json FILE] [--docs DOCS]
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
+import itertools
 import json
 import os
+import pkgutil
 import random
 import secrets
 import sys
@@ -15,8 +18,12 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from .driver import ACTIONS, End, compiled_shim, run, seconds
-from .jobs import Case, commands, left_beside, writing, wrong
+import gyrotc
+
+from .driver import ACTIONS, Blow, End, adopt_orphans, compiled_shim, run, seconds
+from .fleets import fleet
+from .jobs import Case, Content, commands, left_beside, writing, wrong
+from .page import write_page
 
 _IN_SHIM = "GYROTC_TEST_SHIM"
 
@@ -28,34 +35,74 @@ class Campaign:
         self.root = root
         self.counts: Counter[str] = Counter()
         self.found: list[str] = []
-        self.expected: set[str] = set()
+        self._expected: set[str] = set()
+        self._changing: dict[Path, set[str]] = {}
+        self._version = itertools.count()
 
-    def kill(self, case: Case, action: str, at: int = 0, after_s: float | None = None) -> End:
+    def kill(self, case: Case, blow: Blow) -> End:
         """Ends a job, looks at what is left, lets the job run again, looks again."""
-        end = run(case.job, self.root, action, at, after_s)
-        where = f"{case.name}, {action} at {f'call {at}' if after_s is None else f'{after_s:.3f} s'}"
-        self.counts[action] += 1
-        for result in case.results:
-            self.found += [f"{where}: {result.name} {what}" for what in wrong(result)]
+        version = next(self._version)
+        where = f"{case.name}, version {version}, {blow}"
+        case.prepare(version)
+        before = case.contents()
+        end = run(case.job(version), self.root, blow)
+        self.counts[blow.action] += 1
+        self._look(case, where)
+        found = case.contents()
         if "Traceback" in end.told:
-            self.found.append(f"{where}: a traceback: {end.told[-600:]}")
-        if action in ("TERM", "INT") and left_beside(self.root, self.expected):
-            self.found.append(f"{where}: left {left_beside(self.root, self.expected)} itself")
-        again = run(case.job, self.root)
+            self._tell(where, f"a traceback: {end.told[-600:]}")
+        if blow.action in ("TERM", "INT") and not blow.workers and self._left():
+            self._tell(where, f"left {self._left()} itself")
+        again = run(case.job(version), self.root)
         if again.status != 0:
-            self.found.append(f"{where}: the next job ends with {again.status}: {again.told}")
-        for result in case.results:
-            self.found += [f"{where}, then again: {result.name} {what}" for what in wrong(result)]
-        if left := left_beside(self.root, self.expected):
-            self.found.append(f"{where}: the next job leaves {sorted(left)}")
+            self._tell(where, f"the next job ends with {again.status}: {again.told}")
+        self._look(case, f"{where}, then again")
+        for result, *contents in zip(case.results, before, found, case.contents(), strict=True):
+            self._compare(where, result, *contents)
+        if left := self._left() | {
+            f"{path.name} (temporary)" for path in Path(os.environ["TMPDIR"]).iterdir()
+        }:
+            self._tell(where, f"the next job leaves {sorted(left)}")
         return end
 
+    def _look(self, case: Case, where: str) -> None:
+        for result in case.results:
+            for what in wrong(result):
+                self._tell(where, f"{result.name} {what}")
+        for what in case.disagree():
+            self._tell(where, what)
+
+    def _compare(self, where: str, result: Path, before: Content, found: Content, after: Content) -> None:
+        """What was found is what was there, or what an undisturbed job makes; but for files that are never the same."""
+        changing = self._changing.get(result, set())
+        old, now, new = (
+            {k: b"" if k in changing else v for k, v in c.items()} for c in (before, found, after)
+        )
+        if now not in (old, new):
+            names = sorted(n for n in {*old, *now, *new} if now.get(n) not in (old.get(n), new.get(n)))
+            self._tell(where, f"{result.name} is neither as before nor as after: {names or 'a mixture'}")
+
+    def _left(self) -> set[str]:
+        return left_beside(self.root, self._expected)
+
+    def _tell(self, where: str, what: str) -> None:
+        self.found.append(f"{where}: {what}")
+        print(f"\n{self.found[-1]}", file=sys.stderr, flush=True)
+
     def first(self, case: Case) -> int:
-        """Lets a job run undisturbed; the number of its calls that change files."""
-        end = run(case.job, self.root)
-        if end.status != 0:
-            raise SystemExit(f"{case.name} fails by itself: {end.told}")
-        self.expected = {path.name for path in self.root.iterdir() if not path.name.startswith(".")}
+        """Lets a job run undisturbed, twice; the number of its calls that change files."""
+        version = next(self._version)
+        seen = []
+        for _ in range(2):
+            case.prepare(version)
+            end = run(case.job(version), self.root)
+            if end.status != 0:
+                raise SystemExit(f"{case.name} fails by itself: {end.told}")
+            seen.append(case.contents())
+        for result, one, other in zip(case.results, *seen, strict=True):
+            self._changing.setdefault(result, set()).update(n for n in one if one[n] != other.get(n))
+        self._expected = {path.name for path in self.root.iterdir() if not path.name.startswith(".")}
+        self.counts["calls"] += end.calls
         return end.calls
 
 
@@ -65,33 +112,42 @@ def between_calls(root: Path, every: int) -> Campaign:
     cases = writing(root)
     for case in cases:
         campaign.first(case)
+    campaign.counts.clear()
     for case in cases:
-        calls = run(case.job, root).calls
-        campaign.counts["calls"] += calls
+        calls = campaign.first(case)
         for number, action in enumerate(ACTIONS):
             first = 1 + (17 * number) % min(every, calls)  # so that few kills meet different calls
             for at in range(first, calls + 1, every):
-                campaign.kill(case, action, at)
+                campaign.kill(case, Blow(action, at))
     return campaign
 
 
 def of_commands(root: Path, number: int, only: set[str], draw: random.Random) -> Campaign:
     """Commands ended at random calls, and signalled at random times."""
+    for module in pkgutil.walk_packages(gyrotc.__path__, "gyrotc."):
+        if not module.name.endswith("__main__"):  # so that the jobs, which are forks, need not
+            importlib.import_module(module.name)
     campaign = Campaign(root)
-    cases = [case for case in commands(root) if not only or case.name in only]
+    cases = [*commands(root), fleet(root, root / "short.toml")]
+    cases = [case for case in cases if not only or case.name in only]
     calls = {case.name: campaign.first(case) for case in cases}
-    lengths = {case.name: seconds(case.job, root) for case in cases}
+    lengths = {case.name: seconds(case.job(0), root) for case in cases}
     campaign.first(cases[0])
     for k in range(number):
         case = cases[k % len(cases)]
-        action = draw.choice(list(ACTIONS))
         campaign.counts[case.name] += 1
-        if ACTIONS[action] > 0 and draw.random() < 0.5:
-            campaign.kill(case, action, after_s=draw.uniform(0.0, 1.05) * lengths[case.name])
-        else:
-            campaign.kill(case, action, draw.randint(1, calls[case.name]))
+        campaign.kill(case, _drawn(case, calls[case.name], lengths[case.name], draw))
         print(f"\r{k + 1} of {number}", end="", file=sys.stderr, flush=True)
     return campaign
+
+
+def _drawn(case: Case, calls: int, length: float, draw: random.Random) -> Blow:
+    action = draw.choice(list(ACTIONS))
+    if case.worker_calls and draw.random() < 0.5:
+        return Blow(action, draw.randint(1, case.worker_calls), workers=True)
+    if ACTIONS[action] > 0 and draw.random() < 0.5:
+        return Blow(action, after_s=draw.uniform(0.0, 1.05) * length)
+    return Blow(action, draw.randint(1, calls))
 
 
 def _again_with_shim() -> None:
@@ -115,10 +171,12 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=(), help="these commands only")
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
     parser.add_argument("--json", type=Path, default=None, help="write the counts here")
+    parser.add_argument("--docs", type=Path, default=None, help="write results/kills.json and the page here")
     arguments = parser.parse_args()
     if _IN_SHIM not in os.environ:
         _again_with_shim()
     print(f"seed {arguments.seed}", flush=True)
+    adopt_orphans()
     done = {}
     with tempfile.TemporaryDirectory(prefix="gyrotc-kills-") as work:
         root = Path(work).resolve()
@@ -136,14 +194,12 @@ def main() -> None:
     counts = {name: dict(campaign.counts) for name, campaign in done.items()}
     faults = [fault for campaign in done.values() for fault in campaign.found]
     ended = sum(n for counted in counts.values() for key, n in counted.items() if key in ACTIONS)
-    print(
-        json.dumps({"seed": arguments.seed, "ended": ended, "counts": counts, "wrong": len(faults)}, indent=1)
-    )
-    for fault in faults[:40]:
-        print(fault, file=sys.stderr)
+    result = {"seed": arguments.seed, "ended": ended, "counts": counts, "wrong": len(faults)}
+    print(json.dumps(result, indent=1))
     if arguments.json:
-        result = {"seed": arguments.seed, "ended": ended, "counts": counts, "wrong": len(faults)}
         arguments.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    if arguments.docs and not faults:
+        write_page(arguments.docs, result)
     raise SystemExit(1 if faults else 0)
 
 

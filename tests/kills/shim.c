@@ -3,6 +3,7 @@
  * shim_arm(folder, n, action) begins to count; actions are a signal's number (sent before the call), or -errno (the
  * call fails so; ENOSPC then fails every further call that needs space). shim_count() tells the calls so far. While
  * armed, fsync only counts: what a dead process wrote is there without it, and campaigns have thousands of them.
+ * A program that is started with SHIM_BELOW, SHIM_AT and SHIM_ACTION in its environment is armed from its beginning.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -40,6 +41,16 @@ void shim_arm(const char *folder, long n, int what)
 long shim_count(void)
 {
     return count;
+}
+
+__attribute__((constructor)) static void arm_from_environment(void)
+{
+    const char *folder = getenv("SHIM_BELOW");
+    const char *n = getenv("SHIM_AT");
+    const char *what = getenv("SHIM_ACTION");
+    if (folder != NULL && n != NULL && what != NULL) {
+        shim_arm(folder, atol(n), atoi(what));
+    }
 }
 
 static int is_ours(int dir, const char *path)

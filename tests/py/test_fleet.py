@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import pytest
 from conftest import Command
 from gyrotc.errors import InputError
 from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
+from gyrotc.jobs.fleet.unit import Task, do_unit
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -52,7 +54,7 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     summary = json.loads((out / "fleet.json").read_text())
     assert json.loads((tmp_path / "fleet.json").read_text()) == summary
     assert (summary["schema"], summary["done"], summary["failed"]) == ("gyrotc.fleet/1", 2, 1)
-    rows = list(csv.DictReader((out / "fleet.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines()))
     assert [row["status"] for row in rows] == ["done", "done", "failed"]
     assert "RLG-3" in (out / "fleet.html").read_text()
 
@@ -158,6 +160,48 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
     assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
         *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html",
     }  # fmt: skip
+
+
+def test_no_file_of_the_summary_outlives_what_it_says(
+    tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before: without `fleet.json` (a kill between the three files) the others kept the figures of replaced results."""
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    out, manifest = tmp_path / "out", tmp_path / "fleet.toml"
+    manifest.write_text('schema = 1\ndatasets = ["d/*"]\n')
+    assert gyrotc("fleet", manifest, "--out", out).returncode == 0
+    (out / "fleet.json").unlink()
+    manifest.write_text('schema = 1\ndatasets = ["d/*"]\n[options]\nseed = 1\n')
+
+    def stopped(_jobs: int, tasks: Sequence[Task]) -> Iterator[Any]:
+        assert do_unit(tasks[0])["status"] == "done"
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr("gyrotc.jobs.fleet.run.on_processes", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_fleet(load_manifest(manifest), out)
+    [row] = csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines())
+    assert row["status"] == "unfinished" and row["model_hash"] == ""
+    assert "unfinished" in (out / "fleet.html").read_text()
+
+
+def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(tmp_path: Path) -> None:
+    """Also beside a result whose gyro is no longer in the manifest; locks of others stay."""
+    for k in (1, 2):
+        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    out = tmp_path / "out"
+    run_fleet(load_manifest(tmp_path / "d"), out)
+    left = [out / f".RLG-{k}.gyrotc-part-0123abcd" for k in (1, 2)]
+    for path in left:
+        path.mkdir()
+        (path / ".gyrotc-result.json").write_text('{"schema": "gyrotc.result/1", "kind": "result"}')
+    for name in ("RLG-1", "RLG-2", "thesis"):
+        (out / f".{name}.lock").write_text("")
+    shutil.rmtree(tmp_path / "d" / "RLG-1")
+    run_fleet(load_manifest(tmp_path / "d"), out)
+    assert not any(path.exists() for path in left)
+    assert sorted(p.name for p in out.glob(".*.lock")) == [".thesis.lock"]
 
 
 def _entries(n: int, seed: int) -> list[dict[str, Any]]:

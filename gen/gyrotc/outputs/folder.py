@@ -262,11 +262,11 @@ class _Job:
                 clean(place)
 
 
-def leftovers(folder: Path) -> set[str]:
-    """Names in a folder beside which jobs, at work or dead, left something."""
-    names = [path.name[1:] for path in folder.iterdir() if path.name.startswith(".")]
-    parted = (name.partition(prefix_of(Path())[1:]) for name in names)
-    return {name for name, found, _ in parted if found} | {n[:-5] for n in names if n.endswith(".lock")}
+def leftovers(folder: Path, names: Sequence[str] = ()) -> set[str]:
+    """Names in a folder beside which jobs, at work or dead, left a folder; and those of `names` that have a lock."""
+    hidden = {path.name[1:] for path in folder.iterdir() if path.name.startswith(".")}
+    parted = (name.partition(prefix_of(Path())[1:]) for name in hidden)
+    return {name for name, found, _ in parted if found} | {name for name in names if f"{name}.lock" in hidden}
 
 
 def clean(place: Path) -> None:

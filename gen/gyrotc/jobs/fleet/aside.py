@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -42,10 +43,8 @@ def _changed(place: Path) -> bool:
         return True
 
 
-def clean_units(out: Path, names: list[str]) -> None:
-    """Removes what jobs that were killed left beside the results of these names."""
-    left = leftovers(out)
-    for name in names:
-        if name in left:
-            with suppress(InputError):  # a job is at work there
-                clean(out / name)
+def clean_units(out: Path, names: Sequence[str]) -> None:
+    """Removes what jobs that were killed left beside results in a fleet's folder; of these names also their locks."""
+    for name in leftovers(out, names):
+        with suppress(InputError):  # a job is at work there
+            clean(out / name)

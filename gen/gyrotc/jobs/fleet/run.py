@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ...outputs import KINDS, Lock
+from ...outputs import KINDS, Lock, deferred
 from ...outputs.places import check_apart, check_contents, final_place
 from .aside import clean_units
 from .entry import Entry
@@ -53,7 +53,11 @@ def run_fleet(
     try:
         return _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
     finally:
-        lock.release()
+        with deferred():
+            try:
+                clean_units(place, [unit.folder for unit in fleet.units])  # of processes that this one ended
+            finally:
+                lock.release()
 
 
 def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told) -> list[Entry]:
@@ -66,7 +70,7 @@ def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, 
             entries[number] = known | {"kept": True}
             say(entries[number])
     waiting = [number for number in range(len(tasks)) if number not in entries]
-    if waiting and (out / "fleet.json").exists():
+    if waiting and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
         write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
     left = [tasks[number] for number in waiting]
