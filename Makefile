@@ -7,12 +7,14 @@ override GYROTC := .venv/bin/gyrotc
 override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.
-unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA
+unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA SETS MEGABYTES
 override export SET_DATA := $(value DATA)
 override export SET_AXIS := $(value AXIS)
 override export SET_SECONDS := $(or $(value SECONDS),20)
 override export SET_STORM := $(or $(value STORM),1000000)
 override export SET_SEED := $(value SEED)
+override export SET_SETS := $(or $(value SETS),2000)
+override export SET_MEGABYTES := $(value MEGABYTES)
 override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -121,7 +123,7 @@ bench-import:
 	@tools/setup.sh test
 	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
-	@build/bench/bin/python -m bench.importing docs $(MEGABYTES)
+	@build/bench/bin/python -m bench.importing docs $${SET_MEGABYTES:+"$$SET_MEGABYTES"}
 
 ## a thousand gyros through gyrotc fleet: docs/results.md
 fleet: setup
@@ -137,7 +139,7 @@ blind: setup
 
 ## training on 2,000 odd but valid data sets (SETS=2000, minutes)
 odd: setup
-	@GYROTC_ODD=$(or $(SETS),2000) $(PYTHON) -m pytest -q tests/py/test_odd_training.py
+	@GYROTC_ODD="$$SET_SETS" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
 
 ## remove what was built (not .venv)
 clean:

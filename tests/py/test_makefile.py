@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 #: Stands in for every program: writes what it was called with.
-STUB = '#!/bin/sh\nprintf "%s\\n" "$(basename "$0")" "$@" >>"$CALLS"\n'
+STUB = '#!/bin/sh\nprintf "%s\\n" "$(basename "$0")" "$@" ${GYROTC_ODD:+"ODD=$GYROTC_ODD"} >>"$CALLS"\n'
 HOSTILE = (
     'x"; touch y; "',
     "x'; touch y; '",
@@ -38,6 +38,7 @@ def house(tmp_path: Path) -> Path:
         "tools/setup.sh",
         ".venv/bin/gyrotc",
         ".venv/bin/python",
+        "build/bench/bin/python",
         "bin/cmake",
         "build/fuzz/fuzz_map_f32",
     ):
@@ -82,6 +83,15 @@ def test_values_reach_programs_as_they_are(value: str, house: Path) -> None:
         assert status == 0 and _after(calls, "tools/real.py") == value
 
 
+@pytest.mark.parametrize("value", HOSTILE)
+def test_numbers_for_one_target_reach_it_as_they_are(value: str, house: Path) -> None:
+    """Before: `make odd SETS='1; touch y'` ran what it said."""
+    for given in ({}, {"SETS": value, "MEGABYTES": value}):
+        words = [] if given else [f"SETS={value}", f"MEGABYTES={value}"]
+        assert make(house, "odd", *words, **given)[1][-1] == f"ODD={value}"
+        assert make(house, "bench-import", *words, **given)[1][-1] == value
+
+
 @pytest.mark.parametrize("value", [*HOSTILE, "-1", "0", "1e3", "20 30"])
 def test_a_fuzzing_time_that_is_none_is_refused(value: str, house: Path) -> None:
     """libFuzzer would take it for 0, which is for ever."""
@@ -93,6 +103,7 @@ def test_a_fuzzing_time_that_is_none_is_refused(value: str, house: Path) -> None
 def test_values_left_out_are_the_defaults(house: Path) -> None:
     assert make(house, "blind", "SEED=")[1][-2:] == ["--docs", "docs"]
     assert _after(make(house, "real")[1], "tools/real.py") == "../shared/data/real"
+    assert make(house, "bench-import")[1][-1] == "docs" and make(house, "odd")[1][-1] == "ODD=2000"
     calls = make(house, "fuzz", "SECONDS=7")[1]
     assert "-max_total_time=7" in calls
     assert "-max_total_time=20" in make(house, "fuzz")[1]
