@@ -6,9 +6,9 @@ import contextlib
 import os
 import sys
 
-from .errors import GyrotcError
+from .errors import GyrotcError, InputError
 from .outputs import Interrupted, die_of, raise_on_signals
-from .texts import terminal_text
+from .texts import terminal_line, terminal_text
 
 _CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
 
@@ -45,7 +45,7 @@ def _failed(error: OSError) -> int:
         return _CLOSED
     where = error.filename or "standard output"
     with contextlib.suppress(OSError):
-        print(f"gyrotc: {terminal_text(f'{where}: {error.strerror or error}')}", file=sys.stderr, flush=True)
+        print(f"gyrotc: {terminal_line(f'{where}: {error.strerror or error}')}", file=sys.stderr, flush=True)
     return GyrotcError.exit_status
 
 
@@ -65,7 +65,10 @@ def _status() -> int:
 
         app(standalone_mode=True)
     except GyrotcError as error:
-        print(f"gyrotc: {terminal_text(str(error))}", file=sys.stderr)
+        shown = (
+            terminal_line if isinstance(error, InputError) else terminal_text
+        )  # compilers say more than a line
+        print(f"gyrotc: {shown(str(error))}", file=sys.stderr)
         return error.exit_status
     except OSError as error:
         return _failed(error)

@@ -38,6 +38,7 @@ __all__ = [
     "file_stem",
     "html_environment",
     "picture_text",
+    "terminal_line",
     "terminal_text",
     "toml_comment",
     "toml_key",
@@ -287,3 +288,8 @@ def terminal_text(text: str) -> str:
     return (
         text if text.isprintable() else _shown(text, lambda char, _: char.isprintable() or char in "\n\t\xa0")
     )
+
+
+def terminal_line(text: str) -> str:
+    """As `terminal_text`, in one line: a name with a line break in it cannot pass for a second message."""
+    return text if text.isprintable() else _shown(text, lambda char, _: char.isprintable() or char == "\xa0")

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -213,6 +214,51 @@ def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
         out.readlink().name if out.is_symlink() else ""
     }
     assert left == {mine.name} and (mine / "thesis.tex").read_text() == "years"
+
+
+def _forged(folder: Path, *parts: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    text = {"schema": "gyrotc.result/1", "kind": "result", "command": "build", "serial": "A", "axis": None}
+    (folder / MARKER).write_text(json.dumps(text | {"files": {}, "parts": parts}))
+
+
+@pytest.mark.parametrize("way", ["absolute", "above", "behind a link", "behind two"])
+def test_a_forged_marker_reaches_nothing_outside(out: Path, way: str) -> None:
+    """Before: a folder beside `--out` (from a supplier's archive) with a marker whose part is a folder of the user's
+    deleted every file in that."""
+    thesis = out.parent / "docs" / "written" / "thesis"
+    thesis.parent.mkdir(parents=True)
+    thesis.write_text("years")
+    write(out.parent / "other", "another result")
+    kept = content(out.parent)
+    for place in (out, out.with_name(".out.gyrotc-part-00000000")):
+        place.mkdir()
+        if way.startswith("behind"):
+            (place / "x").symlink_to(".x.gyrotc-part-1" if way.endswith("two") else out.parent / "docs")
+            (place / ".x.gyrotc-part-1").symlink_to(out.parent / "docs")
+        above = {"absolute": f"{out.parent}/", "above": "../"}.get(way, "")
+        parts = [f"{above}docs/written", f"{above}other"] if above else ["x/written"]
+        _forged(place, *parts)
+        with suppress(InputError):
+            write(out, "new")
+    assert {k: v for k, v in content(out.parent).items() if k in kept} == kept
+    assert thesis.read_text() == "years" and faults(out.parent / "other") == []
+
+
+def test_what_a_forged_leftover_holds_goes_nowhere_else(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A file that somebody put into a result is carried over into the next, and never through a link out of it."""
+    (tmp_path / "home").mkdir()
+    project, left = tmp_path / "project", tmp_path / ".project.gyrotc-part-00000000"
+    project.mkdir()
+    (project / "docs").symlink_to(tmp_path / "home")
+    _forged(left)
+    (left / "docs").mkdir()
+    (left / "docs" / "authorized_keys").write_text("mine")
+    update(project, "c")
+    assert not any((tmp_path / "home").iterdir())
+    assert "is left there" in capfd.readouterr().err and (left / "docs" / "authorized_keys").is_file()
 
 
 def test_what_comes_into_a_result_while_it_is_replaced_is_carried_over(out: Path) -> None:

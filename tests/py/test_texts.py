@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import jinja2
 import pytest
+from conftest import Command
 from emitted import recorded
 from gyrotc.commands import base
 from gyrotc.commands.results import evaluation_table, verify_table
@@ -655,6 +656,7 @@ def test_terminals_show_every_text_and_obey_none(
     monkeypatch.setattr(base, "OUT", console)
     for text in HOSTILE:
         base.tell(text)
+    assert stream.getvalue().count("\n") == len(HOSTILE), "each is told in one line"
     evaluation = result["evaluation"]
     runs = tuple(evaluation.runs[0].model_copy(update={"environment": t, "file": t}) for t in HOSTILE[:400])
     console.print(
@@ -667,6 +669,23 @@ def test_terminals_show_every_text_and_obey_none(
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u202e]", said)
     for text in ("[/bold]", "[red]", ":smile:", "<U+001B>[2J", "<U+202E>", "[link=http://x]"):
         assert said.count(text) > 3
+
+
+def test_a_refusal_is_one_line_whatever_the_name(tmp_path: Path, gyrotc: Command) -> None:
+    """Before: a line break in a name began a second message, in which the name could say what it liked."""
+    folder = tmp_path / "d\ngyrotc: all is well"
+    folder.mkdir()
+    (folder / "a\nb.csv").write_text("time_s,temperature_c\n1,2\n")
+    for command in (
+        ("check", folder),
+        ("build", folder, "--out", tmp_path / "o\n1"),
+        ("report", folder),
+        ("fleet", folder / "a\nb.csv", "--out", tmp_path / "o"),
+    ):
+        done = gyrotc(*command)
+        assert done.returncode == 2 and done.stderr.count("\n") == (0 if command[0] == "check" else 1)
+        assert "<U+000A>" in done.stdout + done.stderr
+        assert "\ngyrotc: all" not in done.stdout + done.stderr
 
 
 def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from rich.text import Text
 from .. import __version__
 from ..inputs import CEILINGS, set_ceilings
 from ..outputs import check_replaceable, json_text, write_result
-from ..texts import terminal_text
+from ..texts import terminal_line, terminal_text
 
 app = typer.Typer(
     name="gyrotc",
@@ -109,7 +109,7 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 def tell(text: str) -> None:
     """A line of the result on stdout, as it is."""
-    OUT.print(text, highlight=False, soft_wrap=True)
+    OUT.print(terminal_line(text), highlight=False, soft_wrap=True)
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ from .exchange import can_exchange, exchange
 from .files import check_replaceable, sync_folder, unfinished, write_atomically
 from .interrupts import deferred
 from .lock import Lock
-from .marker import KINDS, MARKER, OWN, Marker, faults, read_marker, remove_listed, sha256, walk
+from .marker import KINDS, MARKER, OWN, Marker, faults, is_inside, read_marker, remove_listed, sha256, walk
 from .places import check_apart, check_contents, check_serial, final_place, prefix_of
 from .update import Update, write_marker
 
@@ -309,7 +309,7 @@ def _carry(old: Path, place: Path, name: str) -> None:
     source, target = old / name, place / name
     if target.is_file() and not source.is_symlink() and target.samefile(source):
         source.unlink()
-    elif place.is_dir() and not target.exists() and not target.is_symlink():
+    elif place.is_dir() and not target.exists() and not target.is_symlink() and is_inside(place, name):
         target.parent.mkdir(parents=True, exist_ok=True)
         source.rename(target)
     else:

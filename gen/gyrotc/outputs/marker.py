@@ -1,7 +1,7 @@
 """`.gyrotc-result.json`: what gyrotc wrote into a folder, so that it removes that and nothing else.
 
 Names that stand in a marker are compared with names found in the folder; none is ever opened or removed because
-a marker names it.
+a marker names it. Parts are followed: `read_marker` takes none that leads out of the folder.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from ..errors import InputError
 from .jsontext import json_text
 
 __all__ = [
-    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "read_marker", "remove_listed", "sha256", "survey",
+    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "is_inside", "read_marker",
+    "remove_listed", "sha256", "survey",
     "walk",
 ]  # fmt: skip
 
@@ -121,7 +122,7 @@ def read_marker(folder: Path) -> Marker | None:
             raw["serial"],
             raw["axis"],
             {str(k): str(v) for k, v in raw["files"].items()},
-            tuple(str(part) for part in raw["parts"]),
+            tuple(_checked_part(folder, str(part)) for part in raw["parts"]),
             {str(k): {str(n): str(v) for n, v in f.items()} for k, f in raw.get("pending", {}).items()},
             bool(raw.get("unfinished", False)),
         )
@@ -129,6 +130,25 @@ def read_marker(folder: Path) -> Marker | None:
         return None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {SCHEMA}") from error
+
+
+def _checked_part(folder: Path, part: str) -> str:
+    """A folder inside, by a path that leads nowhere else: whoever wrote the marker may have meant one of the user's.
+
+    Raises:
+        ValueError: It is not.
+    """
+    names = part.split("/")
+    if not all(names) or {".", ".."} & set(names) or "\0" in part:
+        raise ValueError(f"a part is {part[:80]!r}, which is no folder inside")
+    if not is_inside(folder, part):
+        raise ValueError(f"the part {part[:80]!r} lies behind a link")
+    return part
+
+
+def is_inside(folder: Path, name: str) -> bool:
+    """Whether no link on the way to a path in a folder leads out of it."""
+    return (folder / name).parent.resolve().is_relative_to(folder.resolve())
 
 
 def sha256(path: Path, *, sync: bool = False) -> str:
