@@ -23,20 +23,20 @@ def main() -> None:
     raise_on_signals()
     try:
         status = _status()
-        status = _flushed() or status
+        status = _flushed(status)
     except Interrupted as end:
         die_of(end.number)
     os._exit(status)
 
 
-def _flushed() -> int:
-    """What is still to be printed is; else the status of what went wrong."""
+def _flushed(status: int) -> int:
+    """What is still to be printed is: the command's status, or that of what went wrong, which is told once."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()
     except OSError as error:
-        return _failed(error)
-    return 0
+        return status if status == GyrotcError.exit_status else _failed(error)
+    return status
 
 
 def _failed(error: OSError) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import os
 import signal
@@ -12,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Command
+from gyrotc import cli
 from gyrotc.commands import app
 from gyrotc.errors import GyrotcError
 from gyrotc.outputs import MARKER, Lock, faults
@@ -153,6 +156,20 @@ def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Pa
             [program, "check", made / "A"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert (done.returncode, done.stderr) == (2, "gyrotc: standard output: No space left on device\n")
+
+
+def test_output_that_cannot_be_written_is_told_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Some releases of Python keep what they could not write, and try again at the end."""
+
+    class Full(io.StringIO):
+        def flush(self) -> None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert [cli._flushed(status) for status in (2, 0)] == [2, 2]
+    assert capsys.readouterr().err == "gyrotc: standard output: No space left on device\n"
 
 
 def test_a_closed_pipe_is_told_as_shells_expect(made: Path) -> None:

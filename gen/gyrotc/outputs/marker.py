@@ -22,8 +22,7 @@ from .jsontext import json_text
 
 __all__ = [
     "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "is_inside", "read_marker",
-    "remove_listed", "sha256", "survey",
-    "walk",
+    "remove_listed", "sha256", "survey", "walk",
 ]  # fmt: skip
 
 MARKER = ".gyrotc-result.json"
