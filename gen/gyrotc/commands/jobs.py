@@ -106,13 +106,13 @@ def build(
             tell(f"axis {result.model.axis}")
         _print_built(result)
     tell(f"report: {out / 'report.html'}")
-    failures = [
-        f"axis {axis}: {failure}" if (axis := result.model.axis) else failure
-        for result in results
-        for failure in result.failures
-    ]
-    if failures:
-        raise CheckFailed("; ".join(failures))
+    if failures := "; ".join(failure for result in results for failure in _failures(result)):
+        raise CheckFailed(failures)
+
+
+def _failures(result: Built) -> list[str]:
+    axis = result.model.axis
+    return [f"axis {axis}: {failure}" if axis else failure for failure in result.failures]
 
 
 def _print_built(result: Built) -> None:

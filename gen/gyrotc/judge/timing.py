@@ -163,13 +163,26 @@ def _drift(run: Run, time: Floats, at: NDArray[np.int64], step: Floats) -> Itera
     if not (apart > limit).any():
         return
     worst = int(kept[np.argmax(apart - limit)])
-    first, last = worst * size, (worst + 1) * size
     total = float(np.sum(np.abs(mean - usual) * count[kept]))
-    yield {
+    every = (usual, float(np.nanmean(steps[worst])))
+    yield _drifting(run, time, at, (worst * size, (worst + 1) * size), every, total)
+
+
+def _drifting(
+    run: Run,
+    time: Floats,
+    at: NDArray[np.int64],
+    span: tuple[int, int],
+    every: tuple[float, float],
+    total: float,
+) -> Finding:
+    """The finding, of the steps of a span; `every`: s from row to row, usually and there."""
+    first, last = span
+    return {
         "id": "time_drifts",
         "text": (
-            f"the time stamps drift against the row count: rows come every {usual:.6g} s, but every "
-            f"{np.nanmean(steps[worst]):.6g} s from row {at[first] + 1} to {at[last] + 1} ({time[first]:.10g} to "
+            f"the time stamps drift against the row count: rows come every {every[0]:.6g} s, but every "
+            f"{every[1]:.6g} s from row {at[first] + 1} to {at[last] + 1} ({time[first]:.10g} to "
             f"{time[last]:.10g} s); in all stamps and rows part by {total:.4g} s"
         ),
         "evidence": {"file": run.file, "from_s": run.from_s},
