@@ -14,6 +14,7 @@ from gyrotc.dataset import load
 from gyrotc.importers.stamps import Stamps
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
+from logger_strangers import STRANGERS
 from logger_table import PAGE, cases, filled
 
 
@@ -29,7 +30,7 @@ def run(
     return status, captured.out, captured.err
 
 
-@pytest.mark.parametrize("case", [*CSV_CASES, *BINARY_CASES], ids=lambda c: c.id)
+@pytest.mark.parametrize("case", [*CSV_CASES, *STRANGERS, *BINARY_CASES], ids=lambda c: c.id)
 def test_a_file_comes_in_by_one_command(
     case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -73,3 +74,35 @@ def test_the_hour_that_comes_twice_when_summer_time_ends(chunk: int) -> None:
     stamps = Stamps("%Y-%m-%d %H:%M:%S", "Europe/Berlin")
     parsed = [stamps.parse(pa.array(texts[k : k + chunk]))[0] for k in range(0, len(texts), chunk)]
     np.testing.assert_array_equal(np.concatenate(parsed).astype("datetime64[ns]"), utc)
+
+
+def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1.234 is 1234 for one logger and 1.234 for another; where nothing tells, the column is no column of numbers."""
+    lines = [f"{k},5;{20 + k % 2},25;{1 + k % 3}.{200 + k}" for k in range(60)]
+    (tmp_path / "a.csv").write_text("Zeit [s];Temp [°C];Rate [°/h]\n" + "\n".join(lines) + "\n", "utf-8")
+    status, _, error = run(capsys, monkeypatch, "import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 2
+    assert "no column that a rate is told from" in error
+    stated = ("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--csv", "thousands=.")
+    status, _, error = run(capsys, monkeypatch, *stated)
+    assert status == 0, error
+    assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1200.0
+
+
+@pytest.mark.parametrize("case", STRANGERS, ids=lambda c: c.id)
+def test_the_kept_map_reads_the_next_file(
+    case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without any option, and to the same rows."""
+    case.write(tmp_path / case.file, truth())
+    assert (
+        run(capsys, monkeypatch, "import", tmp_path / case.file, "--out", tmp_path / "A", *case.options)[0]
+        == 0
+    )
+    again = ("import", tmp_path / case.file, "--map", tmp_path / "A" / "map.toml", "--out", tmp_path / "B")
+    status, _, error = run(capsys, monkeypatch, *again)
+    assert status == 0, error
+    [one], [two] = (sorted((tmp_path / name).glob("*.parquet")) for name in "AB")
+    assert one.read_bytes() == two.read_bytes()

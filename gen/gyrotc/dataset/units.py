@@ -89,6 +89,8 @@ _ALLOWED = re.compile(r"[\w\s.°*/^()+\-µ%]{1,60}")
 _LARGE_POWER = re.compile(r"(\*\*|\^)(?!\s*[-+]?[1-3](?!\s*(\d|\*\*|\^|\.)))")  # pint would compute any
 _ROUNDING = 1e-13  # what pint's products of binary numbers may be off, relative
 _DENOMINATOR = 1000
+_SIZE = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+_SCALED = re.compile(rf"(?:(?P<by>{_SIZE})\s*\*?\s*)?(?P<unit>[^\W\d][\w°]*)(?:\s*/\s*(?P<over>{_SIZE}))?")
 
 
 class UnitError(ValueError):
@@ -193,6 +195,11 @@ def _affine(text: str, target: str) -> tuple[float, float]:
     """Factor and offset of a unit, exact where they are fractions of small whole numbers."""
     registry = _registry()
     wanted = registry.parse_units(target)
+    found = _SCALED.fullmatch(text)
+    if target == NATIVE["temperature"] and found and bool(found["by"]) != bool(found["over"]):
+        factor, offset = _affine(found["unit"], target)  # pint does not multiply a unit with an offset
+        size = float(found["by"]) if found["by"] else 1.0 / float(found["over"])
+        return _snapped(factor * size), offset
     given = registry.parse_expression(text)
     if isinstance(given, int | float):
         raise UnitError(f"{text!r} is a number without a unit")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from typing import Any
@@ -25,7 +26,9 @@ _EPOCH_S = (
 )
 _NAT = np.iinfo(np.int64).min
 _WRAPS = (2**16, 2**24, 2**32)
+_PERIODS_S = (86_400.0, 604_800.0)  # seconds of the day, time of the GPS week
 _NEAR_STEPS = 20.0
+_ZONE = re.compile(r"\b(?:GMT|UTC) ?([+-]\d{2}:?\d{2})")
 
 
 class Clock:
@@ -66,7 +69,8 @@ class Clock:
         self._added = 0
         if columns and columns[0].kind != "number" and columns[0].sample:
             self.form = stated.format or _form(file, columns)
-            self._stamps = Stamps(self.form, stated.zone)
+            in_name = _ZONE.search(columns[0].name)
+            self._stamps = Stamps(self.form, stated.zone or (in_name[1] if in_name else None))
         elif columns and columns[0].kind == "number" and self._unit is None:
             raise InputError(file, "a counter without a unit", "--time-unit")
         self._known_zone = bool(columns) and (
@@ -152,7 +156,7 @@ class Clock:
         return since / whole if whole and abs(whole * factor - 1.0) < 1e-12 else since * factor
 
     def _unwrapped(self, raw: NDArray[Any]) -> NDArray[Any]:
-        """A counter that starts again at 2^16, 2^24 or 2^32 goes on."""
+        """A counter that starts again at 2^16, 2^24 or 2^32, or with the day or the week, goes on."""
         if len(raw) == 0:
             return raw
         if raw.dtype.kind in "ui":
@@ -161,9 +165,10 @@ class Clock:
         self._last = float(raw[-1])
         raw = raw + self._added
         falls = np.flatnonzero(step < 0.0)
+        wraps = (*_WRAPS, *(round(s / self._unit.factor) for s in _PERIODS_S if self._unit))
         usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
         for at in falls[:1000]:
-            wrap = next((w for w in _WRAPS if abs(step[at] + w) <= _NEAR_STEPS * usual), None)
+            wrap = next((w for w in wraps if abs(step[at] + w) <= _NEAR_STEPS * usual), None)
             if wrap is not None and step[at] < -0.5 * wrap:
                 raw[at:] += wrap
                 self._added += wrap

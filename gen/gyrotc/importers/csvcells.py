@@ -7,12 +7,20 @@ from collections.abc import Sequence
 
 from .forms import forms_of
 
-__all__ = ["MISSING", "cells_of", "is_number", "kind_of_cells"]
+__all__ = ["MISSING", "cells_of", "is_number", "kind_of_cells", "plain_lines", "plain_number", "thousands_of"]
 
 MISSING = (
     "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
 )  # fmt: skip
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?[iI]nf(inity)?")
+_NUMBER = re.compile(r"(?:[+-] *)?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?[iI]nf(inity)?")
+_BLANKS = " \u00a0\u202f\u2009'\u2019"  # between thousands: blanks of all widths, apostrophes
+_GROUPED = {
+    decimal: re.compile(
+        rf"(?:[+-] *)?[0-9]{{1,3}}(?P<mark>[{_BLANKS}{other}])[0-9]{{3}}(?:(?P=mark)[0-9]{{3}})*"
+        rf"{re.escape(decimal)}[0-9]+"
+    )
+    for decimal, other in ((",", "."), (".", ","))
+}  # only with a decimal mark behind it: 1.234 alone may be either
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -31,17 +39,60 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     return [*cells, cell.strip()]
 
 
-def kind_of_cells(cells: Sequence[str], decimal: str) -> str:
-    """What cells hold: "number", "stamp", "text", or "empty"."""
+def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> str:
+    """What cells hold: "number", "stamp", "text", or "empty".
+
+    Args:
+        thousands: The mark between thousands, where it is stated.
+    """
     held = [cell for cell in cells if cell not in MISSING]
     if not held:
         return "empty"
-    if all(is_number(cell, decimal) for cell in held):
+    if all(is_number(cell, decimal, thousands) for cell in held):
         return "number"
     return "stamp" if forms_of(held) else "text"
 
 
-def is_number(cell: str, decimal: str) -> bool:
+def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
+    """Whether a cell is a number, with marks between thousands where nothing else can be meant, or as stated."""
+    if thousands and re.fullmatch(
+        rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell
+    ):
+        cell = cell.replace(thousands, "")
+    if _GROUPED[decimal].fullmatch(cell):
+        return True
     if decimal == ",":
         return "." not in cell and bool(_NUMBER.fullmatch(cell.replace(",", ".", 1)))
     return bool(_NUMBER.fullmatch(cell))
+
+
+def thousands_of(cells: Sequence[str], decimal: str) -> str:
+    """The mark between thousands of numbers, empty where there is none."""
+    for cell in cells:
+        if found := _GROUPED[decimal].fullmatch(cell):
+            return found["mark"]
+    return ""
+
+
+def plain_number(cell: str, decimal: str, thousands: str) -> str:
+    """A number without marks between thousands and without blanks behind its sign, with a point."""
+    plain = cell.replace(thousands, "") if thousands else cell
+    plain = re.sub(r"^([+-]) +", r"\1", plain)
+    return plain.replace(",", ".", 1) if decimal == "," else plain
+
+
+def plain_lines(lines: bytes, delimiter: str, thousands: str, *, apart: bool) -> bytes:
+    """Lines of cells, in UTF-8, likewise; the decimal mark stays.
+
+    Args:
+        apart: Signs stand apart from the digits.
+    """
+    edge = re.escape(delimiter.encode())
+    if apart:
+        lines = re.sub(rb"(?m)(^|" + edge + rb'|")( *[+-]) +(?=[0-9.])', rb"\1\2", lines)
+    if thousands:
+        mark = thousands.encode()
+        start, digits = rb"(?m)(^|" + edge + rb'|")( *[+-]?[0-9]{1,3}', rb"[0-9]{3})+)"
+        grouped = re.compile(start + rb"(?:" + re.escape(mark) + digits + rb'(?=[.,"\r\n]|' + edge + rb"|$)")
+        lines = grouped.sub(lambda found: found[1] + found[2].replace(mark, b""), lines)
+    return lines

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import InputError
-from .csvcells import MISSING, cells_of, is_number, kind_of_cells
+from .csvcells import MISSING, cells_of, is_number, kind_of_cells, thousands_of
 from .csvheader import facts_above, header_of, in_comments
 from .forms import forms_of
 
@@ -39,6 +39,8 @@ class Dialect:
         names: Names of the columns; empty for a column that only ends the lines.
         units: Units by column, empty where none are given.
         missing: What cells without a number hold.
+        thousands: The mark between thousands; empty: there is none.
+        apart: Signs stand apart from the digits.
         facts: `key: value` lines above the header.
     """
 
@@ -52,6 +54,8 @@ class Dialect:
     names: tuple[str, ...]
     units: tuple[str, ...]
     missing: tuple[str, ...] = MISSING
+    thousands: str = ""
+    apart: bool = False
     facts: dict[str, str] = field(default_factory=dict)
 
     def to_map(self) -> dict[str, Any]:
@@ -66,6 +70,7 @@ class Dialect:
             "units_line": self.units_line,
         }
         extra = [token for token in self.missing if token not in MISSING]
+        found |= {"thousands": self.thousands} if self.thousands else {}
         return found | ({"missing": extra} if extra else {})
 
 
@@ -98,6 +103,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     above = [(k, cells) for k, cells in split if k < split[first][0]]
     above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
     header, units_line, names, units = header_of(above, count, given, decimal)
+    cells = [cell for _, row in split[first:] for cell in row]
     return Dialect(
         encoding=encoding,
         delimiter=delimiter,
@@ -109,6 +115,8 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         names=names,
         units=units,
         missing=(*MISSING, *given.get("missing", ())),
+        thousands=given.get("thousands") or thousands_of(cells, decimal),
+        apart=any(cell[:2] in ("+ ", "- ") for cell in cells),
         facts=facts_above(lines[: split[first][0] - 1], header),
     )
 
@@ -167,12 +175,14 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
         count, often = Counter(len(cells) for cells in split).most_common(1)[0]
         rows = [cells for cells in split if len(cells) == count]
         for decimal in [given["decimal"]] if given.get("decimal") else (".", ","):
-            kinds = [kind_of_cells(column, decimal) for column in zip(*rows, strict=True)]
+            stated = given.get("thousands", "")
+            kinds = [kind_of_cells(column, decimal, stated) for column in zip(*rows, strict=True)]
             numbers = sum(kind in ("number", "stamp") for kind in kinds)
             texts = sum(kind == "text" for kind in kinds)
-            score = often / len(sample) * (numbers - 0.5 * texts) / max(len(kinds), 1)
-            if any(kind == "number" for kind in kinds) and (score, numbers) > best[:2]:
-                best = (score, numbers, (delimiter, decimal))
+            score = often / len(sample) * (numbers - 0.5 * texts) / max(len(kinds) - kinds.count("empty"), 1)
+            counted = 0 if delimiter == "whitespace" else numbers  # blanks also part a date from its time
+            if any(kind == "number" for kind in kinds) and (score, counted) > best[:2]:
+                best = (score, counted, (delimiter, decimal))
     if not best[2][0]:
         found = f"no columns of numbers: {sample[-1][:60]!r}"
         raise InputError(

@@ -12,6 +12,7 @@ from .csvcells import cells_of, is_number
 __all__ = ["facts_above", "header_of", "in_comments"]
 
 _FACTS = re.compile(r"^\W*(?P<key>[A-Za-z][\w .#/]{1,40}?)\s*[:=,;\t]+\s*(?P<value>[^;,\t]+?)[\s;,]*$")
+_UNITS_LABEL = re.compile(r"(?:y_)?units?(?:_label)?:?|einheit(?:en)?:?", re.IGNORECASE)
 
 
 def in_comments(
@@ -31,15 +32,23 @@ def header_of(
     above: Sequence[tuple[int, list[str]]], count: int, given: Mapping[str, Any], decimal: str
 ) -> tuple[int, int, tuple[str, ...], tuple[str, ...]]:
     """Line of the names, line of the units, names, units; made-up names where there is no header."""
-    rows = [(k, cells) for k, cells in above if _fits_header(cells, count, decimal)]
+    rows = [
+        (k, cells)
+        for k, cells in above
+        if _fits_header(cells, count, decimal) and not _UNITS_LABEL.fullmatch(cells[0])
+    ]
     if "header_line" in given:
         rows = [(k, cells) for k, cells in above if k == given["header_line"]]
         rows += [(k, cells) for k, cells in above if k == given.get("units_line", 0)]
     if not rows:
         return 0, 0, tuple(f"column {k + 1}" for k in range(count)), ("",) * count
-    units_line, units = 0, [""] * count
-    if len(rows) > 1 and (_is_units(rows[-1][1]) or rows[-1][0] == given.get("units_line")):
-        units_line, cells = rows.pop()
+    units_line, units = _labelled(above, count)
+    of_units = [
+        k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.get("units_line")
+    ]
+    if of_units:
+        units_line, cells = rows[of_units[-1]]
+        rows = rows[: of_units[-1]]
         units = [cell.strip("[](){} ") for cell in _padded(cells, count)]
     line, cells = rows[-1]
     names = _padded(cells, count)
@@ -47,6 +56,17 @@ def header_of(
         names = _with_group(_padded(rows[-2][1], count), names)
     names = [name.strip().strip("'\ufeff") for name in names]
     return line, units_line, tuple(names), tuple("" if u in ("-", "1", "none") else u for u in units)
+
+
+def _labelled(above: Sequence[tuple[int, list[str]]], count: int) -> tuple[int, list[str]]:
+    """Units of a line that says so in its first cell, anywhere above the rows, and that of its abscissa."""
+    line, units = 0, [""] * count
+    for k, cells in above:
+        if cells and _UNITS_LABEL.fullmatch(cells[0]) and any(kind_of(cell) for cell in cells[1:] if cell):
+            line, units = k, ["", *_padded(cells[1:], count - 1)[: count - 1]]
+    if any(cells[:2] == ["X_Dimension", "Time"] for _, cells in above):
+        units[0] = "s"  # of a LabVIEW measurement file
+    return line, units
 
 
 def _fits_header(cells: Sequence[str], count: int, decimal: str) -> bool:
@@ -61,10 +81,17 @@ def _padded(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _is_units(cells: Sequence[str]) -> bool:
-    """Whether a line holds units: at least half of its words are, and one of them is of time, temperature or rate."""
+    """Whether a line holds units: at least half of its words are, or two fifths and two of them,
+    and one of them is of time, temperature or rate.
+    """
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
     known = sum(kind_of(word) is not None or _in_brackets(cells, word) for word in words)
-    return bool(words) and known >= 0.5 * len(words) and any(kind_of(word) for word in words)
+    of_kinds = sum(kind_of(word) is not None for word in words)
+    return (
+        bool(words)
+        and of_kinds > 0
+        and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
+    )
 
 
 def _in_brackets(cells: Sequence[str], word: str) -> bool:

@@ -15,7 +15,7 @@ import pyarrow.csv as pacsv
 
 from ..errors import InputError
 from .csvblocks import blocks_of, lines_of
-from .csvcells import MISSING, cells_of, kind_of_cells
+from .csvcells import MISSING, cells_of, kind_of_cells, plain_lines, plain_number
 from .csvdialect import Dialect, dialect_of
 from .tables import Chunk, Column, LoggerFile, Table
 
@@ -113,6 +113,9 @@ class CsvTable(Table):
         if self.dialect.delimiter == "whitespace":
             lines = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", lines)
             lines = re.sub(rb"[ \t]+", b" ", lines)
+        elif self.dialect.thousands or self.dialect.apart:
+            one = self.dialect
+            lines = plain_lines(lines, one.delimiter, one.thousands, apart=one.apart)
         return lines
 
     def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any]:
@@ -191,7 +194,7 @@ class CsvTable(Table):
             elif self._type(name) == pa.string():
                 values[name] = cell
             else:
-                plain = cell.replace(",", ".", 1) if self.dialect.decimal == "," else cell
+                plain = plain_number(cell, self.dialect.decimal, self.dialect.thousands)
                 if not _NUMBER.fullmatch(plain) and plain.lower().lstrip("+-") not in ("inf", "infinity"):
                     hint = f'--csv missing="{cell[:20]}" takes it as no reading'
                     raise InputError(f"{where}, column {name}", repr(cell[:40]), f"a number; {hint}")
@@ -223,7 +226,7 @@ def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:
 
 
 def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Column:
-    kind = kind_of_cells(cells, dialect.decimal)
+    kind = kind_of_cells(cells, dialect.decimal, dialect.thousands)
     why = f"in line {dialect.units_line}" if unit else ""
     known = tuple("" if cell in MISSING else cell for cell in cells)
     return Column(name, unit or None, why, "number" if kind in ("number", "empty") else kind, known)  # type: ignore[arg-type]

@@ -52,6 +52,7 @@ class CsvMap(_Part):
     header_line: Annotated[int, Field(ge=0, le=10_000)] | None = None
     units_line: Annotated[int, Field(ge=0, le=10_000)] | None = None
     missing: Texts = ()
+    thousands: Annotated[str, Field(min_length=1, max_length=1)] | None = None
 
     def given(self) -> dict[str, Any]:
         """The keys that are stated."""

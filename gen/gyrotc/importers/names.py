@@ -96,6 +96,8 @@ _NO_TEMPERATURE = {
     "setpoint",
     "set",
     "soll",
+    "sollwert",
+    "nominal",
     "ambient",
     "chamber",
     "air",
@@ -128,7 +130,7 @@ class Meaning:
 
 def words(name: str) -> list[str]:
     """Lower-case words of a name: `GyrX_dps` gives gyr, x, dps."""
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d{3,})", " ", name)
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?<![Pp][Tt])(?=\d{3,})", " ", name)
     return [w for w in re.split(r"[^0-9a-zäöüßµω°]+", spaced.lower()) if w]
 
 
@@ -137,6 +139,9 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
     """A name without its unit, the unit (None: the name gives none), and how it was given."""
     if found := _BRACKETS.match(name):
         unit = found["unit"]
+        before = split_unit(found["base"]) if kind_of(unit) is None and found["base"] else ("", None, "")
+        if before[1] and kind_of(before[1]):
+            return before
         if kind_of(unit) or not re.fullmatch(r"[xyzXYZ\d\s#:]+", unit):
             return found["base"], unit, "in brackets in its name"
     if (found := _AFTER_SIGN.match(name)) and kind_of(found["unit"]):

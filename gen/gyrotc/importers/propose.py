@@ -101,7 +101,7 @@ def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tupl
         if len({id(table) for _, table, _, _ in found}) > 1:
             raise InputError(file.path.name, "rates of several tables", "rates of one table under [columns]")
         return found
-    likely = [(table, *_rates(table)) for table in tables]
+    likely = [(table, *_rates(table, file.path.stem)) for table in tables]
     likely = [one for one in likely if one[1]]
     best = max((one[2] for one in likely), default=0)
     top = [one for one in likely if one[2] == best]
@@ -118,7 +118,7 @@ def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tupl
     return [(role, table, column, why) for role, column, why in columns]
 
 
-def _rates(table: Table) -> tuple[list[tuple[str, Column, str]], int]:
+def _rates(table: Table, file: str) -> tuple[list[tuple[str, Column, str]], int]:
     """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
     pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
     if pulses:
@@ -129,7 +129,7 @@ def _rates(table: Table) -> tuple[list[tuple[str, Column, str]], int]:
         rates = [
             (c, m)
             for c, m in found
-            if c.name in ("x", "y", "z") and "gyro" in words(table.name.replace("_", " "))
+            if c.name in ("x", "y", "z") and "gyro" in words((table.name or file).replace("_", " "))
         ]
     if not rates:
         return [], 0
