@@ -103,7 +103,6 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     above = [(k, cells) for k, cells in split if k < split[first][0]]
     above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
     header, units_line, names, units = header_of(above, count, given, decimal)
-    cells = [cell for _, row in split[first:] for cell in row]
     return Dialect(
         encoding=encoding,
         delimiter=delimiter,
@@ -115,10 +114,15 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         names=names,
         units=units,
         missing=(*MISSING, *given.get("missing", ())),
-        thousands=given.get("thousands") or thousands_of(cells, decimal),
-        apart=any(cell[:2] in ("+ ", "- ") for cell in cells),
+        **_digits([cell for _, row in split[first:] for cell in row], decimal, given),
         facts=facts_above(lines[: split[first][0] - 1], header),
     )
+
+
+def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """How numbers are written besides their decimal mark."""
+    apart = any(cell[:2] in ("+ ", "- ") for cell in cells)
+    return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "apart": apart}
 
 
 def _encoding(head: bytes) -> str:
