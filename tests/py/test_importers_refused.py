@@ -321,3 +321,88 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
         assert pq.ParquetFile(tmp_path / f"R{k}" / f"{k}.parquet").metadata.num_rows == blocks * 400_000
     assert peaks[1] < peaks[0] + 60, peaks
     assert peaks[1] < 700, peaks
+
+
+@pytest.mark.parametrize(
+    ("name", "extra", "head"),
+    [
+        ("a.ulg", "ulog", b"ULog\x01\x12\x35"),
+        ("a.tdms", "tdms", b"TDSm"),
+        ("a.h5", "hdf5", b"\x89HDF\r\n\x1a\n"),
+        ("a.bag", "ros", b"#ROSBAG V2.0"),
+        ("a.bin", "dataflash", b"\xa3\x95"),
+        ("a.mf4", "mdf", b"MDF     "),
+    ],
+)
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(
+    name: str,
+    extra: str,
+    head: bytes,
+    tmp_path: Path,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from gyrotc.importers import tables
+
+    class Importlib:
+        """Finds nothing."""
+
+        @staticmethod
+        def import_module(module: str) -> None:
+            raise ImportError(module)
+
+    (tmp_path / name).write_bytes(head + bytes(2000))
+    monkeypatch.setattr(tables, "importlib", Importlib)
+    status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
+    assert status == 2
+    assert error.startswith(f"gyrotc: {name}: ")
+    assert f"expected pip install 'gyrotc[{extra}]'" in error
+
+
+GOES_ON = {
+    "pulses": (
+        "time_s,pulses,temp_c",
+        "{k},{k},20.5",
+        "--pulse-weight-arcsec W",
+        ("--pulse-weight-arcsec", "2.0"),
+    ),
+    "increments": (
+        "Time (s),DeltaAngle X (rad),Temp (C)",
+        "{k},0.0001{k},20.5",
+        '--column rate="DeltaAngle X (rad)" --rate-unit "rad / (0.01 s)"',
+        ("--column", "rate=DeltaAngle X (rad)", "--rate-unit", "rad / (0.01 s)"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", GOES_ON)
+def test_the_option_that_is_named_goes_on(case: str, tmp_path: Path, run: Run) -> None:
+    head, row, named, options = GOES_ON[case]
+    lines = [head, *(row.format(k=k + 100) for k in range(50))]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    command = ("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    status, _, error = run(*command)
+    assert status == 2
+    assert named in error
+    assert run(*command, *options, "--trust-units")[0] == 0
+
+
+def test_a_line_that_looks_like_a_row_is_never_offered_as_a_comment(tmp_path: Path, run: Run) -> None:
+    """Before: --csv comment="1000" was offered, which leaves out 10000 too."""
+    lines = ["time_s,temp_c,rate_dph", *(f"{10 * k},20.5,{k % 7}" + ",x" * (k == 100) for k in range(200))]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert "line 102: 4 cells" in error
+    assert "comment=" not in error
+
+
+@pytest.mark.parametrize("rows", [10, 20, 45])
+@pytest.mark.parametrize("above", [0, 25])
+def test_a_short_file_is_read(rows: int, above: int, tmp_path: Path, run: Run) -> None:
+    """Before: a header among the last 60 lines hid that the rows are numbers."""
+    lines = [*(f"note {k}" for k in range(above)), "time_s,temp_c,rate_dph"]
+    lines += [f"{10 * k},20.{k},{k % 7}.5" for k in range(rows)]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 0, error
+    assert load(tmp_path / "R").runs[0].n_rows == rows

@@ -58,6 +58,12 @@ def import_(
         ),
     ] = None,
     format: Annotated[str, typer.Option("--format", help="Of the runs written: parquet or csv.")] = "parquet",
+    pulse_weight: Annotated[
+        float | None,
+        typer.Option(
+            "--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."
+        ),
+    ] = None,
     trust_units: TrustUnitsOption = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only tell how the files would be read.")
@@ -77,6 +83,7 @@ def import_(
     stated = {"rate_hz": rate_hz, "format": time_format, "zone": time_zone}
     content = known.model_dump()
     content["csv"] |= _csv(csv or [], content["csv"])
+    content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
     chosen = _stated(content, units, stated, _columns(column or []), table)
     options = ImportOptions(serial, format, trust_units, dry_run)  # type: ignore[arg-type]
     with _share() as progress:

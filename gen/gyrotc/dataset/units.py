@@ -172,7 +172,9 @@ def channel_unit(name: str) -> str | None:
 
 def _spelt(text: str) -> str:
     """A unit as `pint` wants it."""
-    plain = " ".join(text.replace("º", "°").replace("μ", "µ").replace("·", "*").split()).strip("[](){}")
+    plain = " ".join(text.replace("º", "°").replace("μ", "µ").replace("·", "*").split())
+    while plain[:1] + plain[-1:] in ("[]", "()", "{}"):
+        plain = plain[1:-1].strip()
     if plain.lower() in _SPELT:
         return _SPELT[plain.lower()]
     if not _ALLOWED.fullmatch(plain) or _LARGE_POWER.search(plain):

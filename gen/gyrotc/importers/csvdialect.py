@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import InputError
 from .csvcells import MISSING, cells_of, is_number, kind_of_cells, thousands_of
@@ -22,6 +22,8 @@ __all__ = ["Dialect", "dialect_of"]
 _DELIMITERS = (";", "\t", ",", "|", "whitespace")
 _COMMENTS = ("#", "%", "//", "!", "*")
 _ENOUGH = 0.8
+_LAST, _FEWEST = 60, 5  # lines that are looked at, at most and at least
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     """
     encoding = given.get("encoding") or _encoding(head)
     text = _text(name, head, encoding)
-    lines = re.split(r"\r\n|\n|\r", text)
-    lines = lines if whole else lines[:-1]
+    lines = re.split(r"\r\n|\n|\r", text)[: None if whole else -1]
     comment = _comments(lines, given)
     kept = [
         (k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)
@@ -159,7 +160,8 @@ def _text(name: str, head: bytes, encoding: str) -> str:
     except UnicodeDecodeError as error:
         line = head[: error.start].count(b"\n") + 1
         found = f"bytes that are no {encoding}"
-        raise InputError(f"{name}, line {line}", found, "another --csv encoding=...") from error
+        choices = "--csv encoding=... with cp932 (Japanese), gb18030 (Chinese), cp1251 (Cyrillic) or latin-1"
+        raise InputError(f"{name}, line {line}", found, choices) from error
     return text
 
 
@@ -172,7 +174,7 @@ def _comments(lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, ...]
 
 def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, str]:
     """Delimiter and decimal mark that make numbers of most cells of the last lines."""
-    sample = lines[-60:]
+    sample = _last(lines)
     best: tuple[float, int, tuple[str, str]] = (0.0, 0, ("", ""))
     for delimiter in [given["delimiter"]] if given.get("delimiter") else _DELIMITERS:
         split = [cells_of(line, delimiter) for line in sample]
@@ -188,24 +190,33 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
             if any(kind == "number" for kind in kinds) and (score, counted) > best[:2]:
                 best = (score, counted, (delimiter, decimal))
     if not best[2][0]:
-        found = f"no columns of numbers: {sample[-1][:60]!r}"
-        raise InputError(
-            name,
-            found,
-            "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen",
-        )
+        raise InputError(name, f"no columns of numbers: {sample[-1][:60]!r}", _instead(name, sample[-1]))
     return best[2]
 
 
+def _instead(name: str, line: str) -> str:
+    """What goes on where lines are no rows of numbers."""
+    if line.lstrip()[:1] in ("{", "["):
+        return "a table: records of JSON as CSV or Parquet, one column for each field"
+    if re.search(r"\w[=:] ?[-+]?[0-9.]", line):
+        return f"numbers alone: sed -E 's/[A-Za-z_]+ ?[=:] ?//g' {name} > {name}.csv takes the words out"
+    return "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen"
+
+
+def _last(lines: Sequence[T]) -> Sequence[T]:
+    """The last lines: rows, however many lines stand above them in a short file."""
+    return lines[-min(_LAST, max(len(lines) // 4, _FEWEST)) :]
+
+
 def _usual_count(split: Sequence[tuple[int, list[str]]]) -> int:
-    return Counter(len(cells) for _, cells in split[-60:]).most_common(1)[0][0]
+    return Counter(len(cells) for _, cells in _last(split)).most_common(1)[0][0]
 
 
 def _first_row(
     name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int
 ) -> int:
     """Index of the first row of numbers: it and most of the next lines have the kinds of cells of the last ones."""
-    tail = [cells for _, cells in split[-40:] if len(cells) == count]
+    tail = [cells for _, cells in _last(split) if len(cells) == count]
     kinds = [kind_of_cells(column, decimal) for column in zip(*tail, strict=True)]
     for k, (line, _) in enumerate(split):
         if line > header and all(_like(cells, kinds, decimal, count) for _, cells in split[k : k + 1]):

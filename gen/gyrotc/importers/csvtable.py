@@ -185,6 +185,8 @@ class CsvTable(Table):
         if len(row) != len(self.columns):
             found = f"{len(row)} cells: {self.dialect.delimiter.join(row)[:60]!r}"
             hint = f'--csv comment="{_beginning(row)}" leaves out lines that begin so'
+            if row and row[0][:1].isdigit():
+                hint = "mend or delete that line, which looks like a row"
             raise InputError(where, found, f"{len(self.columns)} as in the first rows; {hint}")
         values: dict[str, Any] = {}
         for name in names:

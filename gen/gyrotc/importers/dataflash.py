@@ -29,7 +29,7 @@ def open_dataflash(path: Path) -> LoggerFile:
     Raises:
         InputError: pymavlink is not installed, or the log is damaged.
     """
-    reader = library("pymavlink.DFReader", "dataflash", "an ArduPilot log")
+    reader = library(path, "pymavlink.DFReader", "dataflash", "an ArduPilot log")
     try:
         with redirect_stdout(StringIO()):  # pymavlink tells of damage on stdout
             read = _read(reader, path)

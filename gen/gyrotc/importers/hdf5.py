@@ -24,7 +24,7 @@ def open_hdf5(path: Path) -> LoggerFile:
     Raises:
         InputError: h5py is not installed, the file is damaged, or holds nothing that can be read.
     """
-    h5py = library("h5py", "hdf5", "an HDF5 or MATLAB 7.3 file")
+    h5py = library(path, "h5py", "hdf5", "an HDF5 or MATLAB 7.3 file")
     try:
         file = h5py.File(path, "r")
     except OSError as error:

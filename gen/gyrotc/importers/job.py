@@ -172,6 +172,7 @@ def _run(
         "file": target.name,
         "started": started,
         "since_power_on": file.since_power_on,
+        "pulses": layout.pulses,
         "rows": rows.count,
         "left_out": dict(rows.left_out)
         | {k: v for t in file.tables for k, v in getattr(t, "remarks", {}).items() if v},

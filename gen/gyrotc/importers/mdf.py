@@ -18,7 +18,7 @@ def open_mdf(path: Path) -> LoggerFile:
     Raises:
         InputError: asammdf is not installed, or the file is damaged.
     """
-    asammdf = library("asammdf", "mdf", "a measurement file of ASAM")
+    asammdf = library(path, "asammdf", "mdf", "a measurement file of ASAM")
     try:
         file = asammdf.MDF(path)
         tables = tuple(t for k in range(len(file.groups)) if (t := _table(file, k)) is not None)

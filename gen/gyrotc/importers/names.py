@@ -63,6 +63,7 @@ _ENDINGS: dict[str, tuple[str, Kind]] = {
 _TIME = {
     "time", "timestamp", "timestamps", "t", "zeit", "zeitstempel", "clock", "elapsed", "stamp", "date", "datetime",
     "datum", "uptime", "epoch", "utc", "millis", "micros", "sec", "seconds", "tick", "ticks", "uhrzeit", "temps", "tow",
+    "ts",
 }  # fmt: skip
 _TEMPERATURE = {
     "temperature", "temp", "temperatur", "temps", "tmp", "therm", "thermistor", "thermometer", "ntc", "pt100", "pt1000",

@@ -7,6 +7,7 @@ the refusal names the choices and the option that makes one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from ..dataset.units import NATIVE, UnitError, channel_unit, conversion
 from ..errors import InputError
@@ -39,6 +40,7 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
     """
     tables = _tables(file, chosen)
     values = _values(file, tables, chosen)
+    _check_weight(file, values[0], chosen)
     main = values[0][1]
     time, rate_hz, why_rate = _time(file, main, chosen)
     temperature = _temperature(file, tables, main, chosen)
@@ -101,14 +103,13 @@ def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tupl
         if len({id(table) for _, table, _, _ in found}) > 1:
             raise InputError(file.path.name, "rates of several tables", "rates of one table under [columns]")
         return found
-    likely = [(table, *_rates(table, file.path.stem)) for table in tables]
+    likely = [(table, *_rates(table, file.path)) for table in tables]
     likely = [one for one in likely if one[1]]
     best = max((one[2] for one in likely), default=0)
     top = [one for one in likely if one[2] == best]
     if not top:
-        raise InputError(
-            file.path.name, f"no column that a rate is told from among {_listed(file)}", _name_it("rate")
-        )
+        unseen = f"no column that a rate is told from among {_listed(file)}"
+        raise InputError(file.path.name, unseen, _increments(file) or _name_it("rate"))
     if len(top) > 1:
         names = ", ".join(repr(table.name) for table, _, _ in top)
         raise InputError(
@@ -118,7 +119,18 @@ def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tupl
     return [(role, table, column, why) for role, column, why in columns]
 
 
-def _rates(table: Table, file: str) -> tuple[list[tuple[str, Column, str]], int]:
+def _check_weight(file: LoggerFile, value: tuple[str, Table, Column, str], chosen: Map) -> None:
+    """Pulses have an angle.
+
+    Raises:
+        InputError: It stands nowhere.
+    """
+    if value[0] == "pulses" and chosen.pulse_weight_arcsec is None:
+        found = f"column {value[2].name} counts pulses, and the angle of one stands nowhere"
+        raise InputError(file.path.name, found, "--pulse-weight-arcsec W")
+
+
+def _rates(table: Table, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
     """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
     pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
     if pulses:
@@ -129,7 +141,7 @@ def _rates(table: Table, file: str) -> tuple[list[tuple[str, Column, str]], int]
         rates = [
             (c, m)
             for c, m in found
-            if c.name in ("x", "y", "z") and "gyro" in words((table.name or file).replace("_", " "))
+            if c.name in ("x", "y", "z") and "gyro" in words((table.name or file.stem).replace("_", " "))
         ]
     if not rates:
         return [], 0
@@ -145,7 +157,7 @@ def _rates(table: Table, file: str) -> tuple[list[tuple[str, Column, str]], int]
     top = [(column, one) for column, one in rates if one.score == best]
     if len(top) > 1:
         raise InputError(
-            f"table {table.name}" if table.name else "columns",
+            f"{file.name}, table {table.name}" if table.name else file.name,
             f"{', '.join(repr(c.name) for c, _ in top)} could be the rate",
             f'--column rate="{top[0][0].name}" (or another of them)',
         )
@@ -264,6 +276,20 @@ def _channel_name(name: str, unit: str | None, native: str) -> str:
             return plain
         return f"{plain}_{endings[native]}"
     return plain
+
+
+def _increments(file: LoggerFile) -> str:
+    """What to do with a file of increments of angle; empty where there are none."""
+    for table in file.tables:
+        for column in table.columns:
+            name, unit, _ = split_unit(column.name)
+            if {"delta", "increment", "incr", "dtheta"} & set(words(name)):
+                angle = column.unit or unit or "rad"
+                return (
+                    f'the increments as rates: --column rate="{column.name}" --rate-unit "{angle} / (0.01 s)" with the '
+                    "row period in place of 0.01 s"
+                )
+    return ""
 
 
 def _listed(file: LoggerFile) -> str:

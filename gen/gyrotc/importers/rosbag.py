@@ -46,7 +46,7 @@ def open_rosbag(path: Path) -> LoggerFile:
     Raises:
         InputError: rosbags is not installed, or the bag is damaged.
     """
-    highlevel = library("rosbags.highlevel", "ros", "a ROS bag")
+    highlevel = library(path, "rosbags.highlevel", "ros", "a ROS bag")
     where = (
         path
         if path.is_dir() or path.suffix == ".bag"

@@ -122,8 +122,8 @@ class LoggerFile:
     since_power_on: bool = False
 
 
-def library(module: str, extra: str, what: str) -> ModuleType:
-    """A library that only one format needs.
+def library(path: Path, module: str, extra: str, what: str) -> ModuleType:
+    """A library that only one format, that of the file at `path`, needs.
 
     Raises:
         InputError: It is not installed; the message says what to install.
@@ -133,7 +133,7 @@ def library(module: str, extra: str, what: str) -> ModuleType:
     except ImportError as error:
         package = module.split(".", maxsplit=1)[0]
         found = f"{what} is read by {package}, which is not installed"
-        raise InputError(extra, found, f"pip install 'gyrotc[{extra}]'") from error
+        raise InputError(path.name, found, f"pip install 'gyrotc[{extra}]'") from error
 
 
 def numbers(values: Any) -> Array:

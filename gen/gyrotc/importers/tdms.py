@@ -23,7 +23,7 @@ def open_tdms(path: Path) -> LoggerFile:
     Raises:
         InputError: nptdms is not installed, or the file is damaged.
     """
-    nptdms = library("nptdms", "tdms", "a TDMS file")
+    nptdms = library(path, "nptdms", "tdms", "a TDMS file")
     try:
         file = nptdms.TdmsFile.open(path)
         tables = tuple(table for group in file.groups() for table in _tables(group))

@@ -37,7 +37,7 @@ def open_ulog(path: Path) -> LoggerFile:
     Raises:
         InputError: pyulog is not installed, or the file is damaged.
     """
-    pyulog = library("pyulog", "ulog", "a PX4 log")
+    pyulog = library(path, "pyulog", "ulog", "a PX4 log")
     try:
         log = pyulog.ULog(str(path), [name for name in _UNITS if name not in _NOT_RAW], True)
     except Exception as error:  # whatever a damaged file makes of the parser

@@ -57,7 +57,7 @@ def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         left = "".join(f"; {count} left out: {reason}" for reason, count in entry["left_out"].items())
         yield (
             f"{out / entry['file']}: {entry['rows']} rows of about {period:.4g} s, {low:.4g} ... {high:.4g} C, "
-            f"mean {means} deg/h{left}"
+            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}{left}"
         )
         for text in entry["trusted"]:
             yield f"  units are trusted: {text}"

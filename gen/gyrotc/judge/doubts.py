@@ -127,7 +127,7 @@ def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[Doub
     if f.outlier is not None and not marks:
         marks = [_mark_at(run.file, rows, f.outlier.time_s)]
     if texts:
-        yield Doubt("rate_outliers", where, "; ".join(texts), tuple(marks))
+        yield Doubt("rate_outliers", where, "; ".join(text.rstrip(".") for text in texts), tuple(marks))
 
 
 def _mark(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
