@@ -222,3 +222,33 @@ def test_rows_and_what_to_do_next_stand_in_the_json(tmp_path: Path) -> None:
     [doubt] = json.loads(json.dumps(check(tmp_path / "R").result().content()))["doubts"]
     assert doubt["rows"] == [{"file": "a.csv", "rows": [50, 51], "span_s": [490.0, 700.0]}]
     assert "Look at the logger" in doubt["next"]
+
+
+@pytest.mark.parametrize("reversed_unit", [None, 3])
+def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
+    from gyrotc.jobs.fleet.turned import turned
+
+    g = np.random.default_rng(1)
+    t = np.arange(-60.0, 126.0, 5.0)
+    entries = []
+    for k in range(10):
+        curve = (
+            g.normal(0.0, 5.0) + (1.0 + 0.3 * g.normal()) * 0.02 * (t - 20.0) + g.normal(0.0, 0.05, len(t))
+        )
+        curve = -curve if k == reversed_unit else curve
+        inside = (t >= -40.0) & (t <= 60.0)
+        held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
+        entries.append({"name": f"u{k}", "axis": None, "findings": [], "curve": held})
+    assert turned(entries) == ([] if reversed_unit is None else ["u3"])
+
+
+def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
+    from gyrotc.jobs.fleet.turned import turned
+
+    g = np.random.default_rng(2)
+    for _ in range(200):
+        entries = [
+            {"name": f"u{k}", "axis": None, "findings": [], "curve": g.normal(0.0, 1.0, 38).cumsum().tolist()}
+            for k in range(12)
+        ]
+        assert turned(entries) == []

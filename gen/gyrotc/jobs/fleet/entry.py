@@ -14,7 +14,7 @@ from ...outputs import faults, json_text, write_atomically
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
 ENTRY = "entry.json"
-INTERNAL = ("key", "kept", "sketch")  # of no use in a summary
+INTERNAL = ("key", "kept", "sketch", "curve")  # of no use in a summary
 Entry = dict[str, Any]
 _Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 _Sketch = Annotated[str, Field(pattern="^([0-9a-f]{16})*$")]  # hashes of rows (`dataset.shared`)
@@ -46,6 +46,7 @@ class _Stored(BaseModel):
     findings: list[str]
     model_hash: str
     sketch: _Sketch
+    curve: list[float | None]
     key: _Hash
 
 

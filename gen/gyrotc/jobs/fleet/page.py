@@ -23,6 +23,7 @@ from .copies import copies, with_copies
 from .entry import INTERNAL
 from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
+from .turned import with_turned
 
 __all__ = ["summary_of", "write_summary"]
 
@@ -36,7 +37,7 @@ def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The JSON object of `fleet.json`."""
     counts = Counter(entry["status"] for entry in entries)
     copied = copies(entries)
-    entries = with_copies(entries, copied)
+    entries = with_turned(with_copies(entries, copied))
     figured = [entry for entry in entries if "model_hash" in entry]
     return {
         "schema": "gyrotc.fleet/1",

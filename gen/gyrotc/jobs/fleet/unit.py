@@ -16,6 +16,7 @@ from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
+from .turned import curve_of
 
 __all__ = ["Task", "do_unit", "done_before", "failed"]
 
@@ -102,7 +103,10 @@ def _built(task: Task) -> Entry:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
         failed_checks = "; ".join(built.failures)
         status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
-        figures = {"serial": dataset.serial} | _figures(built.model, built.evaluation, built.verification)
+        figures: Entry = {"serial": dataset.serial} | _figures(
+            built.model, built.evaluation, built.verification
+        )
+        figures["curve"] = curve_of(built.model)
         figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
         entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
     return entry | {"aside": aside} if aside else entry
