@@ -30,7 +30,8 @@ _HOUR_S = 3600.0
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """What is doubtful about the times of a run; `evidence` has the file, the rows as marks, and figures."""
     at = np.flatnonzero(run.in_span(rows.time_s))
-    time, temperature = rows.time_s[at], rows.temperature_c[at]
+    whole = len(at) == len(rows)
+    time, temperature = (v if whole else v[at] for v in (rows.time_s, rows.temperature_c))
     step = np.diff(time)
     together = np.diff(at) == 1  # what was excluded is no gap
     if len(step) < _AROUND_ROWS:
