@@ -41,9 +41,9 @@ def diagnosed(data: Path, axis: str, out: Path, centers: int | None = None) -> R
 
 
 def after(result: Result) -> float:
-    """RMS on the unseen branch with everything that was named, shipped or not; without causes the plain map's."""
-    gains = [c["gain"] for c in result["causes"] if c["gain"]]
-    return float(gains[-1]["exam_rms_after_dph"] if gains else result["baseline"]["exam_rms_dph"])
+    """RMS on the unseen branch with the best states, named and shipped or not; without any the plain map's."""
+    gain = result["single_cycle"]["gain"]
+    return float(gain["exam_rms_after_dph"] if gain else result["baseline"]["exam_rms_dph"])
 
 
 def cubic(data: Path, axis: str) -> float:
@@ -51,7 +51,7 @@ def cubic(data: Path, axis: str) -> float:
     runs = load(data, axis=axis).runs
     front = front_end([r for r in runs if r.role == "train"], AVERAGE_S)
     train, exam = (
-        samples_of(front.blocks(next(r for r in runs if r.role == role)), front.block_s, 0)
+        samples_of(front.blocks(next(r for r in runs if r.role == role)), front, 0)
         for role in ("train", "exam")
     )
 
@@ -73,8 +73,8 @@ def gains(results: dict[str, list[Result]], cubics: dict[str, float]) -> Iterato
     for axis, of_sizes in results.items():
         first = of_sizes[0]
         spread = [after(r) for r in of_sizes]
-        found = [c["gain"] for c in first["causes"] if c["gain"]]
-        removed = found[-1]["rms_removed_dph"] if found else {"low": 0.0, "high": 0.0}
+        gain = first["single_cycle"]["gain"]
+        removed = gain["rms_removed_dph"] if gain else {"low": 0.0, "high": 0.0}
         cells = [
             axis, first["verdict"], f"{cubics[axis]:.0f}", f"{first['baseline']['exam_rms_dph']:.0f}",
             f"{spread[0]:.0f}", f"{removed['low']:.0f} … {removed['high']:.0f}", f"{np.median(spread):.0f}",

@@ -13,6 +13,7 @@ from gyrotc.diagnose.screen.blocks import Records
 from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.terms.operators import first_order
 from gyrotc.train.fitting import FitOptions
+from single_cycles import NOISE, clean_cycle
 
 SEED = 20260321
 ROW_S = 5.0
@@ -96,3 +97,19 @@ def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> No
     at = np.array([20.0, 20.0])
     cold, hot = found.model.map_dph(at, np.array([low, high]))
     assert cold == pytest.approx(hot, rel=1e-5), "no dT/dt in the map"
+
+
+def test_a_gyro_with_a_static_rate_gets_no_memory_from_one_cycle(tmp_path: Path) -> None:
+    """A slice of `make cycles`: 100 clean cycles at four levels of the noise, of which at most 2 may be named."""
+    for seed in range(8):
+        found = cycle_of(clean_cycle(tmp_path, seed, NOISE[seed % len(NOISE)]))
+        assert found.causes == (), (seed, found.tried[0].kinds, found.lead)
+
+
+def test_a_ramp_that_never_turns_cannot_test_memory(tmp_path: Path) -> None:
+    time, temperature = cycle(1)
+    found = diagnose(load(recorded(tmp_path, temperature, two_states(time, temperature), 1400.0)))
+    assert found.result["verdict"] == "not_testable" and found.result["causes"] == []
+    assert found.result["single_cycle"]["turns"] == 0 and "never turns" in found.result["text"]
+    untestable = {c["id"] for c in found.result["considered"] if "not_testable" in c}
+    assert {"thermal_gradient", "hysteresis"} <= untestable

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.dataset import Dataset, load
-from gyrotc.diagnose.extend.extension import _shipped, extend
+from gyrotc.diagnose.extend.extension import extend
 from gyrotc.diagnose.extend.gain import gain_of
 from gyrotc.diagnose.extend.refit import Effect, samples
 from gyrotc.diagnose.extend.refitting import Refitting, folds_of
+from gyrotc.diagnose.extend.shipping import shipping
 from gyrotc.diagnose.result import diagnose
 from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.metrics import Averages
 from gyrotc.terms.operators import first_order
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
@@ -85,21 +85,19 @@ def test_an_exam_run_measures_what_the_true_effect_gains(case: Case) -> None:
 LEVEL = 1e-3 / np.sqrt(10.0)  # of 100-s means of the noise
 
 
-def _residual(scale: float) -> list[Averages]:
-    rng = np.random.default_rng(SEED)
-    values = scale * rng.standard_normal(600)
-    time = 100.0 * np.arange(values.size)
-    return [Averages(time_s=time, before_dph=values, after_dph=values, temperature_c=np.zeros(values.size))]
-
-
-def test_only_what_gains_and_a_table_can_hold_is_shipped(case: Case) -> None:
-    good, bad = (gain_of(_residual(2.0), _residual(s), 1.0, 100.0) for s in (1.0, 2.2))
-    chain = [_residual(2.0), _residual(1.0)]
-    shipped, total = _shipped(case.refitting, [GRADIENT], [good], chain, 1.0)
-    assert shipped == [GRADIENT] and total is not None and total.positive
-    assert _shipped(case.refitting, [GRADIENT], [bad], chain, 1.0) == ([], None)
+def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
+    """An effect that is there is shipped, a wrong one and one that no table holds are not; the exam is not asked."""
+    blind = Refitting(case.dataset, case.refitting.records, OPTIONS, single_cycle=False)
+    blind.exam, blind.exam_runs = [], []
+    found = shipping(blind, [GRADIENT])
+    assert found.shipped == [GRADIENT]
+    assert found.before_dph is not None and found.after_dph is not None
+    assert found.after_dph < 0.5 * found.before_dph
+    wrong = replace(GRADIENT, values={"tau_s": TAU_S, "amplitude_dph_per_c": -SIZE_DPH_PER_C})
+    assert shipping(blind, [wrong]).shipped == []
+    assert shipping(blind, [GRADIENT, wrong]).shipped == [GRADIENT], "what makes it worse is left"
     offset = replace(GRADIENT, id="turn_on_offset", values={"sigma_dph": 1e-3})
-    assert _shipped(case.refitting, [offset], [good], chain, 1.0) == ([], None), "no table holds it"
+    assert shipping(blind, [offset]).shipped == [], "no table holds it"
 
 
 def test_without_causes_there_is_no_extension(case: Case) -> None:

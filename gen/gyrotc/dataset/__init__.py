@@ -8,7 +8,19 @@ from .earth import earth_rate_warning
 from .facts import Jump, Outlier, RunFacts, facts_of
 from .load import axes_of, load, survey
 from .reading import open_file
-from .records import Applied, Curve, Dataset, DeclaredNoise, EarthRate, Exclusion, Mark, Rows, Run, SharedRows
+from .records import (
+    Applied,
+    Curve,
+    Dataset,
+    DeclaredNoise,
+    EarthRate,
+    Exclusion,
+    Mark,
+    Rows,
+    Run,
+    SharedRows,
+    joined_runs,
+)
 
 __all__ = [
     "Applied",
@@ -27,6 +39,7 @@ __all__ = [
     "axes_of",
     "earth_rate_warning",
     "facts_of",
+    "joined_runs",
     "load",
     "open_file",
     "survey",

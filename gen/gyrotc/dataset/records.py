@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -25,6 +25,7 @@ __all__ = [
     "Run",
     "SharedRows",
     "inside",
+    "joined_runs",
 ]
 
 Floats = NDArray[np.float64]
@@ -141,6 +142,26 @@ class Run:
     def in_span(self, time_s: Floats) -> NDArray[np.bool_]:
         """Which times (s on the file's clock) belong to the run: from_s <= t < to_s and not excluded."""
         return inside(time_s, self.from_s, self.to_s, self.exclude)
+
+
+def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """Runs of one role with spans of one file that touch as one, in order of file and time.
+
+    So neither the order of runs in a description nor where a recording is cut changes what is learnt.
+    """
+    found: list[Run] = []
+    for run in sorted(runs, key=lambda run: (run.file, -np.inf if run.from_s is None else run.from_s)):
+        last = found[-1] if found else None
+        if (
+            last is not None
+            and (last.file, last.role) == (run.file, run.role)
+            and last.to_s is not None
+            and last.to_s == run.from_s
+        ):
+            found[-1] = replace(last, to_s=run.to_s, exclude=(*last.exclude, *run.exclude))
+        else:
+            found.append(run)
+    return tuple(found)
 
 
 def inside(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .. import __version__
-from ..dataset import Dataset
+from ..dataset import Dataset, joined_runs
 from ..metrics import LEAST_SPAN_C
 from ..model import Model
 from ..results.training import Training
@@ -17,6 +17,7 @@ from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
 from ..train.spans import training_spans
 from .advice import VERDICTS, next_steps
+from .attribute.cycle_fits import memories
 from .attribute.intervals import Interval
 from .attribute.refine import Refined
 from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
@@ -80,6 +81,7 @@ def diagnose(
     say = progress or (lambda _: None)
     chosen = options or _options_of(model)
     say("reading")
+    dataset = replace(dataset, runs=joined_runs(dataset.runs))
     records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
     if float(np.ptp(temperature)) < LEAST_SPAN_C:
@@ -96,7 +98,8 @@ def diagnose(
         causes = cycle.causes
     else:
         causes = analysis.attribution.causes if holds(analysis.attribution) else ()
-    extension = extend(dataset, records, causes, chosen, say, single_cycle=cycle is not None)
+    states = causes if cycle is None else cycle.states
+    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
     result = _result(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
@@ -139,6 +142,7 @@ def _not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> dict[
         "missing": [text],
         "measured_on": None,
         "single_cycle": None,
+        "shipping": None,
         "unexplained": None,
         "text": text,
         "meaning": VERDICTS["not_testable"],
@@ -158,34 +162,52 @@ def _result(
     verdict = verdict_of(attribution, analysis.noise)
     if cycle is not None and causes:
         verdict = "ambiguous" if cycle.rivals else "partial"
+    elif cycle is not None and cycle.not_testable:
+        verdict = "not_testable"
     listed = [_cause(analysis, extension, k) for k in range(len(causes))]
     listed += [_noise_cause(n) for n in analysis.noise]
-    missing = [f"{CATALOGUE[i].words.name}: {why}" for i, why in analysis.search.bank.untestable.items()]
+    untestable = _untestable(analysis, cycle)
+    missing = [f"{CATALOGUE[i].words.name}: {why}" for i, why in untestable.items()]
     result = _head(dataset, verdict, options) | {
         "noise_floor_dph": extension.floor,
         "discrepancies": _discrepancies(analysis),
         "causes": listed,
         "baseline": {"exam_rms_dph": extension.baseline_rms, "centers": extension.baseline_centers},
         "extended": _extended(extension),
-        "considered": _considered(analysis),
+        "considered": _considered(analysis, untestable),
         "missing": missing,
         "estimated_noise": _estimated_noise(analysis),
         "measured_on": extension.measured_on,
-        "single_cycle": None if cycle is None else _tried(cycle),
+        "single_cycle": None if cycle is None else _tried(cycle, extension),
+        "shipping": extension.crossed.content(),
         "unexplained": _unexplained(analysis) if verdict in ("unexplained", "partial") else None,
     }
     result["text"] = _sentence(result)
     result["meaning"] = VERDICTS[verdict]
-    untestable = list(analysis.search.bank.untestable)
     shipped = result["extended"] is not None
-    result["next"] = next_steps(verdict, result["causes"], untestable, shipped=shipped)
+    result["next"] = next_steps(verdict, result["causes"], list(untestable), shipped=shipped)
     return result
 
 
-def _tried(cycle: Cycle) -> dict[str, Any]:
-    """Every memory that was tried beside a map of T, best first."""
+def _untestable(analysis: Analysis, cycle: Cycle | None) -> dict[str, str]:
+    """Causes that these recordings cannot test, and why."""
+    found = dict(analysis.search.bank.untestable)
+    if cycle is not None and cycle.not_testable:
+        found |= dict.fromkeys(memories(), cycle.not_testable)
+    return found
+
+
+def _tried(cycle: Cycle, extension: Extension) -> dict[str, Any]:
+    """Every memory and every static dT/dt that was tried beside a map of T, best first."""
     return {
         "map_rms_dph": cycle.rms_dph,
+        "turns": cycle.turns,
+        "not_testable": cycle.not_testable or None,
+        "gain": _gain(extension.steps[-1]) if extension.steps else None,
+        "static": [
+            {"powers": [list(p) for p in s.powers], "rms_dph": s.rms_dph, "criterion": s.criterion}
+            for s in cycle.static
+        ],
         "tried": [
             {
                 "states": [
@@ -287,7 +309,7 @@ def _estimated_noise(analysis: Analysis) -> dict[str, float]:
     return {name: float(view.scale * value) for name, value in levels.items() if value > 0.0}
 
 
-def _considered(analysis: Analysis) -> list[dict[str, Any]]:
+def _considered(analysis: Analysis, untestable: Mapping[str, str]) -> list[dict[str, Any]]:
     """Every cause of the catalogue with its adjusted p-value and its detection limit."""
     best: dict[str, tuple[float, float | None]] = {}
     for found in analysis.attribution.first:
@@ -310,7 +332,8 @@ def _considered(analysis: Analysis) -> list[dict[str, Any]]:
         if channel:
             entry["channel"] = channel
         out.append(entry)
-    for id, why in analysis.search.bank.untestable.items():
+    out = [entry for entry in out if entry["id"] not in untestable]
+    for id, why in untestable.items():
         out.append(
             {
                 "id": id,
@@ -368,7 +391,7 @@ def _sentence(result: dict[str, Any]) -> str:
         "partial": f"{names}, and structure remains that no cause explains.",
         "noise_differs": f"{noise}.",
         "unexplained": "There is structure that no cause of the catalogue explains.",
-        "not_testable": "The recordings cannot decide.",
+        "not_testable": _undecided(result),
     }[result["verdict"]]
     extended = result["extended"]
     if extended is None:
@@ -378,6 +401,12 @@ def _sentence(result: dict[str, Any]) -> str:
         return str(text)
     amount = "all" if share >= 0.995 else f"{share:.0%}"
     return f"{text} On unseen runs the extension removes {amount} of the removable error."
+
+
+def _undecided(result: dict[str, Any]) -> str:
+    cycle = result["single_cycle"]
+    why = f" about memory of the temperature: {cycle['not_testable']}" if cycle else ""
+    return f"The recordings cannot decide{why}."
 
 
 def _extended_model(

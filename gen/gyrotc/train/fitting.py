@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..dataset import Dataset, Run, earth_rate_warning
+from ..dataset import Dataset, Run, earth_rate_warning, joined_runs
 from ..errors import InputError
 from ..frontend import Blocks, run_blocks
 from ..metrics import Averages, pooled
@@ -46,6 +46,7 @@ __all__ = [
     "front_end",
     "map_method",
     "model_of",
+    "power_ons",
     "samples_of",
     "training_of",
     "units_of",
@@ -93,6 +94,7 @@ class FrontEnd:
     max_rate_c_per_min: float
     hold_blocks: int
     stuck_s: float = 0.0
+    lead_blocks: int = 0
 
     def blocks(self, run: Run) -> Blocks:
         return run_blocks(
@@ -105,6 +107,10 @@ class FrontEnd:
             stuck_s=self.stuck_s,
             hold_blocks=self.hold_blocks,
         )
+
+    def led(self, temperature_c: NDArray[np.float32], slope_c: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What map and terms see: the block before's mean, C, led by its slope, C a block, to when it is in force."""
+        return np.asarray(temperature_c + np.float32(self.lead_blocks) * slope_c, dtype=np.float32)
 
 
 def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
@@ -120,12 +126,15 @@ def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
     )
 
 
-def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
-    """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
-    used = blocks.used
+def samples_of(blocks: Blocks, front: FrontEnd, run: int) -> TrainingData:
+    """Training samples of one run: what the map sees during each valid block, and the block's mean rate.
+
+    The correction in force during a block was made of the block before it.
+    """
+    used, block_s = blocks.used, front.block_s
     n = int(used.sum())
     return TrainingData(
-        temperature_c=blocks.temperature_c[used].astype(np.float64),
+        temperature_c=front.led(blocks.temperature_c[used], blocks.slope_c[used]).astype(np.float64),
         slope_c_per_min=blocks.slope_c[used].astype(np.float64) * (60.0 / block_s),
         bias_dph=blocks.rate_dph[used],
         weight=blocks.rows[used].astype(np.float64),
@@ -153,15 +162,14 @@ def fit_dataset(
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
-    stretches = _stretches(runs)
+    stretches = joined_runs(runs)
     parts = []
     left_out_rows: list[LeftOutRows] = []
-    for k, stretch in enumerate(stretches):
-        for run in stretch:
-            say(f"reading {run.file}")
-            blocks = front.blocks(run)
-            parts.append(samples_of(blocks, front.block_s, k))
-            left_out_rows += stretches_left_out(run, blocks.left_out_s)
+    for k, run in enumerate(stretches):
+        say(f"reading {run.file}")
+        blocks = front.blocks(run)
+        parts.append(samples_of(blocks, front, k))
+        left_out_rows += stretches_left_out(run, blocks.left_out_s)
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -170,9 +178,8 @@ def fit_dataset(
             f"at least {_MIN_SAMPLES}",
         )
     say("training")
-    firsts = [stretch[0] for stretch in stretches]
-    fitted = _fit(data, options, power_on=_power_ons(firsts))
-    spans = training_spans(firsts, data)
+    fitted = _fit(data, options, power_on=power_ons(stretches))
+    spans = training_spans(stretches, data)
     left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
     model = model_of(dataset, runs, data, fitted, front, options)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
@@ -184,22 +191,7 @@ def map_method(method: str) -> str:
     return "mrbf" if method in (AUTO, *SIMPLE, "mrbf_t") else method
 
 
-def _stretches(runs: Sequence[Run]) -> list[list[Run]]:
-    """Training runs as stretches of history: spans of one file that touch are one. In order of file and time.
-
-    So neither the order of runs in a description nor where a recording is cut changes a model.
-    """
-    found: list[list[Run]] = []
-    for run in sorted(runs, key=lambda run: (run.file, -np.inf if run.from_s is None else run.from_s)):
-        last = found[-1][-1] if found else None
-        if last is not None and last.file == run.file and last.to_s is not None and last.to_s == run.from_s:
-            found[-1].append(run)
-        else:
-            found.append([run])
-    return found
-
-
-def _power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
+def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
     """Number of the power-on of each stretch: a file is one recording, without a power-on within it."""
     files = sorted({run.file for run in runs})
     return np.array([files.index(run.file) for run in runs], dtype=np.int64)

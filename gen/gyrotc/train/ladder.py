@@ -114,6 +114,24 @@ class Ladder:
                 return False
         return True
 
+    def beaten_by(self, name: str, other: Ladder, rung: str) -> bool:
+        """Whether a rung of another ladder, over the same stretches, is what this one would choose above `name`.
+
+        It must be better than `name` by more than a standard error of the paired difference, in score and in mean
+        square, and better than this ladder's constant as `beats_constant` asks.
+        """
+        own, others = RUNGS.index(name), RUNGS.index(rung)
+        if len(self.folds) < 2 or not np.all(np.isfinite(other.score[:, others])):
+            return False
+        score, rms = self.score.copy(), self.rms_dph.copy()
+        top = RUNGS.index("mrbf")
+        if own == top:
+            own = RUNGS.index("mrbf_t")
+            score[:, own], rms[:, own] = self.score[:, top], self.rms_dph[:, top]
+        score[:, top], rms[:, top] = other.score[:, others], other.rms_dph[:, others]
+        both = replace(self, score=score, rms_dph=rms)
+        return both._clearly_worse(own, top) and both.beats_constant("mrbf")
+
     def rows(self, chosen: str) -> list[dict[str, Any]]:
         """`ladder` of `training.json`: RMS over the stretches, all counting alike, with its standard error."""
         return [self._row(k, name, chosen) for k, name in enumerate(RUNGS)]
@@ -167,6 +185,7 @@ def climb(
     process: Process | None,
     power_on: NDArray[np.int64] | None,
     average_s: float,
+    folds: Sequence[Fold] | None = None,
 ) -> Ladder:
     """Fits every rung without every stretch of history.
 
@@ -176,10 +195,11 @@ def climb(
         process: The evidence process of all samples; None: it could not be fitted, and no map is tried.
         power_on: Number of the power-on of each run, by the run's index; None: each run is one.
         average_s: Averaging of what is judged, s.
+        folds: Stretches that another ladder of the same times has left out; None: those of these samples.
     """
     means, kept = _means(samples, process)
     groups = means.run if power_on is None else power_on[means.run]
-    folds = history_folds(means, groups)
+    folds = history_folds(means, groups) if folds is None else folds
     judged = average(means, average_s)
     noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
     noise = max(

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..dataset import Run
 from ..results.training import SpanLeftOut
 
-__all__ = ["Fold", "Span", "history_folds", "training_spans"]
+__all__ = ["Fold", "Span", "history_folds", "training_spans", "turning_points"]
 
 Floats = NDArray[np.float64]
 
@@ -192,7 +192,7 @@ def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
 def _cut(index: int, file: str, time_s: Floats, temperature_c: Floats) -> list[Span]:
     step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     start, end = float(time_s[0]), float(time_s[-1]) + step
-    turns = _turning_points(time_s, temperature_c)
+    turns = turning_points(time_s, temperature_c)
     edges = _long_enough([start, *turns, end])
     kind: Literal["branch", "part"] = "branch"
     if len(edges) < 3:
@@ -201,8 +201,8 @@ def _cut(index: int, file: str, time_s: Floats, temperature_c: Floats) -> list[S
     return [Span(index, file, a, b, kind, min(_GUARD_S, 0.25 * (b - a))) for a, b in pairwise(edges)]
 
 
-def _turning_points(time_s: Floats, temperature_c: Floats) -> list[float]:
-    """Times at which the smoothed temperature turns by more than noise and control make it."""
+def turning_points(time_s: Floats, temperature_c: Floats) -> list[float]:
+    """Times at which the smoothed temperature turns by more than noise and control make it, s; arrays of shape (n,)."""
     cell = np.floor((time_s - time_s[0]) / _SMOOTHING_S).astype(np.int64)
     _, index = np.unique(cell, return_inverse=True)
     count = np.bincount(index)

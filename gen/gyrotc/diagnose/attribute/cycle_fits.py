@@ -1,15 +1,17 @@
-"""Least squares of a map of T alone and of states beside it: all combinations of one or two states at once."""
+"""Least squares of a map of T alone, and beside it of states, all combinations of one or two at once, or of dT/dt."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from ...terms.search import Reach, SingleCycle
 from ..orthonormal import orthonormal
-from ..screen.blocks import Records
+from ..screen.blocks import Records, centred_slope
 from ..signatures.candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
 from .pairs import APART
 
@@ -19,6 +21,19 @@ Array = NDArray[np.float64]
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
+_ROUNDS, _AROUND, _FINE = (
+    4,
+    1.5,
+    1e-4,
+)  # of a walk to the optimum: steps of the grid to either side, end in logarithms
+RATES: tuple[tuple[tuple[int, int], ...], ...] = (
+    ((0, 1),),
+    ((0, 1), (1, 1)),
+    ((0, 1), (1, 1), (2, 1)),
+    ((0, 1), (1, 1), (2, 1), (0, 2)),
+    ((0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (0, 3)),
+)
+"""Powers of (T, dT/dt) beside a map of T: g(T) dT/dt, and flows that saturate or have no sign (docs/simulation.md)."""
 
 
 def memories() -> dict[str, SingleCycle]:
@@ -96,6 +111,70 @@ class CycleFits:
 
     def left(self, members: tuple[Candidate, ...]) -> Array:
         """Residual of map and states."""
-        x = np.column_stack([self.columns[m.id][:, self.grid[m.id].index(m)] for m in members])
-        q = orthonormal(x)
+        return self._without(np.column_stack([self._column(m) for m in members]))
+
+    def without_rate(self, powers: tuple[tuple[int, int], ...]) -> Array:
+        """Residual of the map and of products of T and dT/dt."""
+        t, r = self._inputs
+        return self._without(self._less_map(np.column_stack([t**a * r**b for a, b in powers])))
+
+    @cached_property
+    def _inputs(self) -> tuple[Array, Array]:
+        """Block means of T and centred dT/dt, scaled to -1 ... 1."""
+        runs = self.records.runs
+        t = self.records.average([run.history.temperature_c for run in runs])
+        r = self.records.average([centred_slope(run.history) for run in runs])
+        return 2.0 * (t - t.min()) / float(np.ptp(t)) - 1.0, r / float(np.abs(r).max())
+
+    def _without(self, columns: Array) -> Array:
+        q = orthonormal(columns)
         return np.asarray(self.rest - q @ (q.T @ self.rest))
+
+    def _column(self, member: Candidate) -> Array:
+        rest = self._less_map(columns_of(self.records, member.id, member.values)[:, 0])
+        return np.asarray(rest / np.linalg.norm(rest))
+
+    def polished(self, members: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+        """The states moved off the grid to the optimum nearby, one after the other; two of a kind stay apart."""
+        best, least = members, float((self.left(members) ** 2).sum())
+        for k in [k for _ in range(_ROUNDS) for k in range(len(members))]:
+            moved, sum_of_squares = self._along(best, k)
+            if sum_of_squares < least:
+                best, least = moved, sum_of_squares
+        return best
+
+    def _along(self, members: tuple[Candidate, ...], k: int) -> tuple[tuple[Candidate, ...], float]:
+        """The best place of one state, the others held; of two of a kind the first moves both, their ratio held."""
+        grid = np.log([next(iter(c.values.values())) for c in self.grid[members[k].id]])
+        here = [float(np.log(next(iter(m.values.values())))) for m in members]
+        twins = len(members) == 2 and members[0].id == members[1].id
+        together = twins and k == 0
+        reach = _AROUND * float(grid[1] - grid[0])
+        low, high = max(here[k] - reach, grid[0]), min(here[k] + reach, grid[-1])
+        if together:
+            low, high = _shared(here, low, high, grid)
+        elif twins:
+            low = max(low, here[0] + APART)
+
+        def at(value: float) -> tuple[Candidate, ...]:
+            moved = [h + value - here[k] if together or j == k else h for j, h in enumerate(here)]
+            return tuple(
+                replace(m, values={next(iter(m.values)): float(np.exp(v))})
+                for m, v in zip(members, moved, strict=True)
+            )
+
+        if high - low <= _FINE:
+            return members, np.inf
+        found = minimize_scalar(
+            lambda v: float((self.left(at(v)) ** 2).sum()),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": _FINE},
+        )
+        return at(float(found.x)), float(found.fun)
+
+
+def _shared(here: list[float], low: float, high: float, grid: Array) -> tuple[float, float]:
+    """Limits of the first of two parameters that move together, so that both stay on the grid's range."""
+    gap = here[1] - here[0]
+    return max(low, float(grid[0]) - min(gap, 0.0)), min(high, float(grid[-1]) - max(gap, 0.0))

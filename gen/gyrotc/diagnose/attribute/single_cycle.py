@@ -4,6 +4,10 @@ Where every temperature is visited only two or three times, each time at another
 can imitate any memory in the runs that it is fitted to and fails on the next. So the map has no dT/dt here,
 and one or two states stand beside it, by an information criterion that counts independent blocks: first-order
 states, which every package has, unless plays are clearly better. What explains the recordings as well is told.
+
+A static dT/dt, f(T) + g(T) dT/dt and flows that saturate, is a rival like any other: memory is named only where it
+is clearly better than every one of them, and never where the temperature does not turn. States that are not named may
+still be a good correction: that is for the unseen stretches of history to say (`extend`).
 """
 
 from __future__ import annotations
@@ -17,20 +21,22 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ... import terms
+from ...train.spans import turning_points
 from ..quantiles import CHI2_95_ONE, NORMAL_95
-from ..screen.blocks import Records
+from ..screen.blocks import Record, Records
 from ..signatures.candidates import Candidate, columns_of
 from .attribution import Attribution
-from .cycle_fits import CycleFits, memories
+from .cycle_fits import RATES, CycleFits, memories
 from .intervals import Interval
 from .refine import Refined
 from .rivals import EQUIVALENT, Rival
 
-__all__ = ["Cycle", "cycle_of", "is_single_cycle"]
+__all__ = ["Cycle", "Static", "Tried", "cycle_of", "is_single_cycle"]
 
 Array = NDArray[np.float64]
 
 _FEW_PASSES = 3  # of any temperature, in all runs together
+_UNCORRELATED = 0.05  # about what chance makes of a few hundred blocks
 _PRICE = 2  # parameters of a state: time constant (or width) and amplitude
 
 
@@ -58,13 +64,30 @@ class Tried:
 
 
 @dataclass(frozen=True)
+class Static:
+    """A map of T with products of T and dT/dt beside it.
+
+    Attributes:
+        powers: Of T and dT/dt.
+        rms_dph: What it leaves.
+        criterion: As of `Tried`.
+    """
+
+    powers: tuple[tuple[int, int], ...]
+    rms_dph: float
+    criterion: float
+
+
+@dataclass(frozen=True)
 class Cycle:
     """What a cycle tells.
 
     Attributes:
         tried: Every kind of one and of two states at its best, best first.
-        chosen: The one that is named; None where none is better than the map alone.
-        causes: Its states.
+        static: Every static dependence on dT/dt, best first.
+        turns: How often the temperature turns.
+        chosen: The best states; None where none is better than the map alone, or the temperature never turns.
+        states: What they add.
         rivals: Causes that would explain the recordings as well.
         rms_dph: What the map of T alone leaves.
         p_value: Of the chosen states together.
@@ -73,17 +96,45 @@ class Cycle:
     """
 
     tried: tuple[Tried, ...]
+    static: tuple[Static, ...]
+    turns: int
     chosen: Tried | None
-    causes: tuple[Refined, ...]
+    states: tuple[Refined, ...]
     rivals: tuple[Rival, ...]
     rms_dph: float
     p_value: float
     residual: Array
     explained: Array
 
+    @property
+    def causes(self) -> tuple[Refined, ...]:
+        """The states, where they are named: clearly better than the map of T and than any static dT/dt."""
+        return self.states if self.chosen is not None and self.lead >= EQUIVALENT else ()
+
+    @property
+    def lead(self) -> float:
+        """By how much the criterion of the chosen states is better than that of the best without memory."""
+        assert self.chosen is not None
+        return min(0.0, self.static[0].criterion) - self.chosen.criterion
+
+    @property
+    def not_testable(self) -> str:
+        """Why memory can be neither named nor ruled out here; empty where it can."""
+        if self.turns == 0:
+            return (
+                "the temperature never turns, so that a memory of it cannot be told from a map of T: "
+                "record the way back, too"
+            )
+        if self.chosen is None or self.causes:
+            return ""
+        return (
+            f"a static dependence on dT/dt explains this cycle as well (memory leads by {self.lead:.1f} in twice the "
+            f"log-likelihood, {EQUIVALENT:g} are needed): record the same cycle at another rate"
+        )
+
     def attribution(self, before: Attribution) -> Attribution:
         """The attribution with this cycle's causes in place of those of the search."""
-        if self.chosen is None:
+        if self.chosen is None or not self.causes:
             return replace(before, causes=(), p_values=(), rivals=())
         share = 1.0 - (self.chosen.rms_dph / self.rms_dph) ** 2
         count = len(self.causes)
@@ -105,26 +156,40 @@ def is_single_cycle(records: Records) -> bool:
 
 
 def cycle_of(records: Records) -> Cycle:
-    """Looks for one or two states in a single cycle."""
+    """Looks for one or two states in a single cycle, and for a static dT/dt in their place."""
     fits = CycleFits(records)
     states = memories()
     kinds = [(k,) for k in states] + list(itertools.combinations_with_replacement(states, 2))
-    best = {k: _members(fits, k) for k in kinds}
-    least = min((fits.left(m) for m in best.values()), key=lambda e: float(e @ e))
-    effective = _effective_size(records, least)
-    tried = tuple(sorted((_tried(fits, m, effective) for m in best.values()), key=lambda t: t.criterion))
+    best = [fits.polished(_members(fits, k)) for k in kinds]
+    left = [fits.left(members) for members in best] + [fits.without_rate(powers) for powers in RATES]
+    effective = _effective_size(records, min(left, key=lambda e: float(e @ e)))
+    tried = tuple(sorted((_tried(fits, m, effective) for m in best), key=lambda t: t.criterion))
+    static = tuple(sorted((_static(fits, p, effective) for p in RATES), key=lambda t: t.criterion))
+    turns = sum(len(_turns(run)) for run in records.runs)
     rms = float(np.sqrt(np.mean(fits.rest**2)))
-    if tried[0].criterion >= 0.0:
-        return Cycle(tried, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
+    if tried[0].criterion >= 0.0 or turns == 0:
+        return Cycle(tried, static, turns, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
     near = [t for t in tried if t.criterion - tried[0].criterion <= EQUIVALENT]
     chosen = next((t for t in near if not _rare(t)), tried[0])
     others = [t for t in near if t is not chosen and _rare(t) and not _rare(chosen)]
     rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
     p_value = max(float(chi2.sf(ratio, _PRICE * len(chosen.members))), 1e-300)
-    causes = tuple(_refined(fits, chosen, effective))
+    refined = tuple(_refined(fits, chosen, effective))
     explained = fits.rest - fits.left(chosen.members)
-    return Cycle(tried, chosen, causes, rivals, rms, p_value, fits.rest, explained)
+    return Cycle(tried, static, turns, chosen, refined, rivals, rms, p_value, fits.rest, explained)
+
+
+def _turns(run: Record) -> list[float]:
+    """Times at which the temperature of the rows that count turns, s."""
+    return turning_points(run.history.time_s[run.usable], run.history.temperature_c[run.usable])
+
+
+def _static(fits: CycleFits, powers: tuple[tuple[int, int], ...], effective: float) -> Static:
+    left = float((fits.without_rate(powers) ** 2).sum())
+    total = float(fits.rest @ fits.rest)
+    criterion = effective * float(np.log(left / total)) + len(powers) * float(np.log(effective))
+    return Static(powers, float(np.sqrt(left / fits.rest.size)), criterion)
 
 
 def _rare(tried: Tried) -> list[str]:
@@ -140,11 +205,18 @@ def _members(fits: CycleFits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:
 
 
 def _effective_size(records: Records, residual: Array) -> float:
-    """Number of independent blocks: n (1 − ρ)/(1 + ρ), ρ the correlation of neighbours."""
-    pairs = [(residual[s][1:], residual[s][:-1]) for s in records.spans()]
-    top = sum(float(a @ b) for a, b in pairs)
-    rho = float(np.clip(top / float(residual @ residual), 0.0, 0.99))
-    return residual.size * (1.0 - rho) / (1.0 + rho)
+    """Number of independent blocks: n/(1 + 2 Σ ρ), over the correlations of blocks until they are noise.
+
+    So it hardly depends on how long a block is, as it would were the correlation of neighbours all that counted.
+    """
+    total, spans = float(residual @ residual), records.spans()
+    correlated = 1.0
+    for lag in range(1, max(s.stop - s.start for s in spans)):
+        rho = sum(float(residual[s][lag:] @ residual[s][:-lag]) for s in spans) / total
+        if rho <= _UNCORRELATED:
+            break
+        correlated += 2.0 * rho
+    return float(residual.size / correlated)
 
 
 def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) -> Tried:
@@ -153,19 +225,21 @@ def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) ->
     energy = fits.energies(kinds)
     if len(kinds) == 2 and kinds[0] == kinds[1]:
         energy = energy + energy.T
-    left = np.maximum(total - energy, 1e-12 * total)
-    deviance = effective * np.log(left / left.min())
+    least = max(float((fits.left(members) ** 2).sum()), 1e-12 * total)
+    left = np.maximum(total - energy, least)
+    deviance = effective * np.log(left / least)
     intervals, resolved = [], True
     for axis, member in enumerate(members):
         profile = deviance.min(axis=tuple(k for k in range(deviance.ndim) if k != axis))
-        inside = np.flatnonzero(profile <= CHI2_95_ONE)
+        inside = np.flatnonzero(profile <= max(CHI2_95_ONE, float(profile.min())))
         resolved = resolved and bool(inside[0] > 0 and inside[-1] < profile.size - 1)
         name = next(iter(member.values))
         values = [c.values[name] for c in fits.grid[member.id]]
-        intervals.append(Interval(member.values[name], values[inside[0]], values[inside[-1]]))
+        value = member.values[name]
+        intervals.append(Interval(value, min(values[inside[0]], value), max(values[inside[-1]], value)))
     price = _PRICE * len(members) * float(np.log(effective))
-    criterion = effective * float(np.log(left.min() / total)) + price
-    return Tried(members, float(np.sqrt(left.min() / fits.rest.size)), criterion, tuple(intervals), resolved)
+    criterion = effective * float(np.log(least / total)) + price
+    return Tried(members, float(np.sqrt(least / fits.rest.size)), criterion, tuple(intervals), resolved)
 
 
 def _refined(fits: CycleFits, chosen: Tried, effective: float) -> Iterator[Refined]:

@@ -1,7 +1,7 @@
 """Extension and its gain: the compensation model refitted with the named causes, measured on unseen runs.
 
-Where there are exam runs, the training runs choose and the exam runs measure. Where there are none, runs
-(or branches of few runs) are left out in turn, and causes and parameters are chosen anew without them.
+The training runs choose, what is shipped, too (`shipping`). Where there are exam runs, they measure. Where there are
+none, runs (or branches of few runs) are left out in turn, and causes and parameters are chosen anew without them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
 from .refit import Effect, samples, score
 from .refitting import FEW_RUNS, Chain, Refitting, folds_of
+from .shipping import Shipping, shipping
 
 __all__ = ["Extension", "extend"]
 
@@ -29,7 +30,6 @@ Progress = Callable[[str], None]
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts
 _LEARNT = 0.67  # share of the dates that is learnt from where no exam run is later
-_MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Extension:
         forward: Gain on runs later than everything that was learnt from; None without dates.
         extended: Fit with the shipped causes, None if none is shipped.
         shipped: Effects of the extended model.
+        crossed: The cross-validation on the training runs that decided so.
         samples: Training samples as the extended map sees them.
         floor: Noise floor of the scored samples, deg/h.
         baseline_rms, baseline_centers: Of the model without causes.
@@ -56,6 +57,7 @@ class Extension:
     forward: Gain | None
     extended: Fit | None
     shipped: tuple[Effect, ...]
+    crossed: Shipping
     samples: TrainingData
     floor: float
     baseline_rms: float
@@ -85,7 +87,8 @@ def extend(
     floor = floor_of([*chain[-1], *refitting.on_training(effects)])
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
     steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
-    shipped, total = _shipped(refitting, effects, steps, chain, floor)
+    crossed = shipping(refitting, effects)
+    shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     extended = refitting.fit(shipped) if shipped else None
     return Extension(
         steps=tuple(steps),
@@ -94,6 +97,7 @@ def extend(
         forward=_forward(refitting, chain, len(effects), floor) if effects else None,
         extended=extended,
         shipped=tuple(shipped),
+        crossed=crossed,
         samples=joined([samples(run, shipped) for run in refitting.train]),
         floor=floor,
         baseline_rms=_rms(chain[0]),
@@ -109,20 +113,19 @@ def _rms(runs: Sequence[Averages]) -> float:
 
 
 def _shipped(
-    refitting: Refitting, effects: list[Effect], steps: list[Gain], chain: Chain, floor: float
+    refitting: Refitting, effects: list[Effect], worthy: list[Effect], chain: Chain, floor: float
 ) -> tuple[list[Effect], Gain | None]:
-    """Effects that a table can hold and that gain with confidence on unseen runs."""
-    able = [e for e, g in zip(effects, steps, strict=True) if e.term.shipped and g.positive][:_MOST_TERMS]
-    if not able:
+    """The effects that are shipped, and what they gain together where it is measured."""
+    if not worthy:
         return [], None
-    if able == effects:
+    if worthy == effects:
         both = [chain[0], chain[-1]]
     elif refitting.exam:
-        both = refitting.on_exam([[], able])
+        both = refitting.on_exam([[], worthy])
     else:
-        return able, next(g for e, g in zip(effects, steps, strict=True) if e in able)
+        both = [chain[0], chain[1 + max(k for k, e in enumerate(effects) if e in worthy)]]
     total = gain_of(both[0], both[1], floor, refitting.average_s)
-    return (able, total) if total.positive else ([], None)
+    return (worthy, total) if refitting.exam or total.positive else ([], None)
 
 
 def _crossed(refitting: Refitting, count: int) -> Chain:

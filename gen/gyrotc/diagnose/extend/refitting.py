@@ -117,7 +117,7 @@ class Refitting:
                 hidden = (run.history.time_s >= times[0] - _ROUNDING_S) & (run.history.time_s < end)
             masks.append(run.usable & ~hidden)
         rest = self.records.without_rows(masks)
-        return cycle_of(rest).causes[:count] if self.single_cycle else choose(search_of(rest), count)
+        return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
 
 
 def folds_of(refitting: Refitting) -> list[list[Mask]]:
