@@ -27,13 +27,13 @@ static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
 }
 
 /* Lets every term take note that a block of mean temperature state->mean ends. */
-static void FN(step_terms)(STATE *state)
+static void FN(step_terms)(STATE *state, NUM temp)
 {
     const TABLE *const table = state->table;
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
-        table->term_code[i]->step(state, i, state->mean);
+        table->term_code[i]->step(state, i, temp);
     }
 }
 
@@ -135,7 +135,7 @@ static void FN(bridge)(STATE *state)
     const TABLE *const table = state->table;
 
     FN(push)(state, 0U);
-    FN(step_terms)(state);
+    FN(step_terms)(state, state->mean);
     if (state->held_blocks <= table->guards[GUARD_MISSING].bits) {
         state->held_blocks++;
     }
@@ -153,22 +153,25 @@ static void FN(pass)(STATE *state, uint_least32_t blocks)
     state->elapsed = ((MAX_ELAPSED - state->elapsed) > blocks) ? (state->elapsed + blocks) : MAX_ELAPSED;
 }
 
-/* The running block is complete: its mean and slope make the next correction. */
+/* The running block is complete: its mean and slope make the next correction, which is in force for the next block:
+ * so terms and map see where the slope brings the mean by then. */
 static void FN(close)(STATE *state)
 {
     FN(pass)(state, 1U);
     if (state->gap == 0U) {
         /* nothing was ever believed: no correction yet */
     } else if ((2U * state->valid) >= state->samples_per_block) {
+        NUM temp;
         NUM slope;
         int_least32_t remarks;
 
         state->mean = FN(mean)(state->base, state->sum, state->valid);
         state->held_blocks = 0U;
         FN(push)(state, 1U);
-        FN(step_terms)(state);
         remarks = FN(window_slope)(state, &slope);
-        FN(correct)(state, state->mean, slope, remarks);
+        temp = (state->table->lead_blocks != 0U) ? FN(total)(state->mean, slope) : state->mean;
+        FN(step_terms)(state, temp);
+        FN(correct)(state, temp, slope, remarks);
     } else {
         FN(bridge)(state);
     }

@@ -95,7 +95,7 @@ def _spans_out(source: Path, work: Path) -> Iterator[Case]:
     _described(plain, source.name, [data], ['power_on_s = "unknown"'])
     runs = load(plain, axis=axes_of(plain)[0]).runs
     front = front_end(runs, BLOCK_S)
-    spans = training_spans(runs, samples_of(front.blocks(runs[0]), front, 0))
+    spans = training_spans(runs, samples_of(front.blocks(runs[0]), front.block_s, 0))
     for k, span in enumerate(spans):
         folder = work / f"{source.name}-data-{k}"
         before, after = f"to_s = {span.from_s!r}", f"from_s = {span.to_s!r}"
@@ -159,7 +159,7 @@ def _of_others(dataset: Dataset) -> dict[str, float]:
 def _samples(dataset: Dataset, role: str) -> TrainingData:
     runs = [run for run in dataset.runs if run.role == role]
     front = front_end([run for run in dataset.runs if run.role == "train"], BLOCK_S)
-    parts = [samples_of(front.blocks(run), front, k) for k, run in enumerate(runs)]
+    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(runs)]
     names = TrainingData.__dataclass_fields__
     return TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
 

@@ -51,7 +51,7 @@ def cubic(data: Path, axis: str) -> float:
     runs = load(data, axis=axis).runs
     front = front_end([r for r in runs if r.role == "train"], AVERAGE_S)
     train, exam = (
-        samples_of(front.blocks(next(r for r in runs if r.role == role)), front, 0)
+        samples_of(front.blocks(next(r for r in runs if r.role == role)), front.block_s, 0)
         for role in ("train", "exam")
     )
 

@@ -26,6 +26,7 @@ def random_model(seed: int, **changes: Any) -> Model:
         "method": "mrbf",
         "block_s": 10.0,
         "slope_blocks": int(rng.integers(2, 12)),
+        "lead_blocks": seed % 2,
         "scale": Scale(temperature_c=((t0 + t1) / 2, (t1 - t0) / 2), slope_c_per_min=r),
         "envelope": Envelope(temperature_c=(t0, t1), slope_c_per_min=(-r, r)),
         "coverage": None

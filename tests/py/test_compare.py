@@ -51,7 +51,7 @@ def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_m
     front = front_end(runs, 10.0)
     squares, count = 0.0, 0
     for k, run in enumerate(runs):
-        s = samples_of(front.blocks(run), front, k)
+        s = samples_of(front.blocks(run), front.block_s, k)
         after = s.bias_dph - model.map_dph(s.temperature_c, s.slope_c_per_min)
         means = after[: len(after) // 10 * 10].reshape(-1, 10).mean(axis=1)
         squares, count = squares + float(np.sum(means**2)), count + len(means)
@@ -70,7 +70,7 @@ def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
     result = compare(dataset, CompareOptions(methods=("mlr", "mrbf"))).content()
     assert result["judged_on"] == "left_out"
     front = front_end(dataset.runs, 10.0)
-    parts = [samples_of(front.blocks(run), front, k) for k, run in enumerate(dataset.runs)]
+    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(dataset.runs)]
     for row in result["methods"]:
         for k, held in enumerate(parts):
             rest = parts[:k] + parts[k + 1 :]

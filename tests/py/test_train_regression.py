@@ -24,7 +24,7 @@ def sets(folder: Path) -> tuple[TrainingData, TrainingData, float]:
     roles = {role: [run for run in dataset.runs if run.role == role] for role in ("train", "exam")}
     front = front_end(roles["train"], 10.0)
     blocks = {
-        role: joined([samples_of(front.blocks(run), front, k) for k, run in enumerate(runs)])
+        role: joined([samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(runs)])
         for role, runs in roles.items()
     }
     floor = simulated_floor(folder, [run.file for run in roles["exam"]], AVERAGE_S)

@@ -6,7 +6,7 @@ float32 operation is the one that the target does, in its order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ __all__ = [
 
 MAP, KEEP, FALLBACK = 0, 1, 2
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
+_LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
 
 
@@ -69,6 +70,19 @@ class Steps:
     is_restart: NDArray[np.bool_]
     valid: NDArray[np.bool_]
     mean: Numbers
+
+    def led(self, blocks: int) -> Steps:
+        """The same corrections with every mean where its slope brings it within `blocks` (0 or 1) blocks.
+
+        A correction is in force for the block after the one that it was made of; so it is not late.
+        """
+        if blocks == 0:
+            return self
+        slope = np.where(self.kind == MAP, self.slope, self.slope.dtype.type(0))
+        temperature = self.temperature + slope
+        if np.issubdtype(temperature.dtype, np.integer):
+            temperature = np.clip(temperature, -_LARGEST, _LARGEST)
+        return replace(self, temperature=temperature)
 
     def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
         """Index of the correction in force at each of the ascending `samples`; -1 before the first."""

@@ -88,6 +88,7 @@ def run_blocks(  # long: one line for each field of the result
     max_rate_c_per_min: float,
     stuck_s: float = 0.0,
     hold_blocks: int = 30,
+    lead_blocks: int = 0,
 ) -> Blocks:
     """Runs the float32 front end over a recording.
 
@@ -100,6 +101,7 @@ def run_blocks(  # long: one line for each field of the result
         max_rate_c_per_min: ... this rate times the time since the last believed one.
         stuck_s: Time after which a reading that stays the same is none, s; 0: never.
         hold_blocks: Invalid blocks in a row that are bridged before the fallback.
+        lead_blocks: 1: map and terms see where the slope brings a block's mean by the time that it is in force.
     """
     n = samples_per_block(block_s, run.row_period_s)
     settings = Settings(
@@ -113,7 +115,7 @@ def run_blocks(  # long: one line for each field of the result
     )
     missed = missed_before(rows.time_s, run.row_period_s)
     stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
-    steps = follow(F32, stream.samples, settings)
+    steps = follow(F32, stream.samples, settings).led(lead_blocks)
     n_blocks = steps.valid.size
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)
@@ -149,12 +151,12 @@ def _in_force(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Input and status in force during each block, from the correction at its last sample (-1: none)."""
     started = k >= 0
-    source = k[started]
+    source, made = k[started], _last_map(steps, k)[started]
     temperature = np.full(k.size, np.nan, dtype=np.float32)
     slope = np.zeros(k.size, dtype=np.float32)
     status = np.full(k.size, status_bits.HELD, dtype=np.int32)
-    temperature[started] = steps.temperature[source]
-    slope[started] = steps.slope[source]
+    temperature[started] = steps.temperature[made]
+    slope[started] = steps.slope[made]
     kind = steps.kind[source]
     kept = steps.remarks[source] | np.where(kind == KEEP, status_bits.HELD, 0)
     status[started] = np.where(kind == FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)

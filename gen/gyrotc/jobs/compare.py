@@ -96,7 +96,7 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     if not training:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     front = front_end(training, options.block_s)
-    parts = [samples_of(front.blocks(run), front, k) for k, run in enumerate(training)]
+    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(training)]
     data = joined(parts)
     if len(data) == 0:
         raise InputError(
@@ -106,7 +106,7 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     everything = np.ones(len(data), dtype=bool)
     if exam:
         held = [
-            _Held(run.environment or run.file, samples_of(front.blocks(run), front, k), everything)
+            _Held(run.environment or run.file, samples_of(front.blocks(run), front.block_s, k), everything)
             for k, run in enumerate(exam)
         ]
         return data, [h for h in held if len(h.samples)], "exam"

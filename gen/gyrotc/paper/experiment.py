@@ -95,7 +95,7 @@ def _groups(folder: Path) -> tuple[list[Group], float]:
     dataset = load(folder)
     front = front_end(dataset.runs, _BLOCK_S)
     blocks = {
-        (run.environment, run.role): samples_of(front.blocks(run), front, number)
+        (run.environment, run.role): samples_of(front.blocks(run), front.block_s, number)
         for number, run in enumerate(dataset.runs)
     }
     groups = [Group(name, blocks[name, "train"], blocks[name, "exam"]) for name in ENVIRONMENTS]

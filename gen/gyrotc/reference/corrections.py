@@ -54,6 +54,7 @@ def corrections(
         channels: Bits of every row's channels, shape (n, n_channels).
         samples_per_block: What the target gives to `gtc_<n>_init`.
     """
+    steps = steps.led(table.lead_blocks)
     made = np.flatnonzero(steps.kind == MAP)
     outcome = _outcome(table, steps, stream, table.numbers(channels), samples_per_block)
     inputs = np.stack([_bits(table, outcome.temperature), _bits(table, outcome.slope)], axis=1)

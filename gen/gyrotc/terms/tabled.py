@@ -10,7 +10,7 @@ from decimal import Context, Decimal
 from .arithmetic import FLOAT64
 from .recursion import Recursion, TableKind, recursion_of
 
-__all__ = ["Tabled", "blocks_per_tau", "memory_gain", "octaves_per_block", "turns"]
+__all__ = ["Tabled", "blocks_per_tau", "half_block_before", "memory_gain", "octaves_per_block", "turns"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,16 @@ def memory_gain(block_s: float, tau_s: float) -> float:
     context = Context(prec=40)
     ratio = context.divide(Decimal(-block_s), Decimal(tau_s))
     return float(1 - context.exp(ratio))
+
+
+def half_block_before(block_s: float, tau_s: float) -> float:
+    """exp(block/2τ): what fades with τ was so much larger half a block earlier.
+
+    A memory is known for the end of a block, and in force over the whole of it: its mean is that of the middle. Of a
+    block that is longer than 2τ nothing is left of it, and no factor brings it back: e at most.
+    """
+    context = Context(prec=40)
+    return float(context.exp(min(context.divide(Decimal(block_s), 2 * Decimal(tau_s)), Decimal(1))))
 
 
 def blocks_per_tau(block_s: float, tau_s: float) -> float:

@@ -16,7 +16,7 @@ from .memory import RATES, lagged
 from .operators import first_order
 from .recursion import TableKind
 from .search import Search, SingleCycle, geometric
-from .tabled import Tabled, memory_gain
+from .tabled import Tabled, half_block_before, memory_gain
 from .words import Words
 
 __all__ = ["TERM"]
@@ -40,7 +40,12 @@ _TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
 
 def _record(values: Values, block_s: float) -> list[float]:
-    return [memory_gain(block_s, values["tau_s"]), values["amplitude_dph_per_c"], 0.0]
+    tau_s = values["tau_s"]
+    return [
+        memory_gain(block_s, tau_s),
+        values["amplitude_dph_per_c"] * half_block_before(block_s, tau_s),
+        0.0,
+    ]
 
 
 TERM = Term(

@@ -11,7 +11,7 @@ from .base import Array, Features, History, Needs, Parameter, Scene, Term, Value
 from .memory import COLD_STARTS
 from .recursion import TableKind
 from .search import Search, geometric
-from .tabled import Tabled, octaves_per_block
+from .tabled import Tabled, half_block_before, octaves_per_block
 from .words import Telling, Words
 
 __all__ = ["TERM"]
@@ -41,7 +41,9 @@ _TAU = Parameter("tau_s", "s", 200.0, 8000.0)
 
 
 def _record(values: Values, block_s: float) -> list[float]:
-    return [octaves_per_block(block_s, values["tau_s"]), values["amplitude_dph"]]
+    tau_s = values["tau_s"]
+    middle = 1.0 / half_block_before(block_s, tau_s)  # the target counts to the start of a block
+    return [octaves_per_block(block_s, tau_s), values["amplitude_dph"] * middle]
 
 
 TERM = Term(

@@ -94,7 +94,7 @@ class FrontEnd:
     max_rate_c_per_min: float
     hold_blocks: int
     stuck_s: float = 0.0
-    lead_blocks: int = 0
+    lead_blocks: int = 1
 
     def blocks(self, run: Run) -> Blocks:
         return run_blocks(
@@ -106,11 +106,8 @@ class FrontEnd:
             max_rate_c_per_min=self.max_rate_c_per_min,
             stuck_s=self.stuck_s,
             hold_blocks=self.hold_blocks,
+            lead_blocks=self.lead_blocks,
         )
-
-    def led(self, temperature_c: NDArray[np.float32], slope_c: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What map and terms see: the block before's mean, C, led by its slope, C a block, to when it is in force."""
-        return np.asarray(temperature_c + np.float32(self.lead_blocks) * slope_c, dtype=np.float32)
 
 
 def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
@@ -126,15 +123,12 @@ def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
     )
 
 
-def samples_of(blocks: Blocks, front: FrontEnd, run: int) -> TrainingData:
-    """Training samples of one run: what the map sees during each valid block, and the block's mean rate.
-
-    The correction in force during a block was made of the block before it.
-    """
-    used, block_s = blocks.used, front.block_s
+def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
+    """Training samples of one run: what was in force during each valid block, and the block's mean rate."""
+    used = blocks.used
     n = int(used.sum())
     return TrainingData(
-        temperature_c=front.led(blocks.temperature_c[used], blocks.slope_c[used]).astype(np.float64),
+        temperature_c=blocks.temperature_c[used].astype(np.float64),
         slope_c_per_min=blocks.slope_c[used].astype(np.float64) * (60.0 / block_s),
         bias_dph=blocks.rate_dph[used],
         weight=blocks.rows[used].astype(np.float64),
@@ -168,7 +162,7 @@ def fit_dataset(
     for k, run in enumerate(stretches):
         say(f"reading {run.file}")
         blocks = front.blocks(run)
-        parts.append(samples_of(blocks, front, k))
+        parts.append(samples_of(blocks, front.block_s, k))
         left_out_rows += stretches_left_out(run, blocks.left_out_s)
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
@@ -271,6 +265,7 @@ def model_of(  # long: one line for each field of model.json
             "method": fitted.method,
             "block_s": front.block_s,
             "slope_blocks": front.slope_blocks,
+            "lead_blocks": front.lead_blocks,
             "scale": fitted.scale,
             "envelope": fitted.envelope,
             "coverage": coverage(data, fitted, _COVERAGE_CELLS),

@@ -173,6 +173,7 @@ def cycle_of(records: Records) -> Cycle:
     chosen = next((t for t in near if not _rare(t)), tried[0])
     others = [t for t in near if t is not chosen and _rare(t) and not _rare(chosen)]
     rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
+    chosen = _averaged(fits, chosen, effective) if chosen.resolved else chosen
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
     p_value = max(float(chi2.sf(ratio, _PRICE * len(chosen.members))), 1e-300)
     refined = tuple(_refined(fits, chosen, effective))
@@ -240,6 +241,27 @@ def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) ->
     price = _PRICE * len(members) * float(np.log(effective))
     criterion = effective * float(np.log(least / total)) + price
     return Tried(members, float(np.sqrt(least / fits.rest.size)), criterion, tuple(intervals), resolved)
+
+
+def _averaged(fits: CycleFits, chosen: Tried, effective: float) -> Tried:
+    """The states at the mean of their parameters' logarithms over the likelihood, in place of its top.
+
+    The top wanders over what explains the cycle equally well. Where an interval reaches the end of what the recordings
+    can show, the mean hangs on that end, and the top stays.
+    """
+    energy = fits.energies(chosen.kinds)
+    left = np.maximum(float(fits.rest @ fits.rest) - energy, 1e-300)
+    weight = np.where(energy > 0.0, np.exp(-0.5 * effective * np.log(left / left.min())), 0.0)
+    members, intervals = [], []
+    for axis, (member, interval) in enumerate(zip(chosen.members, chosen.intervals, strict=True)):
+        name = next(iter(member.values))
+        over = weight.sum(axis=tuple(k for k in range(weight.ndim) if k != axis))
+        logs = np.log([c.values[name] for c in fits.grid[member.id]])
+        value = float(np.exp(over @ logs / over.sum()))
+        members.append(replace(member, values={name: value}))
+        intervals.append(Interval(value, min(interval.low, value), max(interval.high, value)))
+    rms = float(np.sqrt(np.mean(fits.left(tuple(members)) ** 2)))
+    return replace(chosen, members=tuple(members), intervals=tuple(intervals), rms_dph=rms)
 
 
 def _refined(fits: CycleFits, chosen: Tried, effective: float) -> Iterator[Refined]:

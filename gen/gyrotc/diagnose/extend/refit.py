@@ -102,7 +102,7 @@ def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Pl
 
 def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
     blocks, rows = front.blocks(run), run.rows()
-    data = samples_of(blocks, front, number)
+    data = samples_of(blocks, front.block_s, number)
     before = blocks_since_power_on(rows, run, front.block_s)
     course = blocks.stream.course(blocks.steps, blocks.samples_per_block, before)
     day = None
@@ -111,9 +111,7 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
     return Played(
         data=data,
         in_force=blocks.in_force[blocks.used],
-        course=replace(
-            course, temperature=front.led(blocks.steps.temperature, blocks.steps.slope).astype(np.float64)
-        ),
+        course=replace(course, temperature=course.temperature.astype(np.float64)),
         slope=blocks.steps.slope.astype(np.float64),
         on_s=data.time_s - (run.power_on_s or 0.0),
         day=day,
