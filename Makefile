@@ -141,8 +141,12 @@ blind: setup
 odd: setup
 	@GYROTC_ODD="$$SET_SETS" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
 
+## memory named from 100 clean single cycles at four levels of noise (CYCLES=100): at most 2 %
+cycles: setup
+	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/test_diagnose_cycle.py -k clean_cycles
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd cycles clean

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
+from gyrotc.dataset import joined_runs, load
 from gyrotc.diagnose import diagnose
 from gyrotc.diagnose.attribute.single_cycle import cycle_of, is_single_cycle
+from gyrotc.diagnose.extend.refit import Effect
+from gyrotc.diagnose.extend.refitting import Refitting
 from gyrotc.diagnose.screen.blocks import Records
 from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.terms.operators import first_order
@@ -99,11 +102,45 @@ def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> No
     assert cold == pytest.approx(hot, rel=1e-5), "no dT/dt in the map"
 
 
-def test_a_gyro_with_a_static_rate_gets_no_memory_from_one_cycle(tmp_path: Path) -> None:
-    """A slice of `make cycles`: 100 clean cycles at four levels of the noise, of which at most 2 may be named."""
-    for seed in range(8):
+def test_clean_cycles_get_no_memory(tmp_path: Path) -> None:
+    """Gyros with a static map of (T, dT/dt); `make cycles` has 100 at four levels of the noise, here are a few."""
+    count = int(os.environ.get("GYROTC_CYCLES", "8"))
+    named = []
+    for seed in range(count):
         found = cycle_of(clean_cycle(tmp_path, seed, NOISE[seed % len(NOISE)]))
-        assert found.causes == (), (seed, found.tried[0].kinds, found.lead)
+        named += [(seed, found.causes[0].candidate.id, found.lead)] if found.causes else []
+    print(f"{len(named)} of {count} clean cycles named", named)
+    assert len(named) <= 0.02 * count, named
+
+
+def test_a_correction_hardly_depends_on_the_length_of_a_block(tmp_path: Path) -> None:
+    """The same cycle by blocks of 5, 10 and 20 s: the same states, and the same error on the unseen branch."""
+    time, temperature = cycle(3)
+    folder = recorded(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    left = []
+    for block_s in (5.0, 10.0, 20.0):
+        refitting = Refitting(
+            load(folder),
+            records_of(load(folder), "train", block_s=block_s, average_s=100.0),
+            FitOptions(block_s=block_s),
+            single_cycle=True,
+        )
+        effects = [Effect.of(state) for state in cycle_of(refitting.records).states]
+        (chain,) = refitting.on_exam([effects])
+        left.append(float(np.sqrt(np.mean(np.concatenate([a.after_dph for a in chain]) ** 2))))
+    assert max(left) < 1.05 * min(left), left
+
+
+def test_spans_that_touch_are_one_run(tmp_path: Path) -> None:
+    time, temperature = cycle(3)
+    recorded(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    whole = load(tmp_path).runs
+    text = (tmp_path / "dataset.toml").read_text()
+    run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
+    cut = f"{run}from_s = 1000.0\nto_s = {CUT_S}\n{run}to_s = 1000.0\n"
+    (tmp_path / "dataset.toml").write_text(text.replace(f"{run}to_s = {CUT_S}\n", cut))
+    assert len(load(tmp_path).runs) == 3
+    assert joined_runs(load(tmp_path).runs) == joined_runs(whole)
 
 
 def test_a_ramp_that_never_turns_cannot_test_memory(tmp_path: Path) -> None:

@@ -116,6 +116,7 @@ def _model(model_dict: dict[str, Any], front: FrontEnd, terms: list[dict[str, An
             "networks": [plane],
             "block_s": front.block_s,
             "slope_blocks": front.slope_blocks,
+            "lead_blocks": front.lead_blocks,
             "hold_blocks": front.hold_blocks,
             "max_step_c": front.max_step_c,
             "max_rate_c_per_min": front.max_rate_c_per_min,
