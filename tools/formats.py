@@ -17,6 +17,7 @@ from gyrotc.results.changes import Changes
 from gyrotc.results.check import Checked
 from gyrotc.results.comparison import Comparison
 from gyrotc.results.describe import schema_text, tables
+from gyrotc.results.diagnosed import Diagnosed
 from gyrotc.results.emission import Emitted
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.limits import HeldLimits
@@ -35,6 +36,7 @@ RESULTS: dict[str, type[Numbered]] = {
     "changes": Changes,
     "check": Checked,
     "compare": Comparison,
+    "diagnose": Diagnosed,
     "emission": EmissionRecord,
     "emit": Emitted,
     "evaluate": Evaluation,

@@ -25,7 +25,7 @@ def main() -> None:
         began = time.process_time()
         result: dict[str, Any]
         try:
-            result = diagnose(load(Path(folder))).result
+            result = diagnose(load(Path(folder))).result.content()
         except Exception:
             result = {"verdict": "error", "text": traceback.format_exc(), "causes": [], "considered": []}
         result["seconds"] = time.process_time() - began

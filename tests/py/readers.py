@@ -143,7 +143,7 @@ def make_seeds(folder: Path) -> None:
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))
     (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min").content()))
-    found = diagnose(dataset).result | {"pictures": ["pictures/a.svg"]}
+    found = diagnose(dataset).result.content() | {"pictures": ["pictures/a.svg"]}
     (folder / "diagnose.json").write_text(json.dumps(found))
 
 

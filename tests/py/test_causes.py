@@ -66,12 +66,12 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -
     (built,) = build(tmp_path / "data", out, FitOptions(), extend=True)
     assert not built.failures
     diagnosis = built.diagnosis
-    assert diagnosis is not None and diagnosis["verdict"] in ("explained", "ambiguous")
-    (cause,) = diagnosis["causes"]
-    assert (cause["id"], cause["name"]) == (made_up.id, made_up.words.name)
-    assert cause["parameters"]["tau_s"]["value"] == pytest.approx(900.0, rel=0.2)
-    assert cause["parameters"]["slope_dph_min_per_c"]["value"] == pytest.approx(4e-3, rel=0.2)
-    assert cause["gain"]["share_of_excess_removed"] > 0.6
+    assert diagnosis is not None and diagnosis.verdict in ("explained", "ambiguous")
+    (cause,) = diagnosis.causes
+    assert (cause.id, cause.name) == (made_up.id, made_up.words.name)
+    assert cause.parameters["tau_s"].value == pytest.approx(900.0, rel=0.2)
+    assert cause.parameters["slope_dph_min_per_c"].value == pytest.approx(4e-3, rel=0.2)
+    assert cause.gain is not None and (cause.gain.share_of_excess_removed or 0.0) > 0.6
 
     (term,) = load_model(out / "model.json").terms
     assert term.id == made_up.id

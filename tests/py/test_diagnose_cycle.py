@@ -90,8 +90,8 @@ def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> No
     time, temperature = cycle(3)
     folder = recorded(tmp_path, temperature, two_states(time, temperature), CUT_S)
     found = diagnose(load(folder), options=FitOptions(average_s=10.0))
-    assert found.result["verdict"] in ("ambiguous", "partial")
-    extended = found.result["extended"]
+    assert found.result.verdict in ("ambiguous", "partial")
+    extended = found.result.content()["extended"]
     assert extended["terms"] == ["thermal_gradient", "thermal_gradient"]
     gain = extended["gain"]
     assert gain["exam_rms_after_dph"] < 0.5 * gain["exam_rms_before_dph"]

@@ -112,4 +112,4 @@ def test_recordings_at_one_temperature_cannot_decide(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", {"time_s": time, "temperature_c": 20.0 + 1e-4 * time, "rate_dph": rate})
     (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
     found = diagnose(load(tmp_path))
-    assert found.result["verdict"] == "not_testable" and found.analysis is None
+    assert found.result.verdict == "not_testable" and found.analysis is None

@@ -195,7 +195,7 @@ def test_an_effect_of_the_training_runs_alone_is_not_shipped(
     roles = drawing.campaign.roles
     rows = [a if role == "train" else b for a, b, role in zip(hidden.rows, plain.rows, roles, strict=True)]
     blind.write(drawing.campaign, replace(hidden, rows=rows), tmp_path / "r", declare=True, serial="U-0001")
-    result = diagnose(load(tmp_path / "r")).result
+    result = diagnose(load(tmp_path / "r")).result.content()
     assert [c["id"] for c in result["causes"]] == ["hysteresis"]
     assert result["causes"][0]["gain"]["low"] < 0.0
     assert result["extended"] is None

@@ -187,7 +187,7 @@ def test_a_gap_in_every_run_costs_an_extension_next_to_nothing(tmp_path: Path) -
             lines = path.read_text().splitlines(keepends=True)
             middle = len(lines) // 2
             path.write_text("".join(lines[:middle] + lines[middle + gap :]))
-        result = diagnose(load(tmp_path / "data")).result
+        result = diagnose(load(tmp_path / "data")).result.content()
         assert (result["verdict"], result["extended"]["terms"]) == ("explained", ["auxiliary"])
         left.append(result["extended"]["gain"]["exam_rms_after_dph"])
     assert left[1] < 1.02 * left[0]

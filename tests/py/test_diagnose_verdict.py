@@ -11,6 +11,8 @@ from gyrotc.commands.diagnosis_lines import diagnosis_lines
 from gyrotc.diagnose.advice import VERDICTS, next_steps
 from gyrotc.diagnose.discrepancy.declared_noise import NoiseFinding
 from gyrotc.diagnose.verdict import verdict_of
+from gyrotc.results.diagnosed import ConsideredCause, Diagnosed, Estimate, NamedCause, Unexplained, Verdict
+from gyrotc.results.planned import DetectionLimit
 
 NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]
 
@@ -46,26 +48,31 @@ def test_the_verdict_follows_from_what_was_found(verdict: str, found: Any, noise
     assert verdict_of(found, noise) == verdict
 
 
-def result(verdict: str) -> dict[str, Any]:
-    cause = {
-        "id": "hysteresis", "family": "hysteresis", "name": "A loop", "p_value": 0.001, "gain": None,
-        "parameters": {"width_c": {"value": 4.0, "low": 3.0, "high": 5.0}},
-        "remedy": "one play operator",
-        "equivalent": ["turn_on_offset"] if verdict == "ambiguous" else [],
-        "separate_by": "holds from both sides" if verdict == "ambiguous" else None,
-    }  # fmt: skip
-    named = verdict in ("explained", "ambiguous", "partial")
-    return {
-        "serial": "G1", "axis": None, "verdict": verdict, "text": "Finding.", "meaning": VERDICTS[verdict],
-        "discrepancies": [], "causes": [cause] if named else [], "extended": None,
-        "considered": [{"id": "warm_up", "detection_limit": {"value": 1e-3, "unit": "deg/h", "parameter": "tau_s"}},
-                       {"id": "cavity_lag", "detection_limit": {"value": None, "unit": "s", "parameter": "tau_s"}}],
-        "next": next_steps(verdict, [cause] if named else [], ["ageing"], shipped=False),
-    }  # fmt: skip
+def result(verdict: Verdict) -> Diagnosed:
+    cause = NamedCause(
+        id="hysteresis", family="hysteresis", name="A loop", p_value=0.001, gain=None, signature="a loop",
+        parameters={"width_c": Estimate(value=4.0, low=3.0, high=5.0)}, remedy="one play operator",
+        equivalent=("turn_on_offset",) if verdict == "ambiguous" else (),
+        separate_by="holds from both sides" if verdict == "ambiguous" else None,
+    )  # fmt: skip
+    causes = (cause,) if verdict in ("explained", "ambiguous", "partial") else ()
+    considered = tuple(
+        ConsideredCause(
+            id=id, family="lag", p_value=0.5,
+            detection_limit=DetectionLimit(value=value, unit=unit, parameter="tau_s", over=()),
+        )
+        for id, value, unit in (("warm_up", 1e-3, "deg/h"), ("cavity_lag", None, "s"))
+    )  # fmt: skip
+    return Diagnosed(
+        gyrotc_version="0.1.0", serial="G1", axis=None, verdict=verdict, block_s=10.0, average_s=100.0,
+        noise_floor_dph=1e-3, discrepancies=(), causes=causes, baseline=None, extended=None, considered=considered,
+        missing=(), estimated_noise=None, measured_on="exam", single_cycle=None, unexplained=None, text="Finding.",
+        meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], shipped=False)),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_every_verdict_has_words_and_a_next_step(verdict: str) -> None:
+def test_every_verdict_has_words_and_a_next_step(verdict: Verdict) -> None:
     text = "\n".join(diagnosis_lines(result(verdict)))
     assert text.startswith(f"G1: {verdict.replace('_', ' ')}. Finding.")
     assert VERDICTS[verdict] in text and "next: " in text
@@ -73,24 +80,21 @@ def test_every_verdict_has_words_and_a_next_step(verdict: str) -> None:
 
 
 def test_an_ambiguous_verdict_names_the_experiment() -> None:
-    steps = next_steps("ambiguous", result("ambiguous")["causes"], [], shipped=True)
+    steps = next_steps("ambiguous", result("ambiguous").causes, [], shipped=True)
     assert steps == ["To tell them apart: holds from both sides."]
 
 
 def test_what_no_table_holds_has_its_own_remedy() -> None:
-    causes = result("explained")["causes"]
+    causes = result("explained").causes
     assert next_steps("explained", causes, [], shipped=False) == ["Against it: one play operator."]
     assert "build --extend" in next_steps("explained", causes, [], shipped=True)[0]
 
 
 def test_structure_without_a_name_is_described() -> None:
-    left = {
-        "p_value": 1e-6,
-        "share_explained": 0.4,
-        "best_partial_match": ["hysteresis"],
-        "looks_like": "a switch",
-    }
-    text = "\n".join(diagnosis_lines({**result("unexplained"), "unexplained": left}))
+    left = Unexplained(
+        p_value=1e-6, share_explained=0.4, best_partial_match=("hysteresis",), looks_like="a switch"
+    )
+    text = "\n".join(diagnosis_lines(result("unexplained").model_copy(update={"unexplained": left})))
     assert "40%" in text and "it looks more like a switch" in text
 
 

@@ -34,6 +34,8 @@ from gyrotc.model import Model, table_id
 from gyrotc.pages import report
 from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
+from gyrotc.results.base import checked_result
+from gyrotc.results.diagnosed import Diagnosed, Estimate
 from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.texts import (
@@ -287,7 +289,6 @@ def test_the_report_of_a_build(
 ) -> None:
     monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(("bias", "map", "curve", "allan")))
     monkeypatch.setattr(report, "read_result", _unchecked)  # which would refuse some of the texts
-    monkeypatch.setattr(report, "read_stored", _unchecked)
     monkeypatch.setattr(report, "read_optional", _optional)
     finding = {"id": "text", "text": "text", "evidence": {}}
     evaluation = result["evaluation"].content() | {"findings": [finding]}
@@ -332,6 +333,7 @@ _DIAGNOSIS: dict[str, Any] = {
     "meaning": "m",
     "next": ["text"],
     "missing": ["text"],
+    "block_s": 10.0,
     "average_s": 100.0,
     "noise_floor_dph": 1e-3,
     "single_cycle": None,
@@ -345,6 +347,7 @@ _DIAGNOSIS: dict[str, Any] = {
         {
             "statistic": "s",
             "measured": 1.0,
+            "simulated_mean": 0.5,
             "simulated_low": 0.0,
             "simulated_high": 1.0,
             "p_value": 0.001,
@@ -377,6 +380,7 @@ _DIAGNOSIS: dict[str, Any] = {
     "considered": [
         {
             "id": "i",
+            "family": "f",
             "channel": "c",
             "p_value": None,
             "not_testable": "text",
@@ -526,9 +530,11 @@ def test_toml_reads_back_what_was_written() -> None:
 
 
 def test_the_scenario_of_a_diagnosis_reads_back() -> None:
+    found = checked_result(_DIAGNOSIS, Diagnosed, "diagnose.json")
+    slope = Estimate(**_INTERVAL)
     for text in HOSTILE:
-        cause = _DIAGNOSIS["causes"][0] | {"channel": text, "parameters": {text: _INTERVAL}}
-        written = extended_scenario(_DIAGNOSIS | {"serial": text, "causes": [cause]})
+        cause = found.physical[0].model_copy(update={"channel": text, "parameters": {text: slope}})
+        written = extended_scenario(found.model_copy(update={"serial": text, "causes": (cause,)}))
         assert written is not None
         content = tomllib.loads(written)
         assert content["channel"][0]["name"] == content["cause"][0]["channel"] == text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -44,6 +44,7 @@ from .results import (
 
 if TYPE_CHECKING:
     from ..jobs.build import Built
+    from ..results.diagnosed import Diagnosed
 
 
 @app.command()
@@ -210,7 +211,7 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     axes = axes_of(dataset) if axis == "all" else (axis,)
     if not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
-    results: dict[str, dict[str, Any]] = {}
+    results: dict[str, Diagnosed] = {}
 
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
@@ -228,7 +229,8 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
         with result_folder(out, "diagnose", inputs=[dataset]) as stage:
             for name in axes:
                 one(name, stage.folder / str(name))
-    write_json(json_file, results if axis == "all" else results[axis or ""])
+    contents = {name: result.content() for name, result in results.items()}
+    write_json(json_file, contents if axis == "all" else contents[axis or ""])
     for name, result in results.items():
         for line in diagnosis_lines(result):
             tell(line)

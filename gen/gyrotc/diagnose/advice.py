@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
+from ..results.diagnosed import NamedCause, Verdict
 from ..terms import CATALOGUE
 
 __all__ = ["VERDICTS", "next_steps"]
 
-VERDICTS: dict[str, str] = {
+VERDICTS: dict[Verdict, str] = {
     "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
     "explained": "The causes listed account for what the simulation gets wrong.",
     "ambiguous": "Two or more causes explain these recordings equally well.",
@@ -19,7 +19,7 @@ VERDICTS: dict[str, str] = {
     "not_testable": "These recordings cannot decide.",
 }
 
-_STEPS = {
+_STEPS: dict[Verdict, str] = {
     "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
     " profile.",
     "explained": "Build with the extension (gyrotc build --extend), or mend the cause and record again.",
@@ -34,7 +34,7 @@ _STEPS = {
 
 
 def next_steps(
-    verdict: str, causes: Sequence[Mapping[str, Any]], untestable: Sequence[str], *, shipped: bool
+    verdict: Verdict, causes: Sequence[NamedCause], untestable: Sequence[str], *, shipped: bool
 ) -> list[str]:
     """Sentences, the most telling first.
 
@@ -44,13 +44,13 @@ def next_steps(
         untestable: Ids of the causes that these recordings cannot test.
         shipped: Whether an extension is.
     """
-    steps = [f"To tell them apart: {c['separate_by']}." for c in causes if c["separate_by"]]
+    steps = [f"To tell them apart: {c.separate_by}." for c in causes if c.separate_by]
     if verdict == "explained" and not shipped:
-        remedies = dict.fromkeys(c["remedy"] for c in causes if c["family"] != "noise")
+        remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
         steps.append(f"Against it: {'; '.join(remedies)}.")
     elif verdict != "ambiguous":
         steps.append(_STEPS[verdict])
-    named = [CATALOGUE[c["id"]].words for c in causes if c["id"] in CATALOGUE]
+    named = [CATALOGUE[c.id].words for c in causes if c.id in CATALOGUE]
     steps += dict.fromkeys(words.advice for words in named if words.advice)
     missing = [text for i in untestable if (text := CATALOGUE[i].words.recording)]
     if missing and verdict != "not_testable":

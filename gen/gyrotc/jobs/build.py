@@ -21,6 +21,7 @@ from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
 from ..pages.report import write_report
 from ..quantise.applied import applied_of
 from ..results.changes import Changes
+from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Evaluation
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
@@ -51,7 +52,7 @@ class Built:
     verification: Verification
     refused: dict[str, str]
     failures: tuple[str, ...]
-    diagnosis: dict[str, Any] | None = None
+    diagnosis: Diagnosed | None = None
     limits: HeldLimits | None = None
     changes: Changes | None = None
 
@@ -198,7 +199,7 @@ def _build_axis(
 
 def _extended(
     dataset: Dataset, work: Path, options: FitOptions, say: Progress
-) -> tuple[Fitted | None, dict[str, Any]]:
+) -> tuple[Fitted | None, Diagnosed]:
     """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
     from .diagnosis import diagnose_into
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..dataset import Dataset
 from ..diagnose import Diagnosis, diagnose
@@ -18,6 +17,7 @@ from ..model import Model
 from ..outputs import json_text, result_folder, write_atomically
 from ..pages.diagnosis_page import PICTURES, write_diagnosis_page
 from ..pages.diagnosis_plots import draw
+from ..results.diagnosed import Diagnosed, NamedCause
 from ..texts import toml_comment, toml_key, toml_value
 from ..train.fitting import FitOptions
 
@@ -51,38 +51,38 @@ def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagn
     """Writes a diagnosis into a folder; its result then names the files."""
     if progress:
         progress("drawing")
-    result = dict(found.result)
-    if result["extended"] is not None and found.model is not None:
+    result = found.result
+    if result.extended is not None and found.model is not None:
         found.model.save(out / _MODEL)
-        result["extended"] = result["extended"] | {"model": _MODEL}
+        result = result.model_copy(update={"extended": result.extended.model_copy(update={"model": _MODEL})})
     scenario = extended_scenario(result)
     if scenario is not None:
         write_atomically(out / _SCENARIO, scenario)
-        result["scenario"] = _SCENARIO
-    result["pictures"] = []
-    for name, svg in draw(found).items():
+        result = result.model_copy(update={"scenario": _SCENARIO})
+    drawn = draw(found)
+    for name, svg in drawn.items():
         write_atomically(out / PICTURES / f"{name}.svg", svg)
-        result["pictures"].append(f"{PICTURES}/{name}.svg")
-    write_atomically(out / "diagnose.json", json_text(result))
+    result = result.model_copy(update={"pictures": tuple(f"{PICTURES}/{name}.svg" for name in drawn)})
+    write_atomically(out / "diagnose.json", json_text(result.content()))
     write_diagnosis_page(out)
     return replace(found, result=result)
 
 
-def extended_scenario(result: dict[str, Any]) -> str | None:
+def extended_scenario(result: Diagnosed) -> str | None:
     """A scenario file whose gyro has the causes that were found; None where none was.
 
     Profiles are the packaged ones: who knows the chamber's programme puts it in their place.
     """
-    causes = [c for c in result["causes"] if c["family"] != "noise" and c["parameters"]]
+    causes = [cause for cause in result.physical if cause.parameters]
     if not causes:
         return None
     lines = [
-        f"# Causes that gyrotc diagnose found in {toml_comment(result['serial'])}, with their fitted parameters.",
+        f"# Causes that gyrotc diagnose found in {toml_comment(result.serial)}, with their fitted parameters.",
         "# The profiles are those of the scenario named here; put your chamber's in their place.",
         'extends = "separating"',
-        f"title = {toml_value('the separating profiles with what was found in ' + result['serial'])}",
+        f"title = {toml_value('the separating profiles with what was found in ' + result.serial)}",
     ]
-    noise = result["estimated_noise"]
+    noise = result.estimated_noise
     if noise:
         lines += [
             "",
@@ -94,14 +94,14 @@ def extended_scenario(result: dict[str, Any]) -> str | None:
     return "\n".join(lines) + "\n"
 
 
-def _cause(cause: dict[str, Any]) -> Iterator[str]:
-    values = {name: p["value"] for name, p in cause["parameters"].items()}
-    if "channel" in cause:
-        yield from ("", "[[channel]]", f"name = {toml_value(cause['channel'])}")
+def _cause(cause: NamedCause) -> Iterator[str]:
+    values = {name: p.value for name, p in cause.parameters.items()}
+    if cause.channel is not None:
+        yield from ("", "[[channel]]", f"name = {toml_value(cause.channel)}")
         yield f"level = {toml_value(values.get('reference', 0.0))}"
-    yield from ("", "[[cause]]", f"id = {toml_value(cause['id'])}")
-    if "channel" in cause:
-        yield f"channel = {toml_value(cause['channel'])}"
+    yield from ("", "[[cause]]", f"id = {toml_value(cause.id)}")
+    if cause.channel is not None:
+        yield f"channel = {toml_value(cause.channel)}"
     for name, value in values.items():
         if math.isfinite(value):
             yield f"{toml_key(name)} = {toml_value(value)}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from ..errors import InputError
 from ..inputs import read_input
-from ..inputs.stored import read_result
+from ..results.base import read_result
+from ..results.diagnosed import Diagnosed, GainOnUnseen
 from ..texts import checked_svg
 from .report import page_environment, page_from, write_page
 
@@ -29,30 +29,30 @@ def write_diagnosis_page(folder: Path) -> Path:
     Raises:
         InputError: `diagnose.json` is missing, broken or of another kind.
     """
-    result = read_result(folder / "diagnose.json", "diagnose")
+    result = read_result(folder / "diagnose.json", Diagnosed)
     with page_from(folder / "diagnose.json"):
         text = (
             page_environment()
             .get_template("diagnosis.html.j2")
             .render(
                 d=result,
-                physical=[c for c in result["causes"] if c["family"] != "noise"],
-                noise=[c for c in result["causes"] if c["family"] == "noise"],
+                physical=result.physical,
+                noise=result.noise,
                 gains=list(_gains(result)),
-                limits=[c for c in result["considered"] if c["detection_limit"]],
+                limits=[c for c in result.considered if c.detection_limit],
                 pictures=_pictures(folder, result),
             )
         )
     return write_page(folder, text)
 
 
-def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, Markup]:
+def _pictures(folder: Path, result: Diagnosed) -> dict[str, Markup]:
     """Pictures by name; one that is missing is left out.
 
     Raises:
         InputError: One is more than a drawing.
     """
-    paths = [folder / PICTURES / Path(str(name)).name for name in result.get("pictures", [])]
+    paths = [folder / PICTURES / Path(name).name for name in result.pictures or ()]
     found = {}
     for path in (p for p in paths if p.is_file()):
         try:
@@ -62,18 +62,15 @@ def _pictures(folder: Path, result: dict[str, Any]) -> dict[str, Markup]:
     return found
 
 
-def _gains(result: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+def _gains(result: Diagnosed) -> list[tuple[str, GainOnUnseen]]:
     """Gain of the whole extension where it is shipped, else of every cause, by where it was measured."""
-    seen = (
-        "exam runs" if result.get("measured_on") == "exam" else "parts left out in turn, causes chosen anew"
-    )
-    extended = result["extended"]
+    seen = "exam runs" if result.measured_on == "exam" else "parts left out in turn, causes chosen anew"
+    extended = result.extended
     if extended is None:
-        causes = [c for c in result["causes"] if c["gain"]]
-        return [(f"{seen}: {c['name'][0].lower()}{c['name'][1:]}", c["gain"]) for c in causes]
-    rows = [(seen, extended["gain"])]
-    if extended["rate_left_out"]:
-        rows.append((f"“{extended['rate_left_out']['environment']}” left out", extended["rate_left_out"]))
-    if extended["forward_in_time"]:
-        rows.append(("forward in time", extended["forward_in_time"]))
+        return [(f"{seen}: {c.name[0].lower()}{c.name[1:]}", c.gain) for c in result.causes if c.gain]
+    rows = [(seen, extended.gain)]
+    if extended.rate_left_out:
+        rows.append((f"“{extended.rate_left_out.environment}” left out", extended.rate_left_out))
+    if extended.forward_in_time:
+        rows.append(("forward in time", extended.forward_in_time))
     return rows

@@ -45,8 +45,7 @@ def draw(found: Diagnosis) -> dict[str, str]:
     analysis, extension = found.analysis, found.extension
     if analysis is None or extension is None:
         return {}
-    named = [c for c in found.result["causes"] if c["family"] != "noise"]
-    causes = analysis.attribution.causes[: len(named)]
+    causes = analysis.attribution.causes[: len(found.result.physical)]
     term = _beyond_the_map(analysis.search.bank.map, causes) if causes else None
     made: dict[str, str | None] = {
         "residual": _residual_over_time(analysis.records, analysis.ensemble, term)
@@ -60,7 +59,7 @@ def draw(found: Diagnosis) -> dict[str, str]:
         made[f"likelihood-{number + 1}"] = _likelihood(cause)
     if causes:
         made["before-and-after"] = _before_and_after(
-            extension.before, extension.after, found.result["average_s"]
+            extension.before, extension.after, found.result.average_s
         )
     return {name: svg for name, svg in made.items() if svg is not None}
 

@@ -15,12 +15,12 @@ import pyarrow.csv as pacsv
 
 from ..errors import InputError
 from ..inputs import need_memory, open_input, refuse_above
-from ..inputs.stored import read_result as read_stored
 from ..metrics import Averages, average
 from ..model import Model, load_model
 from ..outputs import result_folder, write_atomically
 from ..results.base import read_optional, read_result
 from ..results.changes import Changes
+from ..results.diagnosed import Diagnosed
 from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
 from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
@@ -54,7 +54,7 @@ def write_report(folder: Path) -> Path:
     beside = {
         "verification": read_optional(folder / "verify.json", Verification),
         "manifest": read_optional(folder / "manifest.json", Manifest),
-        "diagnosis": read_stored(folder / "diagnosis" / "diagnose.json", "diagnose", optional=True),
+        "diagnosis": read_optional(folder / "diagnosis" / "diagnose.json", Diagnosed),
         "limits": read_optional(folder / "limits.json", HeldLimits),
         "changes": read_optional(folder / "changes.json", Changes),
     }

@@ -13,7 +13,7 @@ __all__ = [
     "SignatureCheck", "Verification", "VerifiedFile", "VerifiedTarget", "WorstError",
 ]  # fmt: skip
 
-Verdict = Literal["pass", "fail"]
+PassOrFail = Literal["pass", "fail"]
 
 
 class Cost(Part):
@@ -94,7 +94,7 @@ class VerifiedFile(Part):
     verdict: Literal["equal", "differs", "missing", "foreign", "edited"] = Field(
         description="`foreign`: gyrotc does not make it; `edited`: it differs, which `--allow-edited` allows"
     )
-    status: Verdict = Field(description="whether it is as it has to be")
+    status: PassOrFail = Field(description="whether it is as it has to be")
     mismatches: Count = Field(description="lines or words that differ; 1 for what has none")
     line: Count | None = Field(default=None, description="first line that differs, from 1 on")
     word: Count | None = Field(default=None, description="first word of an image that differs, from 1 on")
@@ -106,7 +106,7 @@ class SignatureCheck(Part):
     """The signature of the emitted files."""
 
     file: str = Field(description="its name in `c/`")
-    status: Verdict = Field(description="whether the record of the files was signed with this key")
+    status: PassOrFail = Field(description="whether the record of the files was signed with this key")
     key: str = Field(description="SHA-256 of the public key")
     reason: str | None = Field(description="why it is not good; null where it is")
 
@@ -115,7 +115,7 @@ class MapError(Part):
     """Departure of the emitted map from the model, in one arithmetic."""
 
     numeric: str = Field(description="arithmetic")
-    status: Verdict = Field(description="whether the largest departure keeps to the bound")
+    status: PassOrFail = Field(description="whether the largest departure keeps to the bound")
     bound_dph: float = Field(description="proven for every input, deg/h")
     worst_dph: float = Field(description="largest found, deg/h")
     arithmetic_dph: float | None = Field(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class Extension:
     floor: float
     baseline_rms: float
     baseline_centers: int
-    measured_on: str
+    measured_on: Literal["exam", "left out"]
     before: list[Averages]
     after: list[Averages]
 

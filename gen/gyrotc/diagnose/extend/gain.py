@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics import MAD_TO_SIGMA, Averages, time_statistics
+from ...results.diagnosed import Estimate, GainOnUnseen
 
 __all__ = ["Gain", "floor_of", "gain_of"]
 
@@ -56,26 +56,28 @@ class Gain:
         """Whether the lower 95 % limit of before² − after² is above zero."""
         return self.difference_low > 0.0
 
-    def to_dict(self) -> dict[str, Any]:
-        return {
-            "exam_rms_before_dph": self.rms_before,
-            "exam_rms_after_dph": self.rms_after,
-            "share_of_excess_removed": self.share,
-            "low": self.low,
-            "high": self.high,
-            "rms_removed_dph": _with_limits(self.rms_before - self.rms_after, self.rms_removed),
-            "angle_1h_removed_arcsec": None
-            if self.angle_before is None or self.angle_after is None or self.angle_removed is None
-            else _with_limits(self.angle_before - self.angle_after, self.angle_removed),
-            "angle_1h_before_arcsec": self.angle_before,
-            "angle_1h_after_arcsec": self.angle_after,
-            "rms_30min_before_dph": self.half_hour_before,
-            "rms_30min_after_dph": self.half_hour_after,
-        }
+    def result(self) -> GainOnUnseen:
+        """As `diagnose.json` has it."""
+        angle = None
+        if self.angle_before is not None and self.angle_after is not None and self.angle_removed is not None:
+            angle = _with_limits(self.angle_before - self.angle_after, self.angle_removed)
+        return GainOnUnseen(
+            exam_rms_before_dph=self.rms_before,
+            exam_rms_after_dph=self.rms_after,
+            share_of_excess_removed=self.share,
+            low=self.low,
+            high=self.high,
+            rms_removed_dph=_with_limits(self.rms_before - self.rms_after, self.rms_removed),
+            angle_1h_removed_arcsec=angle,
+            angle_1h_before_arcsec=self.angle_before,
+            angle_1h_after_arcsec=self.angle_after,
+            rms_30min_before_dph=self.half_hour_before,
+            rms_30min_after_dph=self.half_hour_after,
+        )
 
 
-def _with_limits(value: float, limits: tuple[float, float]) -> dict[str, float]:
-    return {"value": value, "low": limits[0], "high": limits[1]}
+def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
+    return Estimate(value=value, low=limits[0], high=limits[1])
 
 
 def floor_of(runs: Sequence[Averages]) -> float:

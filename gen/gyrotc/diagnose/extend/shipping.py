@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from ...results.diagnosed import ShippingTrial
 from ...train import TrainingData, TrainingFailed
 from ...train.data import cleaned, joined, scaling_of
 from ...train.fitting import power_ons
@@ -45,15 +45,15 @@ class Shipping:
     before_dph: float | None
     after_dph: float | None
 
-    def content(self) -> dict[str, Any]:
-        """For the result."""
-        return {
-            "ships": bool(self.shipped),
-            "beside": self.rung,
-            "left_out": self.left_out,
-            "rms_before_dph": self.before_dph,
-            "rms_after_dph": self.after_dph,
-        }
+    def result(self) -> ShippingTrial:
+        """As `diagnose.json` has it."""
+        return ShippingTrial(
+            ships=bool(self.shipped),
+            beside=self.rung,
+            left_out=tuple(self.left_out),
+            rms_before_dph=self.before_dph,
+            rms_after_dph=self.after_dph,
+        )
 
 
 def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:

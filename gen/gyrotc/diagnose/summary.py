@@ -1,0 +1,320 @@
+"""What a diagnosis found, as `diagnose.json` holds it: figures, words, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from .. import __version__
+from ..dataset import Dataset
+from ..results.diagnosed import (
+    Baseline,
+    ComparedStatistic,
+    ConsideredCause,
+    Diagnosed,
+    Estimate,
+    ExtendedModel,
+    NamedCause,
+    SingleCycle,
+    StaticRate,
+    Statistic,
+    TriedMemories,
+    Unexplained,
+    Verdict,
+    WithoutRate,
+)
+from ..results.planned import DetectionLimit
+from ..terms import CATALOGUE, separate_by
+from ..train.fitting import FitOptions, front_end
+from .advice import VERDICTS, next_steps
+from .attribute.cycle_fits import memories
+from .attribute.intervals import Interval
+from .attribute.refine import Refined
+from .attribute.single_cycle import Cycle
+from .detect.detection_limits import Limit
+from .discrepancy.declared_noise import NoiseFinding
+from .extend.extension import Extension
+from .pipeline import Analysis
+from .signatures.candidates import diagnosed
+from .verdict import verdict_of
+from .words import NOISE_WORDS
+
+__all__ = ["not_testable", "summary_of"]
+
+_MOST_EQUIVALENT = 2  # rivals that are named; the page lists every cause with its p-value besides
+_WHOLE = 0.995  # a share of the removable error that shows as 100 %
+
+
+def _block_s(dataset: Dataset, options: FitOptions) -> float:
+    return front_end([r for r in dataset.runs if r.role == "train"], options.block_s).block_s
+
+
+def not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> Diagnosed:
+    """The result where temperature hardly changes: nothing can be decided."""
+    text = f"Temperature spans only {span_c:.2f} C: nothing can be learnt about temperature here."
+    return Diagnosed(
+        gyrotc_version=__version__,
+        serial=dataset.serial,
+        axis=dataset.axis,
+        verdict="not_testable",
+        block_s=_block_s(dataset, options),
+        average_s=options.average_s,
+        noise_floor_dph=None,
+        discrepancies=(),
+        causes=(),
+        estimated_noise=None,
+        baseline=None,
+        extended=None,
+        considered=tuple(_untested(i, text) for i in diagnosed()),
+        missing=(text,),
+        measured_on=None,
+        single_cycle=None,
+        shipping=None,
+        unexplained=None,
+        text=text,
+        meaning=VERDICTS["not_testable"],
+        next=tuple(next_steps("not_testable", [], [], shipped=False)),
+    )
+
+
+def summary_of(  # long: one line for each field of the result
+    dataset: Dataset,
+    analysis: Analysis,
+    extension: Extension,
+    causes: Sequence[Refined],
+    options: FitOptions,
+    cycle: Cycle | None,
+) -> Diagnosed:
+    """The result of a diagnosis.
+
+    Args:
+        causes: Those that are named, as the extension took them.
+        cycle: What a single chamber cycle tells; None where there are more.
+    """
+    verdict = verdict_of(analysis.attribution, analysis.noise)
+    if cycle is not None and causes:
+        verdict = "ambiguous" if cycle.rivals else "partial"
+    elif cycle is not None and cycle.not_testable:
+        verdict = "not_testable"
+    listed = tuple(_cause(analysis, extension, k) for k in range(len(causes)))
+    listed += tuple(_noise_cause(n) for n in analysis.noise)
+    untestable = _untestable(analysis, cycle)
+    extended = _extended(extension)
+    return Diagnosed(
+        gyrotc_version=__version__,
+        serial=dataset.serial,
+        axis=dataset.axis,
+        verdict=verdict,
+        block_s=_block_s(dataset, options),
+        average_s=options.average_s,
+        noise_floor_dph=extension.floor,
+        discrepancies=tuple(_statistics(analysis)),
+        causes=listed,
+        baseline=Baseline(exam_rms_dph=extension.baseline_rms, centers=extension.baseline_centers),
+        extended=extended,
+        considered=tuple(_considered(analysis, untestable)),
+        missing=tuple(f"{CATALOGUE[i].words.name}: {why}" for i, why in untestable.items()),
+        estimated_noise=_estimated_noise(analysis),
+        measured_on=extension.measured_on,
+        single_cycle=None if cycle is None else _single_cycle(cycle, extension),
+        shipping=extension.crossed.result(),
+        unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
+        text=_sentence(verdict, listed, extended, cycle.not_testable if cycle is not None else ""),
+        meaning=VERDICTS[verdict],
+        next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
+    )
+
+
+def _untestable(analysis: Analysis, cycle: Cycle | None) -> dict[str, str]:
+    """Causes that these recordings cannot test, and why."""
+    found = dict(analysis.search.bank.untestable)
+    if cycle is not None and cycle.not_testable:
+        found |= dict.fromkeys(memories(), cycle.not_testable)
+    return found
+
+
+def _single_cycle(cycle: Cycle, extension: Extension) -> SingleCycle:
+    """Every memory and every static dT/dt that was tried beside a map of T, best first."""
+    tried = (
+        TriedMemories(
+            states=tuple(
+                {"id": m.id, **{n: _estimate(i) for n in m.values}}
+                for m, i in zip(t.members, t.intervals, strict=True)
+            ),
+            rms_dph=t.rms_dph,
+            criterion=t.criterion,
+            resolved=t.resolved,
+        )
+        for t in cycle.tried
+    )
+    static = (StaticRate(powers=s.powers, rms_dph=s.rms_dph, criterion=s.criterion) for s in cycle.static)
+    return SingleCycle(
+        map_rms_dph=cycle.rms_dph,
+        turns=cycle.turns,
+        not_testable=cycle.not_testable or None,
+        gain=extension.steps[-1].result() if extension.steps else None,
+        static=tuple(static),
+        tried=tuple(tried),
+    )
+
+
+def _statistics(analysis: Analysis) -> Iterator[Statistic]:
+    """Statistics against the plain simulation and against the extended one."""
+    after = analysis.extended.discrepancies if analysis.extended is not None else ()
+    extended = {d.statistic: ComparedStatistic(**vars(d)) for d in after}
+    for d in analysis.ensemble.discrepancies:
+        yield Statistic(**vars(d), extended=extended.get(d.statistic))
+
+
+def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
+    attribution = analysis.attribution
+    cause = attribution.causes[k]
+    id = cause.candidate.id
+    near = attribution.rivals[k]
+    rivals = tuple(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
+    words = CATALOGUE[id].words
+    named = NamedCause(
+        id=id,
+        family=CATALOGUE[id].family,
+        name=words.name,
+        p_value=attribution.p_values[k],
+        parameters={n: _estimate(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
+        equivalent=rivals,
+        separate_by=separate_by(id, rivals[0]) if rivals else None,
+        gain=extension.steps[k].result(),
+        signature=words.signature,
+        remedy=words.remedy,
+        separable_from_d=analysis.separations[k],
+    )
+    channels = tuple(r.channel for r in near if r.channel is not None)
+    told = {"channel": cause.candidate.channel, "equivalent_channels": channels or None}
+    return named.model_copy(update={name: value for name, value in told.items() if value is not None})
+
+
+def _estimate(interval: Interval) -> Estimate:
+    return Estimate(value=interval.value, low=interval.low, high=interval.high)
+
+
+def _noise_cause(finding: NoiseFinding) -> NamedCause:
+    return NamedCause(
+        id=finding.id,
+        family="noise",
+        name=NOISE_WORDS[finding.id],
+        p_value=finding.p_value,
+        parameters={n: Estimate(value=v, low=None, high=None) for n, v in finding.parameters.items()},
+        equivalent=(),
+        separate_by=None,
+        gain=None,
+        signature=finding.text,
+        remedy="declare what was measured, or mend the instrument",
+    )
+
+
+def _extended(extension: Extension) -> ExtendedModel | None:
+    if extension.extended is None or extension.total is None:
+        return None
+    left = extension.rate_left_out
+    return ExtendedModel(
+        exam_rms_dph=extension.total.rms_after,
+        centers=extension.extended.n_centers,
+        terms=tuple(e.id for e in extension.shipped if CATALOGUE[e.id].table is not None),
+        model=None,
+        gain=extension.total.result(),
+        rate_left_out=None if left is None else WithoutRate(environment=left[0], **dict(left[1].result())),
+        forward_in_time=None if extension.forward is None else extension.forward.result(),
+    )
+
+
+def _estimated_noise(analysis: Analysis) -> dict[str, float]:
+    """Noise at the likeliest colour in the terms of a scenario; a Markov part has no such term."""
+    view, block_s = analysis.after.likeliest, analysis.records.block_s
+    colour = view.colour
+    flicker = colour.slow if colour.tau_s == 0.0 else 0.0
+    levels = {
+        "arw_deg_per_sqrt_h": np.sqrt(colour.white * block_s / 3600.0),
+        "bias_instability_dph": np.sqrt(flicker * np.pi / np.log(4.0)),
+        "rate_random_walk_dph_per_sqrt_h": np.sqrt(colour.walk),
+        "quantum_arcsec": block_s * np.sqrt(12.0 * colour.quantum),
+    }
+    return {name: float(view.scale * value) for name, value in levels.items() if value > 0.0}
+
+
+def _considered(analysis: Analysis, untestable: Mapping[str, str]) -> list[ConsideredCause]:
+    """Every cause of the catalogue with its adjusted p-value and its detection limit."""
+    best: dict[tuple[str, str | None], float] = {}
+    for found in analysis.attribution.first:
+        key = found.candidate.id, found.candidate.channel
+        best[key] = min(found.p_value, best.get(key, np.inf))
+    out = {"structure", *untestable}
+    every = [_tested(analysis, *key, p_value) for key, p_value in best.items() if key[0] not in out]
+    every += [_untested(id, why) for id, why in untestable.items()]
+    order = list(diagnosed())
+    return sorted(every, key=lambda cause: order.index(cause.id))
+
+
+def _tested(analysis: Analysis, id: str, channel: str | None, p_value: float) -> ConsideredCause:
+    limit = analysis.limits.get(id if channel is None else f"{id}:{channel}")
+    cause = ConsideredCause(
+        id=id,
+        family=CATALOGUE[id].family,
+        p_value=p_value,
+        detection_limit=None if limit is None else _limit(limit),
+    )
+    return cause if channel is None else cause.model_copy(update={"channel": channel})
+
+
+def _untested(id: str, why: str) -> ConsideredCause:
+    return ConsideredCause(
+        id=id, family=CATALOGUE[id].family, p_value=None, detection_limit=None, not_testable=why
+    )
+
+
+def _limit(limit: Limit) -> DetectionLimit:
+    return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
+
+
+def _unexplained(analysis: Analysis) -> Unexplained:
+    """What is left: how much of the structure the best cause holds, and where the rest lies."""
+    attribution = analysis.attribution
+    return Unexplained(
+        share_explained=attribution.share,
+        p_value=attribution.misfit_p,
+        best_partial_match=tuple(c.candidate.id for c in attribution.causes),
+        looks_like=attribution.other.name if attribution.other.lead > 0.0 else None,
+    )
+
+
+def _sentence(
+    verdict: Verdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
+) -> str:
+    """The finding in one or two sentences; `undecided` says why a single cycle cannot tell of memory."""
+    why = f" about memory of the temperature: {undecided}" if undecided else ""
+    causes = [c for c in found if c.family != "noise"]
+    names = "; ".join(
+        f"{name} (twice)" if sum(c.name == name for c in causes) > 1 else name
+        for name in dict.fromkeys(c.name for c in causes)
+    )
+    noise = "; ".join(c.name for c in found if c.family == "noise")
+    text = {
+        "consistent": "Nothing was found beyond the static map and the declared noise.",
+        "explained": f"{names}.",
+        "ambiguous": f"{names}, or equally well: {', '.join(_rivals(causes))}.",
+        "partial": f"{names}, and structure remains that no cause explains.",
+        "noise_differs": f"{noise}.",
+        "unexplained": "There is structure that no cause of the catalogue explains.",
+        "not_testable": f"The recordings cannot decide{why}.",
+    }[verdict]
+    share = extended.gain.share_of_excess_removed if extended is not None else None
+    if share is None:
+        return text
+    amount = "all" if share >= _WHOLE else f"{share:.0%}"
+    return f"{text} On unseen runs the extension removes {amount} of the removable error."
+
+
+def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:
+    """Names of causes that explain the runs as well, with their channels."""
+    for cause in causes:
+        for id in cause.equivalent:
+            channels = ", ".join(cause.equivalent_channels or ())
+            yield CATALOGUE[id].words.name + (f" ({channels})" if CATALOGUE[id].needs.channel else "")

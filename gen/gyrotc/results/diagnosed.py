@@ -1,0 +1,231 @@
+"""`diagnose.json`: what the simulation gets wrong about recordings, the named causes, and what an extension gains."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .base import Axis, Count, Figure, Part, Result
+from .planned import DetectionLimit
+
+__all__ = [
+    "Baseline",
+    "ComparedStatistic",
+    "ConsideredCause",
+    "Diagnosed",
+    "Estimate",
+    "ExtendedModel",
+    "GainOnUnseen",
+    "NamedCause",
+    "ShippingTrial",
+    "SingleCycle",
+    "StaticRate",
+    "Statistic",
+    "TriedMemories",
+    "Unexplained",
+    "Verdict",
+    "WithoutRate",
+]  # fmt: skip
+
+Verdict = Literal[
+    "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"
+]
+
+
+class Estimate(Part):
+    """A figure with its 95 % interval."""
+
+    value: float = Field(description="the likeliest")
+    low: Figure = Field(description="lower end; null where there is no interval")
+    high: Figure = Field(description="upper end; null where there is no interval")
+
+
+class GainOnUnseen(Part):
+    """What causes gain on runs that they were not fitted to."""
+
+    exam_rms_before_dph: float = Field(description="RMS of the static map, deg/h")
+    exam_rms_after_dph: float = Field(description="RMS with the causes, deg/h")
+    share_of_excess_removed: Figure = Field(
+        description="share of the removable error that is removed; null where next to nothing is removable"
+    )
+    low: Figure = Field(description="lower 95 % limit of the share")
+    high: Figure = Field(description="upper 95 % limit of the share")
+    rms_removed_dph: Estimate = Field(description="difference of both RMS, deg/h")
+    angle_1h_removed_arcsec: Estimate | None = Field(
+        description="of the RMS angle after an hour, arcsec; null where no run lasts an hour"
+    )
+    angle_1h_before_arcsec: Figure = Field(description="of the static map, arcsec")
+    angle_1h_after_arcsec: Figure = Field(description="with the causes, arcsec")
+    rms_30min_before_dph: Figure = Field(description="RMS of means over 30 minutes, of the static map, deg/h")
+    rms_30min_after_dph: Figure = Field(description="the same with the causes, deg/h")
+
+
+class WithoutRate(GainOnUnseen):
+    """The gain on an environment that was left out of everything."""
+
+    environment: str = Field(description="the one with the fastest temperature")
+
+
+class ComparedStatistic(Part):
+    """A statistic of the residuals against simulated campaigns."""
+
+    statistic: str = Field(description="its name")
+    measured: float = Field(description="of the recordings")
+    simulated_mean: float = Field(description="mean of the simulated campaigns")
+    simulated_low: float = Field(description="lower end of their middle 95 %")
+    simulated_high: float = Field(description="upper end of their middle 95 %")
+    p_value: float = Field(description="how often chance departs as far")
+
+
+class Statistic(ComparedStatistic):
+    """A statistic against the plain simulation, and against the one with what was found."""
+
+    extended: ComparedStatistic | None = Field(description="null where nothing was found")
+
+
+class NamedCause(Part):
+    """A cause, or a kind of noise, that was found."""
+
+    id: str = Field(description="of the catalogue of causes, or of a kind of noise")
+    family: str = Field(description="of the cause; `noise` for noise")
+    name: str = Field(description="in words")
+    p_value: Figure = Field(description="adjusted for the whole search")
+    parameters: dict[str, Estimate] = Field(description="fitted parameters by name")
+    equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
+    separate_by: str | None = Field(description="the experiment that would tell them apart")
+    gain: GainOnUnseen | None = Field(description="null for noise")
+    signature: str = Field(description="how it shows")
+    remedy: str = Field(description="what stands against it")
+    separable_from_d: dict[str, float] | None = Field(
+        default=None, description="size, in standard deviations, from which each other cause is ruled out"
+    )
+    channel: str | None = Field(default=None, description="of a recorded channel")
+    equivalent_channels: tuple[str, ...] | None = Field(
+        default=None, description="channels that explain the runs as well"
+    )
+
+
+class Baseline(Part):
+    """The static map."""
+
+    exam_rms_dph: float = Field(description="RMS on runs it was not fitted to, deg/h")
+    centers: Count = Field(description="of its networks")
+
+
+class ExtendedModel(Part):
+    """The model with terms for the causes."""
+
+    exam_rms_dph: float = Field(description="RMS on runs it was not fitted to, deg/h")
+    centers: Count = Field(description="of its networks")
+    terms: tuple[str, ...] = Field(description="ids of causes in its table; empty: a finer map")
+    model: str | None = Field(description="its file; null where none was written")
+    gain: GainOnUnseen = Field(description="over the static map")
+    rate_left_out: WithoutRate | None = Field(description="null where there is one environment")
+    forward_in_time: GainOnUnseen | None = Field(
+        description="on runs later than all that was learnt from; null without dates"
+    )
+
+
+class ConsideredCause(Part):
+    """A cause of the catalogue."""
+
+    id: str = Field(description="of the catalogue of causes")
+    family: str = Field(description="of the cause")
+    p_value: Figure = Field(description="adjusted for the whole search; null: not testable")
+    detection_limit: DetectionLimit | None = Field(description="what could still hide")
+    channel: str | None = Field(default=None, description="of a recorded channel")
+    not_testable: str | None = Field(default=None, description="why these recordings cannot test it")
+
+
+class TriedMemories(Part):
+    """Memories beside a map of temperature alone."""
+
+    states: tuple[dict[str, str | Estimate], ...] = Field(description="`id` and parameters of each")
+    rms_dph: float = Field(description="what they leave, deg/h")
+    criterion: float = Field(
+        description="twice the log-likelihood with the price of parameters; less is better"
+    )
+    resolved: bool = Field(description="whether this cycle fixes the parameters")
+
+
+class StaticRate(Part):
+    """A map of temperature with products of it and of its rate beside it."""
+
+    powers: tuple[tuple[int, int], ...] = Field(description="of temperature and of its rate")
+    rms_dph: float = Field(description="what it leaves, deg/h")
+    criterion: float = Field(description="as that of the memories")
+
+
+class SingleCycle(Part):
+    """What one chamber cycle tells."""
+
+    map_rms_dph: float = Field(description="what a map of temperature alone leaves, deg/h")
+    turns: Count = Field(description="how often the temperature turns")
+    not_testable: str | None = Field(
+        description="why memory cannot be told from a static map; null where it can"
+    )
+    gain: GainOnUnseen | None = Field(
+        description="of the best memories on unseen runs; null where there are none"
+    )
+    static: tuple[StaticRate, ...] = Field(description="what needs no memory, the best first")
+    tried: tuple[TriedMemories, ...] = Field(description="the best first")
+
+
+class ShippingTrial(Part):
+    """Whether an extension is shipped, by stretches of training history left out in turn."""
+
+    ships: bool = Field(description="whether it is")
+    beside: str = Field(description="correction that would be emitted without it")
+    left_out: tuple[str, ...] = Field(description="what was left out, in words")
+    rms_before_dph: Figure = Field(description="over these stretches without it, deg/h; null: not tried")
+    rms_after_dph: Figure = Field(description="over these stretches with it, deg/h; null: not tried")
+
+
+class Unexplained(Part):
+    """Structure that has no name."""
+
+    share_explained: float = Field(description="by the best causes")
+    p_value: float = Field(description="of what they leave")
+    best_partial_match: tuple[str, ...] = Field(description="ids of the best causes")
+    looks_like: str | None = Field(description="in words")
+
+
+class Diagnosed(Result):
+    """What the static map does not explain, and why (`gyrotc diagnose`)."""
+
+    schema_: Annotated[Literal["gyrotc.diagnose/1"], Field(alias="schema")] = "gyrotc.diagnose/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    verdict: Verdict = Field(description="see docs/diagnosis.md")
+    block_s: float = Field(description="length of a block, s")
+    average_s: float = Field(description="averaging of all RMS figures, s")
+    noise_floor_dph: Figure = Field(description="of the runs that were judged, deg/h")
+    discrepancies: tuple[Statistic, ...] = Field(description="the rarest first")
+    causes: tuple[NamedCause, ...] = Field(description="what was found")
+    baseline: Baseline | None = Field(description="null where nothing could be decided")
+    extended: ExtendedModel | None = Field(description="null where nothing gains on unseen runs")
+    considered: tuple[ConsideredCause, ...] = Field(description="the whole catalogue")
+    missing: tuple[str, ...] = Field(description="what these recordings cannot test, and why")
+    estimated_noise: dict[str, float] | None = Field(
+        description="levels as `[noise]` of a scenario has them; null where nothing could be decided"
+    )
+    measured_on: Literal["exam", "left out"] | None = Field(description="where the gain was measured")
+    single_cycle: SingleCycle | None = Field(description="null where there are more cycles")
+    shipping: ShippingTrial | None = Field(description="null where nothing could be decided")
+    unexplained: Unexplained | None = Field(description="null where everything has a name")
+    text: str = Field(description="the finding in words")
+    meaning: str = Field(description="what the verdict means")
+    next: tuple[str, ...] = Field(description="what to do, the most telling first")
+    scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
+    pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
+
+    @property
+    def physical(self) -> tuple[NamedCause, ...]:
+        """Causes that are not noise."""
+        return tuple(cause for cause in self.causes if cause.family != "noise")
+
+    @property
+    def noise(self) -> tuple[NamedCause, ...]:
+        """Kinds of noise that were found."""
+        return tuple(cause for cause in self.causes if cause.family == "noise")
