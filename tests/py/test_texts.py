@@ -188,7 +188,7 @@ class _Page(HTMLParser):
         self.elements.append(("!--", data))
 
 
-_KEPT = ("schema", "verdict", "family", "status")  # words that decide what a page shows
+_KEPT = ("schema", "verdict", "family", "status", "measured_on")  # words that decide what a page shows
 
 
 def _with(value: Any, text: Callable[[], str], key: str = "") -> Any:
@@ -327,7 +327,7 @@ _DIAGNOSIS: dict[str, Any] = {
     "schema": "gyrotc.diagnose/1",
     "gyrotc_version": "1",
     "serial": "s",
-    "axis": "x",
+    "axis": None,
     "verdict": "explained",
     "text": "t",
     "meaning": "m",
