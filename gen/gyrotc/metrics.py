@@ -25,10 +25,10 @@ MAD_TO_SIGMA = 1.0 / NormalDist().inv_cdf(0.75)
 LEAST_SPAN_C = 2.0
 """A smaller span of temperature says nothing about temperature (finding `no_temperature_information`)."""
 
-_HALF_HOUR_S = 1800.0
-_HOUR_S = 3600.0
-_FIRST_S = 600.0
-_BIN_BYTES = 24
+_HALF_HOUR_S = 1800.0  # the name of the figure says it
+_HOUR_S = 3600.0  # the name of the figure says it
+_FIRST_S = 600.0  # ten minutes: the name of the figure says it
+_BIN_BYTES = 24  # of a mean while it is made: its count, its number and a sum
 
 
 @dataclass(frozen=True, slots=True)

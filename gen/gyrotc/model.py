@@ -50,7 +50,7 @@ __all__ = [
 SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
-_MAX_CENTERS = 512
+_MAX_CENTERS = 512  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.

@@ -13,7 +13,7 @@ from ..terms import CATALOGUE
 
 __all__ = ["limits_of", "pair_of", "plan_parts"]
 
-_NEVER = 90.0
+_NEVER = 90.0  # where two causes overlap wholly d is 100 (`plan.separate`: √(10 / 1e-3))
 _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next to nothing
 
 

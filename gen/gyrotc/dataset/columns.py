@@ -14,7 +14,7 @@ __all__ = ["Layout", "arrange"]
 
 PULSES = "pulses"
 AXES = {"rate_x_dph": "x", "rate_y_dph": "y", "rate_z_dph": "z"}
-_LONGEST_NAME = 64
+_LONGEST_NAME = 64  # characters: fits a line of a page and of a terminal
 
 
 @dataclass(frozen=True, slots=True)

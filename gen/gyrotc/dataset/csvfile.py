@@ -26,9 +26,9 @@ from .values import Fault
 
 __all__ = ["CsvFile"]
 
-_BLOCK_BYTES = 2**20
-_LONGEST_LINE = 2**20
-_LF, _CR = 10, 13
+_BLOCK_BYTES = 2**20  # of a read: bounds memory
+_LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
+_LF, _CR = 10, 13  # ASCII line feed and carriage return
 _COPIES = 2.0  # of the columns while they are checked
 _IMPORT = "`gyrotc import` reads other forms"
 _NAN = ("nan", "+nan", "-nan")

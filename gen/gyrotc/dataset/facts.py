@@ -13,16 +13,18 @@ from .records import EarthRate, Floats, Rows, Run
 
 __all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
 
-_GAP_PERIODS = 1.5
+_GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
-_CELL_ROWS = 5
-_HOLD_C_PER_MIN = 0.1
-_JUMP_SIGMAS = 10.0
+_CELL_ROWS = 5  # fewer do not average the resolution of a thermometer
+_HOLD_C_PER_MIN = 0.1  # slower than this a chamber holds, or settles
+_JUMP_SIGMAS = 10.0  # no normal deviation reaches it
 _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
 _HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
-_MAX_JUMPS = 20
-_OUTLIER_SIGMAS = 8.0
+_MAX_JUMPS = 20  # that are listed: enough to see a pattern
+_OUTLIER_SIGMAS = 8.0  # a normal row lies beyond it once in 8e14
 _OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
+# Widths of counters in the processors and FPGAs that read gyros out
+# Widths of counters in the processors and FPGAs that read gyros out
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _PART = 2**16  # rows that are looked at together
 

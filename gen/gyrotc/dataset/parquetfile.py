@@ -17,8 +17,8 @@ from .values import Fault
 
 __all__ = ["ParquetFile"]
 
-_BATCH_ROWS = 2**16
-_HARMLESS_BYTES = 2**26
+_BATCH_ROWS = 2**16  # of a read: half a MiB a column
+_HARMLESS_BYTES = 2**26  # 64 MiB, which any host has: below it no ratio of packing is asked about
 _COPIES = 2.0  # of the columns while they are checked
 _DAMAGE = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)  # of whatever pyarrow meets
 

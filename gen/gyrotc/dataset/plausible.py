@@ -22,19 +22,19 @@ __all__ = ["Suspicion", "earth_suspicion", "suspicions"]
 Floats = NDArray[np.float64]
 
 _HOTTEST_C = 125.0  # upper end of the military range; beyond it are down-hole gyros, whose owners know
-_COLDEST_C = -90.0
+_COLDEST_C = -90.0  # as `values` has it
 _FASTEST_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _RISE_C = 5.0  # of a change that is looked at, in six steps of which none is nearly half of it
-_STEPS = 6
-_LARGEST_STEP = 0.4
+_STEPS = 6  # of temperature that a rise must last: a single wild reading has two
+_LARGEST_STEP = 0.4  # share of the rise: of six even steps each is 0.17, of a jump one is nearly 1
 _FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
-_QUIETEST = 0.1 * _FLOWN
+_QUIETEST = 0.1 * _FLOWN  # ten times quieter than the quietest gyro is no gyro
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
 _FEWEST_CELLS = 30  # less is not judged
 _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
 _TRIAD = 0.03  # relative; how near three means come to Earth's rate by chance is of this order
 _ALONG = 0.1  # relative; a bias is that much of Earth's component
-_SMALLEST_ALONG_DPH = 1.0
+_SMALLEST_ALONG_DPH = 1.0  # deg/h: a smaller component of Earth's rate is not told from a bias
 _RATES = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 648000.0 / np.pi}  # in deg/h
 _TIMES = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0}  # in s
 

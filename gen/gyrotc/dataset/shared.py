@@ -25,9 +25,9 @@ __all__ = ["Fingerprints", "fingerprints_of", "sketch", "windows_in_common", "wi
 Words = NDArray[np.uint64]
 
 _SCALES = (7, 10)  # windows of 2^7 and, for coarse rates, 2^10 rows
-_ONE_IN = 16
+_ONE_IN = 16  # power of 2; a sixteenth of the windows finds a shared stretch of a few hundred rows
 _BITS = 80.0  # 2^50 alignments of two dozen runs of 100 h at 100 Hz, and a false alarm in 2^30 data sets
-_TABLE = 2**20
+_TABLE = 2**20  # counters: 4 MiB of float32
 _PART, _OVERLAP = 2**18, 2**11  # rows that are looked at together, and those seen again with the next
 _CONTEXT = 4  # doublings: patterns are known by sixteen rows
 _PATTERN = 3  # windows that a recording holds this often are a pattern
@@ -35,7 +35,7 @@ _FIRST, _SECOND = (
     np.uint64(0x9E3779B97F4A7C15),
     np.uint64(0xBF58476D1CE4E5B9),
 )  # SplitMix64, Steele et al. 2014
-_SKETCH = 128
+_SKETCH = 128  # hashes: rows that two gyros share are seen from a twentieth on (docs/fleet.md)
 
 
 @dataclass(frozen=True, slots=True)

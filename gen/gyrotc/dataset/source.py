@@ -15,7 +15,7 @@ from .values import Fault
 
 __all__ = ["Prefix", "Source"]
 
-_BLOCK_BYTES = 2**22
+_BLOCK_BYTES = 2**22  # of a read: bounds memory
 
 
 class Prefix(io.RawIOBase):

@@ -13,10 +13,12 @@ from .records import Floats
 
 __all__ = ["MIN_ROWS", "Fault", "faults", "likely_temperature", "rate_faults"]
 
-MIN_ROWS = 10
-_TEMPERATURE_C = (-90.0, 200.0)
-_RATE_DPH = (-7.5e6, 7.5e6)
-_TIME_S = (-1e10, 1e10)
+MIN_ROWS = 10  # a file of fewer rows is a mistake, not a recording
+_TEMPERATURE_C = (-90.0, 200.0)  # the target holds samples outside: docs/numerics.md, section 1
+_RATE_DPH = (-7.5e6, 7.5e6)  # a little above 2000 deg/s, the widest usual range; no table holds more
+_TIME_S = (-1e10, 1e10)  # three hundred years: seconds of any epoch, not milliseconds or nanoseconds
+# Comparisons with it let NaN and infinities be found without an array of their own
+# Comparisons with it let NaN and infinities be found without an array of their own
 _LARGEST = float(np.finfo(np.float64).max)
 _KELVIN = (183.15, 473.15)  # the plausible range, had it been given in kelvin
 

@@ -20,6 +20,7 @@ _NUMBERS = {"fallback": 1, "authority": 2, "effect": 2, "rezero": 1, "scale": 3,
 _COUNTS = (
     "n_networks", "n_centers", "n_channels", "n_terms", "coverage_cells", "sigma_cells", "n_sigma", "n_probes",
 )  # fmt: skip
+# Words of a record: docs/FORMAT.md, section 3
 _RECORDS = {"networks": 8, "centers": 5, "guards": 8, "terms": 8, "probes": 4}
 _TITLES = {"f32": "float32", "q31": "fixed point"}
 _ARRAY_COMMENTS = {

@@ -15,9 +15,9 @@ from .numbers import Arithmetic, Numbers
 
 __all__ = ["BELIEVED", "HELD", "RESTART", "believe"]
 
-HELD, BELIEVED, RESTART = 0, 1, 2
-_MAX_GAP = 65535
-_NEW_TRUTH = 3
+HELD, BELIEVED, RESTART = 0, 1, 2  # any three numbers
+_MAX_GAP = 65535  # samples, where the target stops counting: docs/numerics.md, step 2
+_NEW_TRUTH = 3  # suspects that agree: docs/numerics.md, step 2
 
 
 def believe(

@@ -29,7 +29,7 @@ __all__ = [
     "with_missing",
 ]
 
-MAP, KEEP, FALLBACK = 0, 1, 2
+MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small

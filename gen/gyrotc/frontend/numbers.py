@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
-_MISSING_Q31 = -(2**31)
+_MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
 _LARGEST = 2**31 - 1
 
 

@@ -24,13 +24,13 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 T = TypeVar("T", bound=np.generic)
 
-_SIGMAS = 7.0
-_MAD_TO_SIGMA = 1.4826
+_SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
+_MAD_TO_SIGMA = 1.4826  # of a normal distribution, as `metrics` derives it
 _AROUND = 5  # blocks of a running median
 _GROUP = 200  # rows, at least, of one scale
-_GROUP_BLOCKS = 10
+_GROUP_BLOCKS = 10  # blocks, at least, of one scale: the same where rows are few to a block
 _BURST = 0.1  # share of departing rows from which a block is left out whole
-_BURST_ROWS = 10
+_BURST_ROWS = 10  # with fewer rows a block, one spike alone would be a tenth of it
 _SLACK = 3.0  # changes of the level from block to block that the bias itself may make
 _FEW = 5  # rows a block from which its median means something
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Blocks", "blocks_since_power_on", "missed_before", "period_us", "run_blocks", "samples_per_block"]
 
 _GAP = 1.5  # median row periods
-_MAX_MISSED = 2**32 - 1
+_MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,9 +25,9 @@ _EPOCH_S = (
     1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
 )
 _NAT = np.iinfo(np.int64).min
-_WRAPS = (2**16, 2**24, 2**32)
+_WRAPS = (2**16, 2**24, 2**32)  # counters of 16, 24 and 32 bits
 _PERIODS_S = (86_400.0, 604_800.0)  # seconds of the day, time of the GPS week
-_NEAR_STEPS = 20.0
+_NEAR_STEPS = 20.0  # usual steps that may be lost while a counter passes its end
 _ZONE = re.compile(r"\b(?:GMT|UTC) ?([+-]\d{2}:?\d{2})")
 
 

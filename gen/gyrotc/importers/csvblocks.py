@@ -11,8 +11,8 @@ from .csvdialect import Dialect
 
 __all__ = ["blocks_of", "lines_of"]
 
-_BLOCK_BYTES = 2**23
-_LONGEST_LINE = 2**20
+_BLOCK_BYTES = 2**23  # of a read: bounds memory; its whole lines are parsed at once
+_LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
 
 
 def blocks_of(

@@ -21,7 +21,7 @@ __all__ = ["Dialect", "dialect_of"]
 
 _DELIMITERS = (";", "\t", ",", "|", "whitespace")
 _COMMENTS = ("#", "%", "//", "!", "*")
-_ENOUGH = 0.8
+_ENOUGH = 0.8  # share of the rows below a header that must be numbers: loggers leave cells empty
 _LAST, _FEWEST = 60, 5  # lines that are looked at, at most and at least
 T = TypeVar("T")
 

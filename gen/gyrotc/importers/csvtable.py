@@ -21,8 +21,8 @@ from .tables import Chunk, Column, LoggerFile, Table
 
 __all__ = ["CsvTable", "open_csv"]
 
-_HEAD_BYTES = 2**18
-_SAMPLE = 40
+_HEAD_BYTES = 2**18  # for guessing a dialect: about a thousand lines
+_SAMPLE = 40  # rows, half of them from the end, where formats that change show
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 

@@ -20,7 +20,7 @@ from .tables import LoggerFile
 
 __all__ = ["description_of", "kept_map", "run_name", "serial_of", "sha256_of", "size_of"]
 
-_BLOCK_BYTES = 2**22
+_BLOCK_BYTES = 2**22  # of a read: bounds memory
 
 
 def kept_map(chosen: Map, file: LoggerFile, plan: Plan, rows: Rows) -> Map:

@@ -15,7 +15,7 @@ from .tables import Column, LoggerFile, library, numbers
 __all__ = ["open_hdf5"]
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
-_MOST_COLUMNS = 64
+_MOST_COLUMNS = 64  # of a two-dimensional set that is taken apart: wider ones are pictures
 
 
 def open_hdf5(path: Path) -> LoggerFile:

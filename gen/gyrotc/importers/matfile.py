@@ -18,7 +18,7 @@ from .tables import Column, LoggerFile, numbers
 
 __all__ = ["open_mat"]
 
-_DEEPEST = 4
+_DEEPEST = 4  # structures within one another: deeper ones are no tables
 
 
 def open_mat(path: Path) -> LoggerFile:  # long: one branch for each form of the file

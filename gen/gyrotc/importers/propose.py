@@ -25,7 +25,7 @@ _CHANNELS = {
     "current": "A", "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "",
     "fan": "",
 }  # fmt: skip
-_MOST_CHANNELS = 12
+_MOST_CHANNELS = 12  # that are proposed: a person has to read the list
 
 
 def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:

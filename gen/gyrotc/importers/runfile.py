@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 __all__ = ["Format", "RunFile"]
 
 Format = Literal["csv", "parquet"]
-_GROUP_ROWS = 2**20
+_GROUP_ROWS = 2**20  # of a row group: Arrow's own default
 
 
 class RunFile:

@@ -21,7 +21,7 @@ from .forms import MONTHS, pattern_of
 __all__ = ["Stamps", "zone_of"]
 
 Ints = NDArray[np.int64]
-_DAY_NS = 86_400_000_000_000
+_DAY_NS = 86_400_000_000_000  # 86,400 s
 
 
 def zone_of(text: str) -> ZoneInfo | int:

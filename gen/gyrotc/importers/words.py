@@ -15,7 +15,7 @@ from .tables import LoggerFile
 __all__ = ["preview", "proposal", "summary"]
 
 _NATIVE = {"time": "s", "temperature": "C", "rate": "deg/h"}
-_MOST_NAMES = 12
+_MOST_NAMES = 12  # that are listed in a line of a terminal
 
 
 def proposal(file: LoggerFile, plan: Plan, rows: Rows) -> Iterator[str]:

@@ -26,7 +26,7 @@ __all__ = ["checked", "parse_json", "parse_toml", "read_json", "read_toml"]
 T = TypeVar("T")
 
 _LONGEST_INTEGER = 64  # bits, signed; TOML v1.0.0, "Integer"
-_SHOWN = 60
+_SHOWN = 60  # characters of what is refused: half a line of a terminal
 # A key of more parts than tables may be nested costs the parser the square of their number.
 _LONG_KEY = r"""(?<![\w-])(?:(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){%d}"""
 

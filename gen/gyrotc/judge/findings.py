@@ -32,17 +32,17 @@ __all__ = [
 Finding = dict[str, Any]
 
 _UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
-_UNSEEN_TO_FLOOR = 3.0
-_WEIGHTS_TO_RANGE = 10.0
-_LEAST_COVERAGE = 0.25
-_OUTLIER_SIGMAS = 6.0
-_OUTLIER_SCATTER = 3.0
+_UNSEEN_TO_FLOOR = 3.0  # below it most of what is left is noise, whatever training left
+_WEIGHTS_TO_RANGE = 10.0  # times the swing: a digit of the correction is then lost to cancelling
+_LEAST_COVERAGE = 0.25  # below it three quarters of the envelope are interpolation
+_OUTLIER_SIGMAS = 6.0  # once in 5e8 normal runs
+_OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not told
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
 _GROSS_OUTLIER = 100.0  # times the noise of a row: no noise of a gyro, whatever its tails
 _PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature and rate of it
-_COMMON_PLACES = 5
+_COMMON_PLACES = 5  # fewer do not make a median
 _CONTRADICTION = 5.0  # times the scatter of a minute within such a place
-_LEAST_FREEDOM = 10
+_LEAST_FREEDOM = 10  # degrees of freedom: with fewer a scatter is known to no better than a quarter
 _OF_TRAINING = ("does_not_generalise", "map_refused", "map_beyond_data")
 _POLYNOMIALS = ("cubic", "cubic_slope")
 

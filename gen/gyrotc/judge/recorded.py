@@ -26,8 +26,8 @@ __all__ = [
 Finding = dict[str, Any]
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is reversed
-_PLACE_C = 1.0
-_LEAST_PLACES = 8
+_PLACE_C = 1.0  # what counts as the same temperature, as in `findings`
+_LEAST_PLACES = 8  # of eight places a correlation of 0.9 is chance in 0.2 % of cases
 _ALIKE = 0.9  # correlation of a run's mean curve over temperature with that of the others
 _STUCK_S, _STUCK_ROWS = (
     60.0,

@@ -13,7 +13,7 @@ from .lock import Lock
 
 __all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
-_MOST_BYTES = 2**30
+_MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
 
 unfinished: list[Path] = []

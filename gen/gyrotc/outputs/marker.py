@@ -47,7 +47,7 @@ NEW = ".gyrotc-new"
 OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
 """Names by which gyrotc keeps its books in a folder: the marker, one being written, what exchanges are tried on."""
 
-_MOST_BYTES = 2**26
+_MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,12 +32,12 @@ __all__ = ["draw"]
 
 Array = NDArray[np.float64]
 
-_SMOOTH_S = 1800.0
-_LEVEL = 0.01
+_SMOOTH_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
+_LEVEL = 0.01  # familywise level of the search (docs/diagnosis.md)
 _MOVING = 0.1  # C/min
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _WITHIN_95 = float(chdtri(1, 0.05))  # fall of 2 log likelihood of one parameter at 95 % (Wilks 1938)
-_LINEAR = 20.0
+_LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
 
 
 def draw(found: Diagnosis) -> dict[str, str]:

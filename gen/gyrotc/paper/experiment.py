@@ -26,7 +26,7 @@ __all__ = ["AVERAGE_S", "METHODS", "Cell", "Experiment", "Group", "experiment"]
 
 Array = NDArray[np.float64]
 
-AVERAGE_S = 100.0
+AVERAGE_S = 100.0  # the paper's means
 METHODS = {
     "constant": "a constant",
     "mlr": "MLR",
@@ -34,7 +34,7 @@ METHODS = {
     "mrbf_paper": "modified RBFNN",
     "mrbf": "gyrotc, one model",
 }
-_BLOCK_S = 10.0
+_BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,8 +38,8 @@ from .shortest import shortest
 
 __all__ = ["plan"]
 
-_AVERAGE_S = 100.0
-_PICTURE_POINTS = 200
+_AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
+_PICTURE_POINTS = 200  # of a run: as many as a picture a few centimetres wide shows
 _HARD = 10.0  # d above which two causes count as hard to tell apart
 
 

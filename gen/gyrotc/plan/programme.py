@@ -22,7 +22,7 @@ __all__ = ["Programme", "library", "programme_of"]
 Array = NDArray[np.float64]
 
 _ROW_CELLS = 10  # simulated seconds in a row
-_AVERAGE_S = 100.0
+_AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
 _LIBRARY = "separating"  # its profiles are what is proposed besides a scenario's own
 
 

@@ -12,7 +12,7 @@ from .sensitivity import Sensitivity
 
 __all__ = ["Shortest", "shortest"]
 
-_MOST_RUNS = 60
+_MOST_RUNS = 60  # bounds the search
 _UNSEEN = 1e3  # times the required limit: what counts for a cause that would not be seen at all
 
 

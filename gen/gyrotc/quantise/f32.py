@@ -30,7 +30,7 @@ _INPUT_GRID = 2.0**-21  # largest error of a normalised input by its rounding to
 _GAIN = 8.0 * math.sqrt(math.log2(math.e))  # u = 64 log2(e) d²/δ²
 _POLYNOMIAL = 6.7e-9  # of 2^(-f/64), relative
 _TINY = 2.0**-80  # smaller weights could make subnormal products
-_MAX_ABS_Z = 8.0
+_MAX_ABS_Z = 8.0  # half ranges, as `words` has it for every table: docs/numerics.md rests on it
 _SHARE = 4.0 * _UNIT  # relative error of a share of a bank: two differences, their quotient
 
 

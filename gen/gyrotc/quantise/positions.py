@@ -20,14 +20,14 @@ from .solve import exp2_of_minus
 
 __all__ = ["POSITIONS", "InputScale", "Inputs", "Surface", "difference", "position_scale", "surface_of"]
 
-POSITIONS = 65536
-_UNITS_PER_C = 65536.0
-_GAIN_BITS = 27
-_SQRT_LOG2E = 1.2011224087864498
-_SQRT_LN2 = 0.8325546111576977
+POSITIONS = 65536  # 16 bits of an input: docs/numerics.md, section 3
+_UNITS_PER_C = 65536.0  # fixed point holds a temperature in 2^-16 C: docs/FORMAT.md
+_GAIN_BITS = 27  # position = offset · gain · 2^-27: docs/numerics.md, section 3
+_SQRT_LOG2E = 1.2011224087864498  # √(log2 e)
+_SQRT_LN2 = 0.8325546111576977  # √(ln 2)
 # Largest |d/dx| and |d²/dx²| of 2^-(α x)², as factors of α and α².
 _SLOPE = STEEPEST * _SQRT_LN2
-_CURVE = 2.0 * 0.6931471805599453
+_CURVE = 2.0 * 0.6931471805599453  # 2 ln 2
 
 Floats = NDArray[np.floating[Any]]
 

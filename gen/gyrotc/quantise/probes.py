@@ -18,8 +18,8 @@ from ..reference.table import Table, Words
 
 __all__ = ["N_PROBES", "with_probes"]
 
-N_PROBES = 8
-_CANDIDATES = 256
+N_PROBES = 8  # known answers in a table: docs/FORMAT.md, section 3
+_CANDIDATES = 256  # inputs of which the most telling are taken; more find no better ones
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)  # 1/p, 1/p² of p³ = p + 1: an even spread in the plane
 #: Each sum fused alone, and what compilers make of all: either of the squares, with everything else.
 _BUILDS = (

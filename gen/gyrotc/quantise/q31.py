@@ -29,13 +29,17 @@ from .terms import q31_terms, term_size_dph
 __all__ = ["table_of"]
 
 _INPUT = 65536.0  # units of a temperature in C
-_MAX_SPAN = 2**26
+_MAX_SPAN = 2**26  # 1024 C in 2^-16 C: an offset times 32 then fits 32 bits
 _FINEST = 28  # largest number of fraction bits of an argument
 _COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
-_LARGEST_ARGUMENT = 2**31 - 1
+_LARGEST_ARGUMENT = 2**31 - 1  # a signed 32-bit word
 _MAX_FACTOR = 65535  # of s
-_SOLVE_POINTS = 256
+_SOLVE_POINTS = 256  # of each input: weights are solved for on this grid, whose time grows with it
+# Of the normal equations, which it keeps solvable where Gaussians nearly coincide: docs/numerics.md, section 3
+# Of the normal equations, which it keeps solvable where Gaussians nearly coincide: docs/numerics.md, section 3
 _RIDGE = 1e-6
+# Of each input: the bound is loose by what a surface grows within a cell, the time grows with their number
+# Of each input: the bound is loose by what a surface grows within a cell, the time grows with their number
 _GRID_CELLS = 512
 _SHARE = 2.0**-24  # unit of a share of a bank, which is cut off
 

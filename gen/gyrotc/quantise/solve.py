@@ -16,8 +16,8 @@ __all__ = ["exp2_of_minus", "gram", "solve"]
 
 Floats = NDArray[np.floating[Any]]
 
-_LN2 = 0.6931471805599453
-_DEGREE = 17
+_LN2 = 0.6931471805599453  # ln 2
+_DEGREE = 17  # of the series of e^y, |y| < ln 2: what is left out is below 2^-60
 
 
 def exp2_of_minus(u: Any) -> Floats:

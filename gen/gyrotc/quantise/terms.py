@@ -16,7 +16,7 @@ from ..terms.recursion import TableKind
 
 __all__ = ["channel_names", "f32_terms", "q31_terms", "term_size_dph"]
 
-_PARAMETERS = 6
+_PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, section 3
 _LIMIT = 2**30  # of parameters in fixed point that are multiplied
 
 _PER_C = {TableKind.MEMORY: 1, TableKind.PLAY: 1}  # which parameter is an amplitude in deg/h/C

@@ -26,8 +26,8 @@ Fused = frozenset[str]
 FUSIBLE = ("grid", "linear", "square of T", "square of slope", "polynomial", "weight")
 _NONE: Fused = frozenset()
 
-ENTRIES = 64
-_CUT = 32 * ENTRIES
+ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
+_CUT = 32 * ENTRIES  # 64ths of an octave: a Gaussian is 0 beyond 32 octaves
 #: ((f - H)² + G) c = 2^(-f/64) (1 + 6.7e-9) for |f| <= 1/2
 _H = np.float32(float.fromhex("0x1.71549ep+6"))
 _G = np.float32(float.fromhex("0x1.0a69ccp+13"))

@@ -27,7 +27,7 @@ _SINE_F32 = tuple(
 _SINE_Q31 = (161942, -5016767, 85564854, -693597876, 1686629674)  # 2^-30
 _ROUND = np.float32(1.5 * 2**23)
 _ONE, _FOUR = np.float32(1.0), np.float32(4.0)
-_LARGEST = 2**31 - 1
+_LARGEST = 2**31 - 1  # a signed 32-bit word
 
 
 class _F32(Floating):

@@ -27,17 +27,17 @@ __all__ = [
     "normalise",
 ]
 
-ENTRIES = 64
+ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
 CUT = 32 << 24  # u in 2^-24
 POSITION_BITS = 27  # gain of an input: position = offset * gain * 2^-27
 _H = np.uint64(1557473452)  # 2^-24
 _G = np.uint64(558709134)  # 2^-16
-_TOP = 2052389455
+_TOP = 2052389455  # 2^-29 of one, at the top of the table: docs/numerics.md, section 3
 #: |2^-29 exp2(u) - 2^-v| for every v that truncates to u; proved by visiting every u (tests/py/test_reference.py)
 GAUSS_ERROR = 2.9e-8
 
-_FULL_SHARE = 2**24
-_LAST_POSITION = 65535
+_FULL_SHARE = 2**24  # one, in 2^-24
+_LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
 
 Integers = NDArray[np.int64]
 

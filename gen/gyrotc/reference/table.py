@@ -26,10 +26,10 @@ __all__ = [
     "f32_words",
 ]
 
-LAYOUT = 2
-MAGIC = 0x47544331
-MISSING_Q31 = -(2**31)
-_ARITHMETIC = {"f32": 1, "q31": 2}
+LAYOUT = 2  # docs/FORMAT.md, section 3
+MAGIC = 0x47544331  # "GTC1" in ASCII
+MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
+_ARITHMETIC = {"f32": 1, "q31": 2}  # docs/FORMAT.md, section 3
 _INPUT_BITS = 16  # q31: temperatures in 2^-16 C
 
 #: Arrays of a table in the order of the image, with the words of one record (0: not in records).

@@ -23,7 +23,7 @@ __all__ = ["BiasMap", "draw"]
 Array = NDArray[np.float64]
 
 T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
-R_LIMIT_C_PER_MIN = 2.5
+R_LIMIT_C_PER_MIN = 2.5  # half of the fastest ramp of a chamber: the cavity follows slowly
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,8 +45,8 @@ _DECLARED = (
     "rate_random_walk_dph_per_sqrt_h",
     "quantum_arcsec",
 )
-_DEFAULT_PULSE_ARCSEC = 0.01
-_PULSES_PER_QUANTUM = 16
+_DEFAULT_PULSE_ARCSEC = 0.01  # finer than the noise of any row, so that only a declared quantum shows
+_PULSES_PER_QUANTUM = 16  # a power of 2, so that pulses and quantum are exact multiples
 
 
 def simulate(

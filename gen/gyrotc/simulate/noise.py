@@ -21,9 +21,9 @@ __all__ = ["CELL_S", "CellNoise", "bridge_arcsec", "cell_noise", "quantised", "w
 
 Array = NDArray[np.float64]
 
-CELL_S = 1.0
+CELL_S = 1.0  # s: noise is drawn once a second and bridged between (docs/simulation.md)
 _SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
-_REFERENCE_C = 20.0
+_REFERENCE_C = 20.0  # room temperature, at which data sheets state a noise
 
 
 @dataclass(frozen=True, slots=True)

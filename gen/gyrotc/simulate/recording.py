@@ -21,8 +21,8 @@ __all__ = ["Chunk", "RowLength", "rows"]
 
 Array = NDArray[np.float64]
 
-_CHUNK_ROWS = 200_000
-_MOST = 10_000
+_CHUNK_ROWS = 200_000  # at once: 1.6 MB a column
+_MOST = 10_000  # rows a second or seconds a row: faster than any gyro is read, slower than any is logged
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from .recording import Chunk
 __all__ = ["Format", "RunFile"]
 
 Format = Literal["csv", "parquet"]
-_RATE_DECIMALS = 9
-_DECIMALS = 6
+_RATE_DECIMALS = 9  # deg/h: far below the noise of any row
+_DECIMALS = 6  # s, C: far below the resolution of any logger
 
 
 class _Writer(Protocol):

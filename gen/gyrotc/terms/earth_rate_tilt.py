@@ -17,8 +17,8 @@ from .words import Telling, Words
 
 __all__ = ["EARTH_RATE_DPH", "TERM"]
 
-EARTH_RATE_DPH = 15.041067
-_REFERENCE_C = 20.0
+EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
+_REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:

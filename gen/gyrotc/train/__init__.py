@@ -43,7 +43,7 @@ NETWORK_METHODS = (*SIMPLE, "mrbf_t", *METHODS[2:])
 """Those whose map is networks alone, so that a table can hold it."""
 AUTO = "auto"
 """The ladder: the simplest correction that does on unseen history what the best one does."""
-_MAX_CENTERS = 512
+_MAX_CENTERS = 512  # what a table holds: docs/FORMAT.md, "Legal ranges"
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
 _GUARDED = ("mrbf", "mrbf_t")
 

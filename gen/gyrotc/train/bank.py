@@ -18,7 +18,7 @@ from .result import Outcome
 __all__ = ["fit_bank"]
 
 _HOLD = 0.1  # |dT/dt| of a hold, share of the half range; the hold's region reaches to twice that
-_MIN_SAMPLES = 100
+_MIN_SAMPLES = 100  # a quarter of an hour in blocks of 10 s: with fewer a region has no map of its own
 
 
 def fit_bank(

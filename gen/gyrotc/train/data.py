@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 # Floors of the scale, so that a constant input is not divided by 0.
 _MIN_HALF_RANGE_C = 1.0
-_MIN_HALF_RANGE_C_PER_MIN = 0.05
+_MIN_HALF_RANGE_C_PER_MIN = 0.05  # rates of a chamber at rest must not be blown up to a whole range
 _BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
 
 

@@ -54,12 +54,12 @@ __all__ = [
 
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0  # as long as the paper's means
-_HOLD_S = 300.0
-_MAX_RATE_C_PER_MIN = 30.0
-_MAX_STEP_C = 1.0
+_HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
+_MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
+_MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse thermometer
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
 _UNCERTAINTY_CELLS = (6, 4)  # of T and of dT/dt: 24 words in a table
-_MIN_SAMPLES = 8
+_MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 

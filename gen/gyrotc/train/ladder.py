@@ -45,7 +45,7 @@ Correction = Callable[[Floats, Floats], Floats]
 MAPS = ("mrbf_t", "mrbf")
 RUNGS = ("nothing", *SIMPLE, *MAPS)
 """From the simplest to the richest."""
-_SIGNIFICANCE = 0.05
+_SIGNIFICANCE = 0.05  # of the t test against the constant: docs/training.md, section 2
 _LEAST_PIECES = 3  # runs or power-ons: with fewer their scatter says nothing
 _LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by rounding only
 

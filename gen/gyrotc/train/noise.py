@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 _CLIP = 4.5  # robust σ, as outliers are dropped in training (process.py)
 _SIGNIFICANCE = 1e-3  # of each test: docs/training.md, section 1, step 5
 _LAGS = 10  # of the autocorrelation, Ljung and Box 1978
-_LEAST_DIFFERENCES = 6
+_LEAST_DIFFERENCES = 6  # with fewer a median says nothing
 
 
 def robust_sigma(x: Floats) -> float:

@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 
 _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
-_LEAST_SPAN_C_PER_MIN = 0.1
-_S_PER_H = 3600.0
+_LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
+_S_PER_H = 3600.0  # s in an hour
 
 
 def stretches(values: Floats, time_s: Floats, run: NDArray[np.int64], step_s: float) -> list[Floats]:

@@ -25,7 +25,7 @@ __all__ = ["MEAN_S", "Process", "TrainingFailed", "conditioned", "fit_process"]
 
 Floats = NDArray[np.float64]
 
-MEAN_S = 50.0
+MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
 _TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
 _TRIMS = 3  # rounds of dropping and fitting again
 _TRIM_SHARE = (

@@ -27,12 +27,12 @@ __all__ = ["Fold", "Span", "history_folds", "training_spans", "turning_points"]
 Floats = NDArray[np.float64]
 
 _ENOUGH_RUNS = 3  # docs/recordings.md: fewer are cut into spans
-_EQUAL_PARTS = 5
+_EQUAL_PARTS = 5  # docs/training.md, section 2: of a single run without turning points
 _SHORTEST_BRANCH_S = 300.0  # docs/recordings.md: branches of at least five minutes
-_SMOOTHING_S = 60.0
-_GUARD_S = 100.0
+_SMOOTHING_S = 60.0  # a thermometer's noise is averaged, a turn of a chamber stays
+_GUARD_S = 100.0  # docs/training.md, section 2: as long as the means that are judged
 _SMALLEST_TURN_C = 1.0  # a smaller swing of temperature is noise or control, not a branch
-_SMALLEST_TURN_SHARE = 0.05
+_SMALLEST_TURN_SHARE = 0.05  # of the span: smaller turns are the control of a chamber
 _LEAST_SPAN_C = 2.0  # less temperature than this has no branches and no ends
 _TAIL_SHARE = 0.1  # of the range of temperature, at either end
 _FAST_SHARE = 0.8  # of the largest |dT/dt|

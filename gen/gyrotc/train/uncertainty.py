@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 _POINTS = 3  # in each direction of a cell
 _SPANS = 5  # a single run is cut into so many
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
-_ROUNDS = 5
+_ROUNDS = 5  # of weighting anew by what was found; chosen, not derived
 _SIGNIFICANT = float(chdtri(2, 0.05))  # κ² and τ² are two parameters: chi-square with two degrees of freedom
 
 

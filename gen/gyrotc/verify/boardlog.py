@@ -19,8 +19,8 @@ __all__ = ["BoardLog", "BoardOutput", "Comparison", "Cost", "compare", "read_log
 
 Words = NDArray[np.uint32]
 Line = tuple[int, str]
-_GROUP = 256
-_SHOWN_MISMATCHES = 5
+_GROUP = 256  # results to a CRC: BOARD_CRC of board_test.c
+_SHOWN_MISMATCHES = 5  # enough to see a pattern
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _BEGIN = re.compile(
     r"begin (?P<id>\S+) (?P<numeric>\w+) (?P<mode>all|crc) (?P<model>[0-9a-f]{8}) (?P<random>[0-9a-f]{8})"

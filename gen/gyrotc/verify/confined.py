@@ -20,7 +20,7 @@ from ..errors import CheckFailed
 
 __all__ = ["LIMIT_S", "Run", "confined", "run_to_end"]
 
-LIMIT_S = 600
+LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).
 # Addresses: qemu-user reserves the 4 GiB of a 32-bit processor, which are addresses without memory behind them.
 # A file: the answers to a recording of 350 million rows. Shells count in KiB, and files in blocks of 512 bytes.

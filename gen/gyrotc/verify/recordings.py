@@ -19,7 +19,7 @@ from .toolchain import Target
 
 __all__ = ["replay_dataset"]
 
-_SHOWN_MISMATCHES = 5
+_SHOWN_MISMATCHES = 5  # enough to see a pattern
 
 
 @dataclass(slots=True)

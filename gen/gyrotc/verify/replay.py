@@ -28,7 +28,7 @@ from .toolchain import Target, compile_c, run_program
 
 __all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
 
-_SHOWN_MISMATCHES = 5
+_SHOWN_MISMATCHES = 5  # enough to see a pattern
 _MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
 
 

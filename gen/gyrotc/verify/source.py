@@ -22,7 +22,7 @@ __all__ = ["board_files", "checked_sources", "table_files"]
 
 Check = Callable[[bytes], str | None]
 
-_MAX_BYTES = 16 * 2**20
+_MAX_BYTES = 16 * 2**20  # 16 MiB: bounds what is read of a folder that is not trusted
 _N = r"(f32|q31)"
 _TEXT = C_COMMENT.pattern
 _NOTE = rf"(?: +/\* {_TEXT} \*/)?"

@@ -46,7 +46,7 @@ C_FLAGS = (
 _HERE = Path(__file__).resolve().parent
 _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
-_SHOWN_LINES = 12
+_SHOWN_LINES = 12  # of what a compiler says: the first error stands there
 _SYMBOL = re.compile(r"[0-9A-Fa-f]+ (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
 
