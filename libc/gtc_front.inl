@@ -14,6 +14,7 @@
 /* So many suspects in a row that agree are the new truth. */
 #define NEW_TRUTH 3U
 
+/* A float counts up to here exactly, and sums of words keep to 64 bits. */
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
 /* Words of a guard. */

@@ -139,7 +139,7 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
 
 /* ---- angle increments -------------------------------------------------------------------- */
 
-#define MICROSECONDS 1000000
+#define MICROSECONDS 1000000 /* in a second */
 
 /* The rest of the division is carried on. 1 deg/h is 1 arcsec/s. */
 int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int_least32_t dt, int_least32_t *increment)

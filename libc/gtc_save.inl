@@ -13,6 +13,7 @@
 #define SAVE_OPTIONS \
     (ARITHMETIC + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
 
+/* Words before the state: magic, options, CRC of the table. */
 #define SAVE_HEAD 3U
 #define CRC_AT (GTC_SAVE_WORDS - 1)
 

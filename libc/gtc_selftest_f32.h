@@ -11,7 +11,7 @@
 #ifndef GTC_SELFTEST_F32_H_INCLUDED
 #define GTC_SELFTEST_F32_H_INCLUDED
 
-#define N_ARITHMETIC 12U
+#define N_ARITHMETIC 12U /* rows of vectors */
 #define N_JOINED 3U /* rows of operands ... */
 #define N_SHAPES 8U /* ... for so many sums of products, as the runtime has them */
 

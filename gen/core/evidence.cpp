@@ -17,12 +17,12 @@ using Eigen::VectorXd;
 
 constexpr int kOfT = 40;         // functions of temperature alone, shared by s1 and s2
 constexpr int kCoupledT = 10;    // functions of the coupled part, by input
-constexpr int kCoupledR = 8;
+constexpr int kCoupledR = 8;     // 121 in all: docs/training.md, section 1, step 2
 constexpr int kBasis = 1 + kOfT + kCoupledT * kCoupledR;
 constexpr double kReach = 1.4;            // domain over largest |input|: the basis vanishes at its edge
 constexpr double kConstVariance = 100.0;  // of the constant, in units of the bias' variance
-constexpr double kVarianceFloor = 1e-10;
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kVarianceFloor = 1e-10;  // a function that is not used keeps the equations solvable
+constexpr double kPi = 3.14159265358979323846;  // C++ has it from C++20 on
 
 // Log-normal priors of the parameters: weak, but they keep unused parts from drifting.
 const EvidenceParameters kPriorMean =

@@ -22,7 +22,7 @@ constexpr double kWall = 0.02;  // stiffness of a wall, in units of the cloud's 
 constexpr double kWidthsT[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
 constexpr double kWidthsR[] = {0.1, 0.25, 0.6, 1.2, 3.0};
 
-constexpr int kMaxRefineSteps = 40;
+constexpr int kMaxRefineSteps = 40;  // bounds the time; the tolerance ends a refinement before
 constexpr double kRelativeTolerance = 0.01;  // a step that gains less of the objective ends the refinement
 constexpr int kExactGains = 200;  // of so many candidates the gain is computed exactly
 

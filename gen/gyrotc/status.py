@@ -17,9 +17,6 @@ __all__ = [
 ]
 
 # Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
-# Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
-# Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
-# Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
 OK = 0
 WARMING = 1
 CLAMPED = 2

@@ -17,6 +17,7 @@ sys.path.insert(0, str(TOOL))
 import analysers  # noqa: E402
 import lengths  # noqa: E402
 import objects  # noqa: E402
+import origins  # noqa: E402
 import source  # noqa: E402
 
 CRC = "libc/gtc_crc.c"
@@ -43,7 +44,7 @@ def _append(path: Path, text: str) -> None:
 
 
 def test_cheap_promises_are_kept() -> None:
-    names = ["words", "functions", "cplusplus", "symbols", "writable", "lengths"]
+    names = ["words", "functions", "cplusplus", "symbols", "writable", "lengths", "origins"]
     done = subprocess.run([sys.executable, str(TOOL), *names], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines() == [f"{name}: kept" for name in names]
@@ -219,3 +220,32 @@ def test_a_long_function_or_module_is_found(case: str, tmp_path: Path) -> None:
     (tmp_path / "gen" / "gyrotc").mkdir(parents=True)
     (tmp_path / "gen" / "gyrotc" / "a.py").write_text(text)
     assert len(list(lengths.long_python(tmp_path))) == broken
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "untold"),
+    [
+        ("a.py", "_A = 3\n", 1),
+        ("a.py", "_A = 3  # sides of a triangle\n", 0),
+        ("a.py", "# Sides of a triangle\n_A = 3\n", 0),
+        ("a.py", "# Sides of a triangle\n_A = 3\n_B = 4\n", 1),
+        ("a.py", "# Sides of a triangle, by Pythagoras:\n_A = 3\n_B = 4\n", 0),
+        ("a.py", '_A = 3\n"""Sides of a triangle."""\n', 0),
+        ("a.py", "_A = {'x': 0.5}\n_B, _C = 1, 2\n_D = np.float32(2.0**-9)\n_E = -7.0 * _X\n", 4),
+        ("a.py", "def f():\n    x = 3\nA = 'text'\nB = (1, 'x')\nC = True\nb = 5\n", 0),
+        ("a.h", "#define A 3U\n", 1),
+        ("a.h", "/* Sides. */\n#define A 3U\n#define B 4U\n\n#define C 5.5F\n", 1),
+        (
+            "a.h",
+            "#define A 0U\n#define B (1.0F)\n#define C (A + 3U)\nstatic const int d = 7; /* days */\n",
+            0,
+        ),
+        ("a.cpp", "constexpr double kA = 2.5;\nconst int kB = 7;  // days\n", 1),
+    ],
+)
+def test_a_number_without_its_origin_is_named(name: str, text: str, untold: int, tmp_path: Path) -> None:
+    place = {"py": "gen/gyrotc", "h": "libc", "cpp": "gen/core"}[name.partition(".")[2]]
+    (tmp_path / place).mkdir(parents=True)
+    (tmp_path / place / name).write_text(text)
+    found = [line for line in origins.unexplained_numbers(tmp_path) if "no constant" not in line]
+    assert len(found) == untold, found

@@ -13,12 +13,14 @@ from pathlib import Path
 import analysers
 import lengths
 import objects
+import origins
 import source
 
 CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "words": source.forbidden_words,
     "functions": source.long_functions,
     "lengths": lengths.long_python,
+    "origins": origins.unexplained_numbers,
     "warnings": objects.warnings,
     "cplusplus": objects.cplusplus,
     "symbols": objects.symbols,

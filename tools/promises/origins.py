@@ -8,100 +8,108 @@ from collections.abc import Iterator
 from pathlib import Path
 
 _NAME = re.compile(r"_?[A-Z][A-Z0-9_]*$")
-_C_NUMBER = re.compile(
-    r"^\s*(?:#\s*define\s+(?P<macro>\w+)\s+|(?:static\s+)?(?:inline\s+)?const(?:expr)?\s+\w+\s+(?P<name>\w+)\s*=\s*)"
-    r"\(?-?(?:\d|\.\d|0x)[\w.+-]*\)?"
+_CALLS = frozenset({"int", "float", "float32", "float64", "int64", "uint32", "uint64", "sqrt", "log"})
+_C_FILES = (".h", ".hpp", ".c", ".inl", ".cpp")
+_NUMBER = r"\(?-?(?:\d|\.\d)[\w.+-]*\)?"
+_C_CONSTANT = re.compile(
+    rf"(?:#\s*define\s+(?P<macro>\w+)\s+|(?:static |inline )*const(?:expr)? \w+ (?P<name>\w+) = )(?P<value>{_NUMBER})"
 )
+_TRIVIAL = re.compile(r"\(?[01](?:\.0)?[UuLlFf]*\)?$")
 
 
 def unexplained_numbers(root: Path) -> Iterator[str]:
     """Constants that are numbers, or tables of them, without a word about their origin.
 
-    A comment counts at the line of the name or on the line above; in Python also one in the lines of the value, and
-    a string that stands right after it. Of names that follow one another without an empty line the first one's
-    comment counts for all only if it stands above, on a line of its own, and ends with a colon.
+    In Python a comment in the lines of the constant or on the line above counts, a string right after it, and a
+    comment that ends with a colon above a block of constants, for all of them. In C and C++ a comment at the line
+    or above the block counts; 0 and 1 need none.
     """
-    package = root / "gen" / "gyrotc"
-    for path in sorted(package.rglob("*.py")):
-        yield from _python(path, path.relative_to(root))
+    found = 0
+    for path in sorted((root / "gen" / "gyrotc").rglob("*.py")):
+        for name, number, told in _python(path.read_text(encoding="utf-8")):
+            found += 1
+            if not told:
+                yield f"{path.relative_to(root)}:{number}: {name} does not say where it comes from"
     for folder in ("include", "libc", "gen/core"):
-        for path in sorted((root / folder).rglob("*")):
-            if path.suffix in (".h", ".c", ".inl", ".hpp", ".cpp"):
-                yield from _c(path, path.relative_to(root))
+        for path in sorted(p for p in (root / folder).rglob("*") if p.suffix in _C_FILES):
+            for name, number, told in _c(path.read_text(encoding="utf-8").splitlines()):
+                found += 1
+                if not told:
+                    yield f"{path.relative_to(root)}:{number}: {name} does not say where it comes from"
+    if not found:
+        yield f"{root}: no constant found"
 
 
-def _python(path: Path, place: Path) -> Iterator[str]:
-    text = path.read_text(encoding="utf-8")
+def _python(text: str) -> Iterator[tuple[str, int, bool]]:
+    """Name, line, and whether its origin is told, of every constant of a module."""
     lines = text.splitlines()
     body = ast.parse(text).body
     for node, after in zip(body, [*body[1:], None], strict=True):
-        name = _name(node)
-        if name is None or not _is_number(node.value):  # type: ignore[attr-defined]
+        if (
+            not isinstance(node, ast.Assign | ast.AnnAssign)
+            or node.value is None
+            or not _is_number(node.value)
+        ):
             continue
-        last = node.end_lineno or node.lineno
-        told = any("#" in line for line in lines[node.lineno - 1 : last]) or _text_follows(after)
-        if not told and not _above(lines, node.lineno - 1, "#"):
-            yield f"{place}:{node.lineno}: {name} does not say where it comes from"
+        name = _name(node.targets[0] if isinstance(node, ast.Assign) else node.target)
+        if name:
+            at = node.lineno - 1
+            told = any("#" in line for line in lines[at : node.end_lineno])
+            told = told or lines[at - 1].startswith("#") or _is_text(after)
+            yield name, node.lineno, told or _headed(lines, at)
 
 
-def _name(node: ast.stmt) -> str | None:
-    """Name of a constant that a statement sets."""
-    if isinstance(node, ast.Assign) and len(node.targets) == 1:
-        target = node.targets[0]
-    elif isinstance(node, ast.AnnAssign) and node.value is not None:
-        target = node.target
-    else:
-        return None
-    if isinstance(target, ast.Tuple):
-        names = [t.id for t in target.elts if isinstance(t, ast.Name)]
-        return ", ".join(names) if names and all(map(_NAME.match, names)) else None
-    return target.id if isinstance(target, ast.Name) and _NAME.match(target.id) else None
+def _name(target: ast.expr) -> str:
+    names = target.elts if isinstance(target, ast.Tuple) else [target]
+    found = [name.id for name in names if isinstance(name, ast.Name) and _NAME.match(name.id)]
+    return ", ".join(found) if len(found) == len(names) else ""
 
 
 def _is_number(value: ast.expr) -> bool:
     """A number, an expression of numbers, or a tuple or dictionary of them."""
-    if isinstance(value, ast.Constant):
-        return isinstance(value.value, int | float) and not isinstance(value.value, bool)
-    if isinstance(value, ast.UnaryOp):
-        return _is_number(value.operand)
-    if isinstance(value, ast.BinOp):
-        return _is_number(value.left) or _is_number(value.right)
-    if isinstance(value, ast.Tuple | ast.List):
-        return bool(value.elts) and all(map(_is_number, value.elts))
-    if isinstance(value, ast.Dict):
-        return bool(value.values) and all(map(_is_number, value.values))
-    if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id in ("float", "int"):
-        return True
+    match value:
+        case ast.Constant():
+            return isinstance(value.value, int | float) and not isinstance(value.value, bool)
+        case ast.UnaryOp():
+            return _is_number(value.operand)
+        case ast.BinOp():
+            return _is_number(value.left) or _is_number(value.right)
+        case ast.Tuple() | ast.List():
+            return bool(value.elts) and all(map(_is_number, value.elts))
+        case ast.Dict():
+            return bool(value.values) and all(map(_is_number, value.values))
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+            return name in _CALLS
     return False
 
 
-def _text_follows(after: ast.stmt | None) -> bool:
+def _is_text(node: ast.stmt | None) -> bool:
     return (
-        isinstance(after, ast.Expr)
-        and isinstance(after.value, ast.Constant)
-        and isinstance(after.value.value, str)
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
     )
 
 
-def _above(lines: list[str], index: int, *marks: str) -> bool:
-    """Whether a comment stands right above, or above a block of constants and ends with a colon."""
-    if index > 0 and lines[index - 1].lstrip().startswith(marks):
-        return True
-    while index > 0 and lines[index - 1].strip() and not lines[index - 1][0].isspace():
-        index -= 1
-        line = lines[index].strip()
-        if line.startswith(marks):
-            return line.removesuffix("*/").rstrip().endswith(":")
-    return False
+def _headed(lines: list[str], at: int) -> bool:
+    """Whether a comment that ends with a colon stands above the block of lines to which this one belongs."""
+    while at > 0 and lines[at - 1].strip() and not lines[at - 1].startswith("#"):
+        at -= 1
+    return at > 0 and lines[at - 1].startswith("#") and lines[at - 1].rstrip().endswith(":")
 
 
-def _c(path: Path, place: Path) -> Iterator[str]:
-    lines = path.read_text(encoding="utf-8").splitlines()
-    for index, line in enumerate(lines):
-        found = _C_NUMBER.match(line)
-        if found is None or "/*" in line or "//" in line:
+def _c(lines: list[str]) -> Iterator[tuple[str, int, bool]]:
+    """The same of the constants at file scope of a C or C++ file."""
+    for at, line in enumerate(lines):
+        found = _C_CONSTANT.match(line)
+        if found is None or _TRIVIAL.match(found["value"]):
             continue
-        above = lines[index - 1].strip() if index else ""
-        if above.endswith("*/") or above.startswith("//") or _above(lines, index, "/*", "//"):
-            continue
-        yield f"{place}:{index + 1}: {found['macro'] or found['name']} does not say where it comes from"
+        above = at
+        while above > 0 and lines[above - 1].strip() and not _is_c_comment(lines[above - 1]):
+            above -= 1
+        told = "/*" in line or "//" in line or (above > 0 and _is_c_comment(lines[above - 1]))
+        yield found["macro"] or found["name"], at + 1, told
+
+
+def _is_c_comment(line: str) -> bool:
+    return line.rstrip().endswith("*/") or line.startswith("//")

@@ -24,7 +24,6 @@ _MAX_JUMPS = 20  # that are listed: enough to see a pattern
 _OUTLIER_SIGMAS = 8.0  # a normal row lies beyond it once in 8e14
 _OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
 # Widths of counters in the processors and FPGAs that read gyros out
-# Widths of counters in the processors and FPGAs that read gyros out
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _PART = 2**16  # rows that are looked at together
 

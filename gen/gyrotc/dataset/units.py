@@ -89,7 +89,6 @@ _ALLOWED = re.compile(r"[\w\s.°*/^()+\-µ%]{1,60}")
 _LARGE_POWER = re.compile(r"(\*\*|\^)(?!\s*[-+]?[1-3](?!\s*(\d|\*\*|\^|\.)))")  # pint would compute any
 _ROUNDING = 1e-13  # what pint's products of binary numbers may be off, relative
 # Factors of units are fractions of small numbers (1/3600, 1/60, 5/9), not of larger ones
-# Factors of units are fractions of small numbers (1/3600, 1/60, 5/9), not of larger ones
 _DENOMINATOR = 1000
 _SIZE = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 _SCALED = re.compile(rf"(?:(?P<by>{_SIZE})\s*\*?\s*)?(?P<unit>[^\W\d][\w°]*)(?:\s*/\s*(?P<over>{_SIZE}))?")

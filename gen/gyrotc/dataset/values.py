@@ -18,7 +18,6 @@ _TEMPERATURE_C = (-90.0, 200.0)  # the target holds samples outside: docs/numeri
 _RATE_DPH = (-7.5e6, 7.5e6)  # a little above 2000 deg/s, the widest usual range; no table holds more
 _TIME_S = (-1e10, 1e10)  # three hundred years: seconds of any epoch, not milliseconds or nanoseconds
 # Comparisons with it let NaN and infinities be found without an array of their own
-# Comparisons with it let NaN and infinities be found without an array of their own
 _LARGEST = float(np.finfo(np.float64).max)
 _KELVIN = (183.15, 473.15)  # the plausible range, had it been given in kelvin
 

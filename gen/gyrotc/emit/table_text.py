@@ -16,6 +16,7 @@ __all__ = ["TableText", "table_text"]
 _INTEGERS = (
     "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits",
 )  # fmt: skip
+# Numbers of a member: docs/FORMAT.md, section 3
 _NUMBERS = {"fallback": 1, "authority": 2, "effect": 2, "rezero": 1, "scale": 3, "envelope": 4}
 _COUNTS = (
     "n_networks", "n_centers", "n_channels", "n_terms", "coverage_cells", "sigma_cells", "n_sigma", "n_probes",

@@ -25,13 +25,11 @@ __all__ = ["MISSING", "Calls", "Segment", "Vectors", "make_vectors"]
 N_RANDOM = 20000  # a fault that shows in one input of a thousand is missed with a chance of 2e-9
 SAMPLES_PER_BLOCK = 8  # short blocks, so that a few thousand samples make hundreds of corrections
 # A quiet NaN, and the word that fixed point has for no value (docs/FORMAT.md)
-# A quiet NaN, and the word that fixed point has for no value (docs/FORMAT.md)
 MISSING = {"f32": 0x7FC00000, "q31": 0x80000000}
 _SPECIAL_F32 = (
     0x00000000, 0x80000000, 0x00000001, 0x80000001, 0x007FFFFF, 0x00800000,
     0x7F7FFFFF, 0xFF7FFFFF, 0x7F800000, 0xFF800000, 0x7FC00000, 0xFFC00001, 0x7F800001,
 )  # fmt: skip
-# Ends of the range, both sides of 0, and a power of two with its opposite
 # Ends of the range, both sides of 0, and a power of two with its opposite
 _SPECIAL_Q31 = (0, 1, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 0x80000001, 0x00010000, 0xFFFF0000)
 

@@ -14,7 +14,7 @@ __all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
 _MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
-_LARGEST = 2**31 - 1
+_LARGEST = 2**31 - 1  # a signed 32-bit word
 
 
 class Arithmetic(Protocol):

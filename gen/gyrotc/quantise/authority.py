@@ -9,7 +9,7 @@ from ..reference.table import Numeric, f32_words
 __all__ = ["Bounds", "unbounded"]
 
 _LARGEST_DPH = 1.5e7  # twice the largest rate that anything here takes for one
-_LARGEST = 2**31 - 1
+_LARGEST = 2**31 - 1  # a signed 32-bit word
 
 
 class Bounds(TypedDict):

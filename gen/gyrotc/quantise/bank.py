@@ -24,7 +24,6 @@ from .solve import exp2_of_minus
 __all__ = ["Axis", "handover_error_dph", "regions"]
 
 # Of T and of dT/dt: the bound is loose by what a share grows within a cell, the time grows with their number
-# Of T and of dT/dt: the bound is loose by what a share grows within a cell, the time grows with their number
 _CELLS = (256, 128)
 _LOG2E = 1.4426950408889634  # log2(e)
 

@@ -17,7 +17,6 @@ from .solve import exp2_of_minus
 __all__ = ["largest_gradient"]
 
 # Of T and of dT/dt: the bound is loose by what a slope grows between them, the time grows with their number
-# Of T and of dT/dt: the bound is loose by what a slope grows between them, the time grows with their number
 _POINTS = (513, 257)
 _STEEPEST = 0.8577638849607068  # largest |d/dx exp(-x²)|, at x = 1/√2
 _MOST_CURVED = 2.0  # largest |d²/dx² exp(-x²)|

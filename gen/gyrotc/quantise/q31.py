@@ -36,9 +36,7 @@ _LARGEST_ARGUMENT = 2**31 - 1  # a signed 32-bit word
 _MAX_FACTOR = 65535  # of s
 _SOLVE_POINTS = 256  # of each input: weights are solved for on this grid, whose time grows with it
 # Of the normal equations, which it keeps solvable where Gaussians nearly coincide: docs/numerics.md, section 3
-# Of the normal equations, which it keeps solvable where Gaussians nearly coincide: docs/numerics.md, section 3
 _RIDGE = 1e-6
-# Of each input: the bound is loose by what a surface grows within a cell, the time grows with their number
 # Of each input: the bound is loose by what a surface grows within a cell, the time grows with their number
 _GRID_CELLS = 512
 _SHARE = 2.0**-24  # unit of a share of a bank, which is cut off

@@ -23,10 +23,12 @@ __all__ = ["outside"]
 
 _ROW = re.compile(r"RANGE\((.*?)\),(?:\s*/\* ([^*]*?) \*/)?$")
 _NAME = re.compile(r"^#define (GTC_\w+) (\d+)U?\b", re.MULTILINE)
+# Words of a table before its arrays, and the first of them that counts records: docs/FORMAT.md, section 3
 _N_WHOLE, _N_NUMBERS, _FIRST_COUNT = 18, 13, 8
 _REACH = np.float32(8.0)  # half ranges to which a normalised input may go
-_WIDTH = np.float32(2.0**-100)
+_WIDTH = np.float32(2.0**-100)  # narrowest range: what is divided by it stays finite
 _SUM = 2**30  # of the magnitudes of weights, so that no sum overflows: docs/numerics.md, section 3
+# C, in the units of either arithmetic: the target holds temperatures outside (docs/numerics.md, section 1)
 _PLAUSIBLE = {"f32": (-90.0, 200.0), "q31": (-90 * 65536, 200 * 65536)}
 _SPAN = 2**26 - 1  # of an input in 2^-16 C: five bits more are 31 (libc/gtc_q31.c)
 _LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3

@@ -25,8 +25,8 @@ _SINE_F32 = tuple(
     for c in ("0x1.3c4b2cp-13", "-0x1.3232fap-8", "0x1.46676ep-4", "-0x1.4abbb6p-1", "0x1.921fb4p+0")
 )
 _SINE_Q31 = (161942, -5016767, 85564854, -693597876, 1686629674)  # 2^-30
-_ROUND = np.float32(1.5 * 2**23)
-_ONE, _FOUR = np.float32(1.0), np.float32(4.0)
+_ROUND = np.float32(1.5 * 2**23)  # added and subtracted again: rounds to an integer
+_ONE, _FOUR = np.float32(1.0), np.float32(4.0)  # a turn has four quarters
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 
 

@@ -36,7 +36,7 @@ _INPUT_BITS = 16  # q31: temperatures in 2^-16 C
 ARRAYS = {
     "serial": 0, "networks": 8, "centers": 5, "guards": 8, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4,
 }  # fmt: skip
-SERIAL_WORDS = 16
+SERIAL_WORDS = 16  # 64 characters, as many as a serial may have
 
 Numeric = Literal["f32", "q31"]
 Words = NDArray[np.uint32]

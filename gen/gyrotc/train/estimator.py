@@ -30,7 +30,6 @@ _CANDIDATES = 300  # samples as centers, drawn at random: bounds time and memory
 _MOST_CENTERS = 60  # bounds the time of a fit
 _SAMPLES_PER_COLUMN = 5  # at least: with fewer the size is chosen by noise
 # Times the number of samples: slight, for candidates that nearly coincide (docs/training.md, section 3)
-# Times the number of samples: slight, for candidates that nearly coincide (docs/training.md, section 3)
 _RIDGE = 1e-8
 
 

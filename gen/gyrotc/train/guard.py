@@ -13,7 +13,6 @@ from .result import Outcome, networks_dph
 __all__ = ["objection"]
 
 # Points of T and of dT/dt: what passes between them is narrower than a sixteenth of the range
-# Points of T and of dT/dt: what passes between them is narrower than a sixteenth of the range
 _GRID = (33, 17)
 _SIGMAS = 4.0  # of the process at a point and of a mean's noise: nothing that a compression loses comes near
 _LARGEST_DPH = 7.5e6  # that a table holds

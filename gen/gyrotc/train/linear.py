@@ -17,7 +17,6 @@ Powers = tuple[int, int]
 
 _BASE: tuple[Powers, ...] = ((0, 0), (1, 0), (0, 1))  # powers of T and of dT/dt: a plane
 # Powers up to the third order together
-# Powers up to the third order together
 _FURTHER: tuple[Powers, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 _HIGHEST_ORDER = 5  # polynomials of higher order swing between the data and beyond
 

@@ -7,8 +7,9 @@ through the same fit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,20 @@ from ..detect.search import Search
 from ..noise_colour.colours import COLOURS, Declared
 from ..noise_colour.whitener import Whitener
 from ..orthonormal import orthonormal
-from ..screen.blocks import centred_slope
+from ..screen.blocks import Records, centred_slope
 
 __all__ = ["Discrepancy", "Ensemble", "compare"]
 
 Array = NDArray[np.float64]
+Blocks = NDArray[np.bool_]
+Statistic = Callable[[Array], Array]
 
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
 _SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
+_CELL_C = 8.0  # C: a dozen cells over the range of a product
+_FEWEST = 3  # blocks of either direction in a cell, for a mean
+_DATES = 3  # days: two give a line in any case
 _ROUNDING = 1e-9  # share of the residuals' RMS below which a statistic is made of rounding errors
 
 
@@ -109,76 +115,85 @@ def _discrepancy(name: str, measured: float, simulated: Array, rounding: float) 
     return Discrepancy(name, measured, float(simulated.mean()), float(low), float(high), p)
 
 
-def _statistics(search: Search) -> dict[str, Callable[[Array], Array]]:
-    """Functions of residuals, shape (N, members), each giving one number for each member."""
+def _statistics(search: Search) -> dict[str, Statistic]:
+    """Statistics of residuals, shape (N, members), by name: each gives one number for each member."""
     records = search.records
     spans = records.spans()
-    slope = records.average([centred_slope(r.history) for r in records.runs])
-    temperature = records.average([r.history.temperature_c for r in records.runs])
-    up, down = slope > _MOVING, slope < -_MOVING
-    width = max(round(_SLOW_S / records.block_s), 2)
-    cells = _cells(temperature)
-
-    def rms(e: Array) -> Array:
-        return np.asarray(np.sqrt((e**2).mean(axis=0)))
-
-    def autocorrelation(e: Array) -> Array:
-        top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)
-        return np.asarray(top / (e**2).sum(axis=0))
-
-    def slow(e: Array) -> Array:
-        parts = [_grouped(e[s], width) for s in spans if s.stop - s.start >= width]
-        return rms(np.concatenate(parts)) if parts else np.full(e.shape[1], np.nan)
-
-    def run_means(e: Array) -> Array:
-        means = np.array([e[s].mean(axis=0) for s in spans])
-        return np.sqrt((means**2).mean(axis=0)) if len(means) > 1 else np.full(e.shape[1], np.nan)
-
-    def loop(e: Array) -> Array:
-        """RMS over temperature of the mean difference between heating and cooling."""
-        gaps = []
-        for cell in np.unique(cells):
-            a, b = up & (cells == cell), down & (cells == cell)
-            if a.sum() >= 3 and b.sum() >= 3:
-                gaps.append(e[a].mean(axis=0) - e[b].mean(axis=0))
-        return rms(np.array(gaps)) if gaps else np.full(e.shape[1], np.nan)
-
-    def start(e: Array) -> Array:
-        parts = [e[s][:width].mean(axis=0) for s in spans]
-        return np.asarray(np.mean(parts, axis=0))
-
-    def outlying(e: Array) -> Array:
-        square = e * e
-        return np.asarray((square * square).mean(axis=0) / square.mean(axis=0) ** 2)
-
-    out: dict[str, Callable[[Array], Array]] = {
-        "residual_rms_dph": rms,
-        "residual_autocorrelation": autocorrelation,
-        "half_hour_means_rms_dph": slow,
-        "run_means_rms_dph": run_means,
-        "heating_cooling_loop_dph": loop,
-        "first_half_hour_dph": start,
-        "kurtosis": outlying,
+    slow = max(round(_SLOW_S / records.block_s), 2)
+    found: dict[str, Statistic] = {
+        "residual_rms_dph": _rms,
+        "residual_autocorrelation": partial(_autocorrelation, spans=spans),
+        "half_hour_means_rms_dph": partial(_rms_of_means, spans=spans, width=slow),
+        "run_means_rms_dph": partial(_rms_of_runs, spans=spans),
+        "heating_cooling_loop_dph": partial(_loop, branches=_branches(records)),
+        "first_half_hour_dph": partial(_first_mean, spans=spans, width=slow),
+        "kurtosis": _kurtosis,
     }
     days = [r.history.day for r in records.runs]
-    if len({d for d in days if d is not None}) >= 3 and None not in days:
-        line = np.array([float(d) for d in days if d is not None])
-        line = (line - line.mean()) / line.std()
+    known = np.array([float(d) for d in days if d is not None])
+    if len(known) == len(days) and len(set(known.tolist())) >= _DATES:
+        date = (known - known.mean()) / known.std()
+        found["trend_with_date_dph"] = partial(_trend, spans=spans, date=date)
+    return found
 
-        def trend(e: Array) -> Array:
-            return np.asarray(
-                np.mean([x * e[s].mean(axis=0) for x, s in zip(line, spans, strict=True)], axis=0)
-            )
 
-        out["trend_with_date_dph"] = trend
-    return out
+def _rms(e: Array) -> Array:
+    return np.asarray(np.sqrt((e**2).mean(axis=0)))
+
+
+def _unknown(e: Array) -> Array:
+    """A statistic that these runs do not have."""
+    return np.full(e.shape[1], np.nan)
+
+
+def _autocorrelation(e: Array, spans: Sequence[slice]) -> Array:
+    """Of neighbouring blocks."""
+    top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)
+    return np.asarray(top / (e**2).sum(axis=0))
+
+
+def _rms_of_means(e: Array, spans: Sequence[slice], width: int) -> Array:
+    """RMS of means over `width` blocks."""
+    parts = [_grouped(e[s], width) for s in spans if s.stop - s.start >= width]
+    return _rms(np.concatenate(parts)) if parts else _unknown(e)
+
+
+def _rms_of_runs(e: Array, spans: Sequence[slice]) -> Array:
+    """RMS of the means of runs."""
+    return _rms(np.array([e[s].mean(axis=0) for s in spans])) if len(spans) > 1 else _unknown(e)
+
+
+def _loop(e: Array, branches: Sequence[tuple[Blocks, Blocks]]) -> Array:
+    """RMS over temperature of the mean difference between heating and cooling."""
+    gaps = [e[up].mean(axis=0) - e[down].mean(axis=0) for up, down in branches]
+    return _rms(np.array(gaps)) if gaps else _unknown(e)
+
+
+def _branches(records: Records) -> list[tuple[Blocks, Blocks]]:
+    """Blocks that heat and that cool, shape (N,) each, for every cell of temperature that has enough of both."""
+    slope = records.average([centred_slope(r.history) for r in records.runs])
+    temperature = records.average([r.history.temperature_c for r in records.runs])
+    cells = np.floor(temperature / _CELL_C).astype(np.int64)
+    pairs = [((slope > _MOVING) & (cells == c), (slope < -_MOVING) & (cells == c)) for c in np.unique(cells)]
+    return [(up, down) for up, down in pairs if min(up.sum(), down.sum()) >= _FEWEST]
+
+
+def _first_mean(e: Array, spans: Sequence[slice], width: int) -> Array:
+    """Mean over the runs of the mean of their first `width` blocks."""
+    return np.asarray(np.mean([e[s][:width].mean(axis=0) for s in spans], axis=0))
+
+
+def _kurtosis(e: Array) -> Array:
+    """Fourth moment over the square of the second, about 0."""
+    square = e * e
+    return np.asarray((square * square).mean(axis=0) / square.mean(axis=0) ** 2)
+
+
+def _trend(e: Array, spans: Sequence[slice], date: Array) -> Array:
+    """Slope of the means of runs in standardised dates."""
+    return np.asarray(np.mean([x * e[s].mean(axis=0) for x, s in zip(date, spans, strict=True)], axis=0))
 
 
 def _grouped(e: Array, width: int) -> Array:
     n = e.shape[0] // width
     return np.asarray(e[: n * width].reshape(n, width, -1).mean(axis=1))
-
-
-def _cells(temperature: Array) -> NDArray[np.int64]:
-    """Number of the 8-C cell of every block."""
-    return np.floor(temperature / 8.0).astype(np.int64)

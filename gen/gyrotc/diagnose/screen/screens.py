@@ -103,21 +103,7 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Arr
     Returns:
         Factor of every block's standard deviation or None, p-value, ratio of largest to smallest (95 % range).
     """
-    power, index = [], []
-    spans = records.spans()
-    for k, run in enumerate(records.runs):
-        usable = masks[k]
-        pair = usable[1:] & usable[:-1]
-        square = np.where(pair, np.diff(np.where(usable, run.rate_dph, 0.0)) ** 2, 0.0)
-        number = records.index[k][1:]
-        size = int(records.index[k][-1]) + 1
-        total = np.bincount(number, weights=square, minlength=size)
-        count = np.bincount(number, weights=pair, minlength=size)
-        kept = records.kept[k]
-        ok = count[kept] > 0
-        power.append(total[kept][ok] / count[kept][ok])
-        index.append(np.arange(spans[k].start, spans[k].stop)[ok])
-    value, at = np.concatenate(power), np.concatenate(index)
+    value, at = _quick_power(records, masks)
     design = _variance_design(records)
     usable_rows = value > 0.0
     logs, x = np.log(value[usable_rows]), design[at[usable_rows]]
@@ -138,6 +124,24 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Arr
     if p > _P_VARIANCE or ratio < _RATIO:
         return None, p, ratio
     return np.clip(sigma, 0.1, 10.0), p, ratio
+
+
+def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Array, NDArray[np.int64]]:
+    """Mean squared difference of neighbouring usable rows of a block, and the block, where there are such rows."""
+    power, index = [], []
+    for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
+        usable = masks[k]
+        pair = usable[1:] & usable[:-1]
+        square = np.where(pair, np.diff(np.where(usable, run.rate_dph, 0.0)) ** 2, 0.0)
+        number = records.index[k][1:]
+        size = int(records.index[k][-1]) + 1
+        total = np.bincount(number, weights=square, minlength=size)
+        count = np.bincount(number, weights=pair, minlength=size)
+        kept = records.kept[k]
+        ok = count[kept] > 0
+        power.append(total[kept][ok] / count[kept][ok])
+        index.append(np.arange(span.start, span.stop)[ok])
+    return np.concatenate(power), np.concatenate(index)
 
 
 def _variance_design(records: Records) -> Array:

@@ -5,6 +5,7 @@ It depends on the temperature records alone, not on the rates, and is kept on di
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,14 +107,9 @@ def build(records: Records, level: int) -> SignatureBank:
     raw = np.column_stack(columns)
     on_map = static.T @ raw
     rest = raw - static @ on_map
-    scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
-    for group in groups:
-        if group.candidate.role == "variance":
-            scale[group.columns] = scale[group.columns].max()
+    scale = _scale(rest, raw, groups)
     signatures = rest / scale
     inputs, replaced, known = changed_inputs(records, basis)
-    _, size, right = np.linalg.svd(signatures, full_matrices=False)
-    keep = size > _COMMON * size[0]
     grams, log_dets = _grams(records, static, signatures, None)
     alternatives, alternative_groups = _alternatives(records)
     return SignatureBank(
@@ -126,7 +122,7 @@ def build(records: Records, level: int) -> SignatureBank:
         inputs=tuple(inputs),
         replaced=replaced,
         known=known,
-        common=right[keep].T,
+        common=_common(signatures),
         grams=grams,
         log_dets=log_dets,
         untestable=untestable,
@@ -134,6 +130,21 @@ def build(records: Records, level: int) -> SignatureBank:
         alternatives=alternatives,
         alternative_groups=alternative_groups,
     )
+
+
+def _scale(rest: Array, raw: Array, groups: Sequence[Signature]) -> Array:
+    """Norm of every column beside the map; one for all columns of a group of random amounts."""
+    scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
+    for group in groups:
+        if group.candidate.role == "variance":
+            scale[group.columns] = scale[group.columns].max()
+    return np.asarray(scale)
+
+
+def _common(signatures: Array) -> Array:
+    """From signatures to their principal directions, shape (K, p)."""
+    _, size, right = np.linalg.svd(signatures, full_matrices=False)
+    return np.asarray(right[size > _COMMON * size[0]].T)
 
 
 def _alternatives(records: Records) -> tuple[Array, tuple[Alternative, ...]]:

@@ -24,7 +24,6 @@ FIGURES = {
 }
 _LEAST = 8  # fewer serials do not say what a usual one is
 # Once in two million normal figures: of a fleet of a thousand with seven figures none by chance
-# Once in two million normal figures: of a fleet of a thousand with seven figures none by chance
 _SIGMAS = 5.0
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
