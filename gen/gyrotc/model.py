@@ -28,8 +28,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from .errors import InputError
 from .inputs import read_json
 from .outputs import canonical_json, json_text, write_atomically
-from .terms import CATALOGUE
-from .terms import Term as Cause
+from .terms import CATALOGUE, Cause
 from .terms.tabled import Tabled
 
 __all__ = [

@@ -8,14 +8,14 @@ On the target it is a memory with the amplitude −60 b/tau.
 from __future__ import annotations
 
 import numpy as np
-from gyrotc.terms import Features, History, Parameter, Scene, Term
+from gyrotc.terms import Cause, Features, History, Parameter, Scene
 from gyrotc.terms.base import Array, Values
 from gyrotc.terms.memory import RATES, lagged
 from gyrotc.terms.operators import first_order
 from gyrotc.terms.recursion import TableKind
-from gyrotc.terms.search import Search, geometric
+from gyrotc.terms.search import SearchRule, geometric
 from gyrotc.terms.tabled import Tabled, memory_gain
-from gyrotc.terms.words import Words
+from gyrotc.terms.words import Wording
 
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
@@ -39,7 +39,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [memory_gain(block_s, values["tau_s"]), amplitude, 0.0]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="slow_rate",
     family="thermal_memory",
     rank=25,
@@ -50,14 +50,14 @@ TERM = Term(
         TAU,
         Parameter("slope_dph_min_per_c", "deg/h per C/min", 1e-6, 1e-1, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The bias follows the temperature rate of a second node",
         short="slow",
         signature="residual follows the ramp and fades in holds",
         remedy="one first-order state and a linear term",
         experiment=RATES,
     ),
-    search=Search(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True, shown=(900.0,)),
+    search=SearchRule(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True, shown=(900.0,)),
     table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
     features=_features,

@@ -41,7 +41,7 @@ from gyrotc.simulate import simulate
 from gyrotc.simulate.truth import simulated_floor
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.verify import verify
-from gyrotc.verify.boardlog import compare
+from gyrotc.verify.boardlog import compared_words
 from gyrotc.verify.logs import log_parts
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet
@@ -379,7 +379,7 @@ def _log(folder: Path) -> Callable[[bytes], None]:
         path = folder / "board.log"
         path.write_bytes(data)
         for part in log_parts(path).parts:
-            compare(part, np.zeros((300, 2), dtype=np.uint32))
+            compared_words(part, np.zeros((300, 2), dtype=np.uint32))
 
     return read
 

@@ -16,8 +16,8 @@ from gyrotc.model import load_model
 from gyrotc.pages.plan_page import write_plan
 from gyrotc.plan import plan
 from gyrotc.simulate import simulate
-from gyrotc.terms import CATALOGUE, History, Scene, Term, register, separate_by
-from gyrotc.terms.recursion import Course, Outcome
+from gyrotc.terms import CATALOGUE, Cause, History, Scene, register, separate_by
+from gyrotc.terms.recursion import Course, TermOutcome
 from gyrotc.terms.search import Reach
 from gyrotc.train.fitting import FitOptions
 
@@ -42,17 +42,17 @@ profiles = ["fast full range"]
 
 
 @pytest.fixture
-def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[Term]:
+def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[Cause]:
     """The made-up cause in the catalogue, without the one whose columns are the same but for their unit."""
     whole = dict(CATALOGUE)
     del CATALOGUE["thermal_gradient"]
-    register(made_up_cause.TERM)
-    yield made_up_cause.TERM
+    register(made_up_cause.CAUSE)
+    yield made_up_cause.CAUSE
     CATALOGUE.clear()
     CATALOGUE.update(whole)
 
 
-def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -> None:
+def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Cause) -> None:
     """Simulated, planned, found, named, put into the table, emitted, verified on the host, reported."""
     scenario, out = tmp_path / "made-up.toml", tmp_path / "out"
     scenario.write_text(SCENARIO)
@@ -81,7 +81,7 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Term) -
     assert "slow rate" in (out / "report.html").read_text()
 
 
-def test_a_cause_has_its_own_id_and_rank(made_up: Term) -> None:
+def test_a_cause_has_its_own_id_and_rank(made_up: Cause) -> None:
     with pytest.raises(ValueError, match="slow_rate"):
         register(made_up)
 
@@ -92,7 +92,7 @@ TIME = np.arange(0.0, 28800.0, 10.0)
 WAVE = 20.0 + 30.0 * np.sin(TIME / 3000.0)
 
 
-def _values(term: Term) -> dict[str, float]:
+def _values(term: Cause) -> dict[str, float]:
     """Every parameter in the middle of its range, at the default where it has one."""
     return {
         p.name: float(np.sqrt(p.low * p.high)) if p.default is None else p.default for p in term.parameters
@@ -141,7 +141,7 @@ def test_every_cause_of_a_table_does_there_what_it_does_in_the_simulation(id: st
     number = np.arange(TIME.size)
     course = Course(WAVE, number > 0, number, number + 1, 1)
     nothing = np.zeros_like(WAVE)
-    outcome = Outcome(WAVE, nothing, nothing, np.zeros(WAVE.size, dtype=np.int32))
+    outcome = TermOutcome(WAVE, nothing, nothing, np.zeros(WAVE.size, dtype=np.int32))
     table = term.table
     table.recursion(values, 10.0).apply(course, WAVE, outcome)
     scene = Scene(TIME, TIME, WAVE, WAVE, WAVE, WAVE, 0.0)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from gyrotc.diagnose.detect.detection import detect
 from gyrotc.diagnose.detect.detection_limits import detection_limits, limit_of
-from gyrotc.diagnose.detect.joined import Layout
+from gyrotc.diagnose.detect.joined import JoinedLayout
 from gyrotc.diagnose.detect.project import project
 from gyrotc.diagnose.detect.scores import (
-    Columns,
     Projection,
+    ScoredColumns,
     draw_null,
     ratio_of,
     score,
@@ -69,7 +69,7 @@ def dense(search: Search, number: int) -> Array:
 
 
 def test_a_layout_counts_every_column_once() -> None:
-    layout = Layout.of(3, 5, 2, 0, 4)
+    layout = JoinedLayout.of(3, 5, 2, 0, 4)
     parts = (layout.static, layout.signatures, layout.channels, layout.inputs, layout.beside)
     assert [i for part in parts for i in range(14)[part]] == list(range(14)) and layout.total == 14
     assert layout.held("map and beside").tolist() == [0, 1, 2, 10, 11, 12, 13]
@@ -134,7 +134,7 @@ def _projection(gram: Array, a: Array) -> Projection:
 def test_scores_are_log_p_values_of_normal_and_chi_square() -> None:
     gram = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.6], [0.0, 0.6, 1.0]])
     a = np.array([2.5, 1.0, -2.0])
-    columns = Columns(np.array([0, 1]), np.array([[1, 2]]), ())
+    columns = ScoredColumns(np.array([0, 1]), np.array([[1, 2]]), ())
     found = score(_projection(gram, a), columns, a)
     assert np.exp(-found.single) == pytest.approx(2.0 * stats.norm.sf([2.5, 1.0]))
     energy = a[1:] @ np.linalg.solve(gram[1:, 1:], a[1:])
@@ -161,7 +161,7 @@ def test_the_ratio_of_a_common_variance_is_the_maximum_of_its_likelihood() -> No
 def test_the_largest_of_independent_scores_is_distributed_as_it_must_be() -> None:
     """The omnibus direction is the first column, so of k columns there are k + 1 scores and k are independent."""
     k = 25
-    columns = Columns(np.arange(1, k), np.zeros((0, 2), dtype=np.int64), ())
+    columns = ScoredColumns(np.arange(1, k), np.zeros((0, 2), dtype=np.int64), ())
     null = np.sort(draw_null(_projection(np.eye(k), np.zeros(k)), columns, 3, draws=4000))
     for share in (0.5, 0.9, 0.99):
         alone = 1.0 - np.exp(-null[int(share * null.size)])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gyrotc.diagnose.discrepancy.declared_noise import _two_sided, noise_findings
-from gyrotc.diagnose.discrepancy.ensemble import _discrepancy, compare
+from gyrotc.diagnose.discrepancy.ensemble import _discrepancy, ensemble_of
 from gyrotc.diagnose.noise_colour.colours import Declared
 from gyrotc.diagnose.pipeline import needs_finer, search_of
 from gyrotc.diagnose.screen.blocks import Records
@@ -34,7 +34,7 @@ def noise(campaign: Campaign, seed: int = SEED) -> Array:
 def test_noise_as_declared_has_no_finding_and_no_discrepancy(campaign: Campaign) -> None:
     search = campaign.search(noise(campaign), declared=DECLARED.colour(BLOCK_S))
     assert noise_findings(search, DECLARED, causes=False) == []
-    found = compare(search, DECLARED)
+    found = ensemble_of(search, DECLARED)
     assert min(d.p_value for d in found.discrepancies) > 0.01
     assert found.residual == pytest.approx(search.y - search.bank.map @ search.map_weights())
 
@@ -73,7 +73,7 @@ def test_a_p_value_is_the_rank_among_the_simulated_ones() -> None:
 def test_what_the_model_takes_away_wholly_is_not_rare(campaign: Campaign) -> None:
     """Means of runs beside offsets of every run are rounding errors: no rank among them means anything."""
     offsets = np.repeat(np.eye(3), [k.size for k in campaign.records.kept], axis=0)
-    found = compare(campaign.search(noise(campaign)), DECLARED, beside=offsets)
+    found = ensemble_of(campaign.search(noise(campaign)), DECLARED, beside=offsets)
     means = next(d for d in found.discrepancies if d.statistic == "run_means_rms_dph")
     assert means.measured < 1e-12 and means.p_value == 1.0
 
@@ -81,8 +81,8 @@ def test_what_the_model_takes_away_wholly_is_not_rare(campaign: Campaign) -> Non
 def test_a_memory_shows_in_half_hours_and_goes_when_the_simulation_has_it(campaign: Campaign) -> None:
     column = columns_of(campaign.records, "thermal_gradient", {"tau_s": 900.0})
     search = campaign.search(noise(campaign) + 5e-4 * column[:, 0])
-    plain = {d.statistic: d.p_value for d in compare(search, DECLARED).discrepancies}
-    extended = {d.statistic: d.p_value for d in compare(search, DECLARED, beside=column).discrepancies}
+    plain = {d.statistic: d.p_value for d in ensemble_of(search, DECLARED).discrepancies}
+    extended = {d.statistic: d.p_value for d in ensemble_of(search, DECLARED, beside=column).discrepancies}
     assert plain["half_hour_means_rms_dph"] == pytest.approx(0.004)
     assert extended["half_hour_means_rms_dph"] > 0.01
 

@@ -11,7 +11,14 @@ from gyrotc.commands.diagnosis_lines import diagnosis_lines
 from gyrotc.diagnose.advice import VERDICTS, next_steps
 from gyrotc.diagnose.discrepancy.declared_noise import NoiseFinding
 from gyrotc.diagnose.verdict import verdict_of
-from gyrotc.results.diagnosed import ConsideredCause, Diagnosed, Estimate, NamedCause, Unexplained, Verdict
+from gyrotc.results.diagnosed import (
+    ConsideredCause,
+    Diagnosed,
+    DiagnosisVerdict,
+    Estimate,
+    NamedCause,
+    Unexplained,
+)
 from gyrotc.results.planned import DetectionLimit
 
 NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]
@@ -48,7 +55,7 @@ def test_the_verdict_follows_from_what_was_found(verdict: str, found: Any, noise
     assert verdict_of(found, noise) == verdict
 
 
-def result(verdict: Verdict) -> Diagnosed:
+def result(verdict: DiagnosisVerdict) -> Diagnosed:
     cause = NamedCause(
         id="hysteresis", family="hysteresis", name="A loop", p_value=0.001, gain=None, signature="a loop",
         parameters={"width_c": Estimate(value=4.0, low=3.0, high=5.0)}, remedy="one play operator",
@@ -72,7 +79,7 @@ def result(verdict: Verdict) -> Diagnosed:
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_every_verdict_has_words_and_a_next_step(verdict: Verdict) -> None:
+def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> None:
     text = "\n".join(diagnosis_lines(result(verdict)))
     assert text.startswith(f"G1: {verdict.replace('_', ' ')}. Finding.")
     assert VERDICTS[verdict] in text and "next: " in text

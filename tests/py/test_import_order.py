@@ -99,3 +99,25 @@ def test_what_stands_beside_the_package_imports_modules_that_are_there() -> None
             found += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             for module in (m for m in found if m.split(".")[0] == "gyrotc"):
                 assert _exists(module), f"{path.relative_to(root)}:{node.lineno} imports {module}"
+
+
+#: Classes that have one name on purpose, with the reason.
+_SAME = {"Points": "reference/f32.py and reference/q31.py say the same in either arithmetic"}
+
+
+def _classes() -> dict[str, list[str]]:
+    """Modules by the name of every public class that they define."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(str(path.relative_to(PACKAGE)))
+    return found
+
+
+def test_a_name_of_a_class_means_one_thing() -> None:
+    found = _classes()
+    assert len(found) > 150
+    twice = {name: where for name, where in found.items() if len(where) > 1 and name not in _SAME}
+    assert twice == {}, "give one of them a name of its own"
+    assert all(len(found[name]) > 1 for name in _SAME), "no longer there twice"

@@ -7,7 +7,7 @@ import pytest
 from gyrotc.simulate import chamber, profile
 from gyrotc.simulate.instrument import thermal_network
 from gyrotc.simulate.scenario import Chamber, Gyro
-from gyrotc.simulate.thermal import Network
+from gyrotc.simulate.thermal import ThermalNetwork
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy.integrate import solve_ivp
@@ -91,7 +91,7 @@ def test_ripple_and_setpoint_error_are_as_large_as_declared() -> None:
     assert np.std(offsets) == pytest.approx(0.5, rel=0.2)
 
 
-def network() -> Network:
+def network() -> ThermalNetwork:
     return thermal_network(Gyro())
 
 
@@ -146,7 +146,7 @@ def test_the_response_is_that_of_an_independent_integration() -> None:
 
 def test_a_single_node_answers_a_ramp_as_the_formula_says() -> None:
     one = np.ones(1)
-    net = Network(("node",), 700.0 * one, 1.4 * one, np.zeros((1, 1)), 7.0 * one)
+    net = ThermalNetwork(("node",), 700.0 * one, 1.4 * one, np.zeros((1, 1)), 7.0 * one)
     tau = 700.0 / 1.4
     time_s = np.arange(4001.0)
     rate = 3.0 / 60.0

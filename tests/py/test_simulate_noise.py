@@ -8,7 +8,7 @@ import allantools
 import numpy as np
 import pytest
 from gyrotc.simulate import noise
-from gyrotc.simulate.instrument import Record
+from gyrotc.simulate.instrument import SimulatedRecord
 from gyrotc.simulate.noise import CELL_S, cell_noise
 from gyrotc.simulate.recording import RowLength, rows
 from gyrotc.simulate.scenario import NoiseLevels
@@ -104,12 +104,12 @@ def test_outliers_come_as_often_and_as_large_as_declared() -> None:
     assert hit.min() >= 1.0 and hit.max() <= 3.0
 
 
-def plain_record(seed: int, cells: int, levels: NoiseLevels) -> Record:
+def plain_record(seed: int, cells: int, levels: NoiseLevels) -> SimulatedRecord:
     """A record without bias."""
     made_noise = cell_noise(np.random.SeedSequence(seed), levels, np.full(cells, 20.0), np.zeros(cells))
     angle = np.concatenate(([0.0], np.cumsum(made_noise.angle_arcsec)))
     zero = np.zeros(cells + 1)
-    return Record(
+    return SimulatedRecord(
         reading_c=np.zeros(cells),
         channels={},
         air_c=zero,

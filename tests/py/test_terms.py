@@ -12,7 +12,7 @@ from gyrotc.errors import InputError
 from gyrotc.simulate.biasmap import draw
 from gyrotc.terms import CATALOGUE, History, Scene
 from gyrotc.terms.operators import delayed, first_order, play
-from gyrotc.terms.recursion import Course, Outcome
+from gyrotc.terms.recursion import Course, TermOutcome
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -142,11 +142,11 @@ def course_of(temperature_c: Array) -> Course:
     return Course(temperature_c, number > 0, number, number + 1, 1)
 
 
-def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, channel: Array) -> Outcome:
+def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, channel: Array) -> TermOutcome:
     table = CATALOGUE[cause].table
     assert table
     nothing = np.zeros_like(temperature_c)
-    outcome = Outcome(temperature_c, nothing, nothing, np.zeros(len(nothing), dtype=np.int32))
+    outcome = TermOutcome(temperature_c, nothing, nothing, np.zeros(len(nothing), dtype=np.int32))
     table.recursion(values, 10.0).apply(course_of(temperature_c), channel, outcome)
     return outcome
 

@@ -17,7 +17,7 @@ from gyrotc import verify as package
 from gyrotc.errors import CheckFailed, InputError
 from gyrotc.reference import answers
 from gyrotc.verify import verify
-from gyrotc.verify.boardlog import compare, read_output
+from gyrotc.verify.boardlog import compared_words, read_output
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 
 FAST = "host-gcc-O2"
@@ -241,13 +241,13 @@ def test_groups_of_a_crc_log_are_compared_each(whole: Path, tmp_path: Path) -> N
     groups = {p.numeric: p for p in read_output(_board_output(folder, "BOARD_CRC=1"))}
     for numeric, part in groups.items():
         expected = everything[numeric].words
-        assert compare(part, expected).mismatches == 0
+        assert compared_words(part, expected).mismatches == 0
         wrong = expected.copy()
         wrong[-1, 1] ^= 0x80000000
         wrong[-1, 0] ^= 0x80000000
-        assert compare(part, wrong).mismatches == len(expected) - 256 * (len(expected) // 256)
+        assert compared_words(part, wrong).mismatches == len(expected) - 256 * (len(expected) // 256)
         with pytest.raises(CheckFailed, match="instead of"):
-            compare(part, expected[:-1])
+            compared_words(part, expected[:-1])
 
 
 def test_unknown_target_names_the_known_ones(whole: Path) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..results.diagnosed import NamedCause, Verdict
+from ..results.diagnosed import DiagnosisVerdict, NamedCause
 from ..terms import CATALOGUE
 
 __all__ = ["VERDICTS", "next_steps"]
 
-VERDICTS: dict[Verdict, str] = {
+VERDICTS: dict[DiagnosisVerdict, str] = {
     "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
     "explained": "The causes listed account for what the simulation gets wrong.",
     "ambiguous": "Two or more causes explain these recordings equally well.",
@@ -19,7 +19,7 @@ VERDICTS: dict[Verdict, str] = {
     "not_testable": "These recordings cannot decide.",
 }
 
-_STEPS: dict[Verdict, str] = {
+_STEPS: dict[DiagnosisVerdict, str] = {
     "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
     " profile.",
     "explained": "Build with the extension (gyrotc build --extend), or mend the cause and record again.",
@@ -34,7 +34,7 @@ _STEPS: dict[Verdict, str] = {
 
 
 def next_steps(
-    verdict: Verdict, causes: Sequence[NamedCause], untestable: Sequence[str], *, shipped: bool
+    verdict: DiagnosisVerdict, causes: Sequence[NamedCause], untestable: Sequence[str], *, shipped: bool
 ) -> list[str]:
     """Sentences, the most telling first.
 

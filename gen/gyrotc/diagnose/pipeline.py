@@ -13,11 +13,11 @@ from .attribute.attribution import Attribution, attribute
 from .attribute.gains import Gains
 from .attribute.overlap import overlap
 from .attribute.refine import model_columns
-from .detect.detection_limits import Limit, detection_limits
+from .detect.detection_limits import CauseLimit, detection_limits
 from .detect.joined import Channels
 from .detect.search import Search, open_search
 from .discrepancy.declared_noise import NoiseFinding, noise_findings
-from .discrepancy.ensemble import Ensemble, compare
+from .discrepancy.ensemble import Ensemble, ensemble_of
 from .noise_colour.colours import Declared
 from .orthonormal import main_directions, orthonormal
 from .screen.blocks import Records
@@ -62,7 +62,7 @@ class Analysis:
     search: Search
     attribution: Attribution
     noise: tuple[NoiseFinding, ...]
-    limits: dict[str, Limit]
+    limits: dict[str, CauseLimit]
     separations: tuple[dict[str, float], ...]
     ensemble: Ensemble
     after: Search
@@ -95,7 +95,7 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
         tuple(noise),
         detection_limits(search),
         separations,
-        compare(search, declared),
+        ensemble_of(search, declared),
         after,
         _extended(after, attribution, noise, declared),
     )
@@ -109,7 +109,7 @@ def _extended(
     if not attribution.causes and not refuted:
         return None
     beside = model_columns(attribution.causes) if attribution.causes else None
-    return compare(after, declared, beside=beside, estimated=refuted)
+    return ensemble_of(after, declared, beside=beside, estimated=refuted)
 
 
 def _imitators(cause: str) -> list[str]:

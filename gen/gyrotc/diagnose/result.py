@@ -20,7 +20,7 @@ from .extend.extension import Extension, extend
 from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
 from .screen.gather import records_of
-from .summary import not_testable, summary_of
+from .summary import not_testable, result_of
 from .verdict import holds
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -90,7 +90,7 @@ def diagnose(
     states = causes if cycle is None else cycle.states
     extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
-    result = summary_of(dataset, analysis, extension, causes, chosen, cycle)
+    result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
 
 

@@ -12,16 +12,16 @@ from ..results.diagnosed import (
     Baseline,
     ComparedStatistic,
     ConsideredCause,
+    CycleResult,
     Diagnosed,
+    DiagnosisVerdict,
     Estimate,
     ExtendedModel,
     NamedCause,
-    SingleCycle,
     StaticRate,
     Statistic,
     TriedMemories,
     Unexplained,
-    Verdict,
     WithoutRate,
 )
 from ..results.planned import DetectionLimit
@@ -32,7 +32,7 @@ from .attribute.cycle_fits import memories
 from .attribute.intervals import Interval
 from .attribute.refine import Refined
 from .attribute.single_cycle import Cycle
-from .detect.detection_limits import Limit
+from .detect.detection_limits import CauseLimit
 from .discrepancy.declared_noise import NoiseFinding
 from .extend.extension import Extension
 from .pipeline import Analysis
@@ -40,7 +40,7 @@ from .signatures.candidates import diagnosed
 from .verdict import verdict_of
 from .words import NOISE_WORDS
 
-__all__ = ["not_testable", "summary_of"]
+__all__ = ["not_testable", "result_of"]
 
 _MOST_EQUIVALENT = 2  # rivals that are named; the page lists every cause with its p-value besides
 _WHOLE = 0.995  # a share of the removable error that shows as 100 %
@@ -78,7 +78,7 @@ def not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> Diagno
     )
 
 
-def summary_of(  # long: one line for each field of the result
+def result_of(  # long: one line for each field of the result
     dataset: Dataset,
     analysis: Analysis,
     extension: Extension,
@@ -134,7 +134,7 @@ def _untestable(analysis: Analysis, cycle: Cycle | None) -> dict[str, str]:
     return found
 
 
-def _single_cycle(cycle: Cycle, extension: Extension) -> SingleCycle:
+def _single_cycle(cycle: Cycle, extension: Extension) -> CycleResult:
     """Every memory and every static dT/dt that was tried beside a map of T, best first."""
     tried = (
         TriedMemories(
@@ -149,7 +149,7 @@ def _single_cycle(cycle: Cycle, extension: Extension) -> SingleCycle:
         for t in cycle.tried
     )
     static = (StaticRate(powers=s.powers, rms_dph=s.rms_dph, criterion=s.criterion) for s in cycle.static)
-    return SingleCycle(
+    return CycleResult(
         map_rms_dph=cycle.rms_dph,
         turns=cycle.turns,
         not_testable=cycle.not_testable or None,
@@ -270,7 +270,7 @@ def _untested(id: str, why: str) -> ConsideredCause:
     )
 
 
-def _limit(limit: Limit) -> DetectionLimit:
+def _limit(limit: CauseLimit) -> DetectionLimit:
     return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
 
 
@@ -286,7 +286,7 @@ def _unexplained(analysis: Analysis) -> Unexplained:
 
 
 def _sentence(
-    verdict: Verdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
+    verdict: DiagnosisVerdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
 ) -> str:
     """The finding in one or two sentences; `undecided` says why a single cycle cannot tell of memory."""
     why = f" about memory of the temperature: {undecided}" if undecided else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..results.diagnosed import Verdict
+from ..results.diagnosed import DiagnosisVerdict
 from .attribute.attribution import Attribution
 from .discrepancy.declared_noise import NoiseFinding
 
@@ -23,7 +23,7 @@ def holds(attribution: Attribution) -> bool:
     return bool(attribution.causes) and not little and attribution.other.lead < _LEAD
 
 
-def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> Verdict:
+def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
     """One of the verdicts of the interface; `not_testable` is given before any search.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .tables import CHUNK_ROWS, Chunk, Column, Table
+from .tables import CHUNK_ROWS, Chunk, Column, LoggerTable
 
 __all__ = ["ArrayTable", "Part", "grouped", "part_of", "rate_of"]
 
@@ -17,7 +17,7 @@ Part = Callable[[int, int], Any]
 
 
 @dataclass(frozen=True)
-class ArrayTable(Table):
+class ArrayTable(LoggerTable):
     """Columns that can be read from any row on.
 
     Attributes:
@@ -43,7 +43,7 @@ def part_of(values: Any) -> Part:
 
 def grouped(
     columns: Sequence[tuple[str, str, int, Column, Part]], rates: Mapping[str, tuple[float, str]]
-) -> tuple[Table, ...]:
+) -> tuple[LoggerTable, ...]:
     """Tables of columns of one group and one length.
 
     Args:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from .forms import forms_of
 from .mapping import TimeMap
 from .stamps import Stamps
-from .tables import Chunk, Column, Table
+from .tables import Chunk, Column, LoggerTable
 
 __all__ = ["Clock"]
 
@@ -53,7 +53,7 @@ class Clock:
     def __init__(
         self,
         file: str,
-        table: Table,
+        table: LoggerTable,
         columns: Sequence[Column],
         unit: str | None,
         rate_hz: float | None,

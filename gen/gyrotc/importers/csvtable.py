@@ -17,7 +17,7 @@ from ..errors import InputError
 from .csvblocks import blocks_of, lines_of
 from .csvcells import MISSING, cells_of, kind_of_cells, plain_lines, plain_number
 from .csvdialect import Dialect, dialect_of
-from .tables import Chunk, Column, LoggerFile, Table
+from .tables import Chunk, Column, LoggerFile, LoggerTable
 
 __all__ = ["CsvTable", "open_csv"]
 
@@ -55,7 +55,7 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
 
 
 @dataclass(frozen=True)
-class CsvTable(Table):
+class CsvTable(LoggerTable):
     """The rows of a CSV file.
 
     Attributes:

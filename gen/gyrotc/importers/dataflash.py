@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from .arrays import ArrayTable, part_of
-from .tables import Column, LoggerFile, Table, library
+from .tables import Column, LoggerFile, LoggerTable, library
 
 __all__ = ["open_dataflash"]
 
@@ -61,7 +61,7 @@ def _read(reader: Any, path: Path) -> dict[str, dict[str, array[float]]]:
     return read
 
 
-def _table(name: str, columns: dict[str, array[float]]) -> Table:
+def _table(name: str, columns: dict[str, array[float]]) -> LoggerTable:
     rows = min(len(values) for values in columns.values())
     arrays = {column: np.frombuffer(values)[:rows] for column, values in columns.items()}
     described = tuple(

@@ -14,8 +14,8 @@ from ..dataset.schema import check_serial
 from ..dataset.text import dataset_toml
 from ..errors import InputError
 from .mapping import Map, TimeMap
-from .plan import Plan
-from .rows import Rows
+from .plan import ImportPlan
+from .rows import ImportedRows
 from .tables import LoggerFile
 
 __all__ = ["description_of", "kept_map", "run_name", "serial_of", "sha256_of", "size_of"]
@@ -23,7 +23,7 @@ __all__ = ["description_of", "kept_map", "run_name", "serial_of", "sha256_of", "
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 
 
-def kept_map(chosen: Map, file: LoggerFile, plan: Plan, rows: Rows) -> Map:
+def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Map:
     """The map with every choice that was made."""
     columns: dict[str, Any] = {choice.role: choice.source for choice in (*plan.values, plan.temperature)}
     if plan.time:

@@ -17,7 +17,7 @@ from .described import description_of, kept_map, run_name, serial_of, sha256_of,
 from .formats import open_logger_file
 from .mapping import MAP_FILE, Map, map_text
 from .propose import propose
-from .rows import Rows
+from .rows import ImportedRows
 from .runfile import Format, RunFile
 from .tables import LoggerFile
 from .unitchoice import Ask
@@ -116,7 +116,7 @@ def _imported(
         for path in files:
             file = open_logger_file(path, chosen)
             plan = propose(file, chosen, ask)
-            rows = Rows(path.name, plan, chosen.time)
+            rows = ImportedRows(path.name, plan, chosen.time)
             for line in proposal(file, plan, rows):
                 tell(line)
             chosen = kept_map(chosen, file, plan, rows)
@@ -139,7 +139,7 @@ class _DryRun(Exception):
 
 def _run(
     file: LoggerFile,
-    rows: Rows,
+    rows: ImportedRows,
     target: Path,
     chosen: Map,
     options: ImportOptions,
@@ -189,7 +189,7 @@ def _run(
     }
 
 
-def _judged(file: LoggerFile, rows: Rows, chosen: Map, options: ImportOptions) -> list[str]:
+def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOptions) -> list[str]:
     """Values against their units; what the user's word is taken against.
 
     Raises:

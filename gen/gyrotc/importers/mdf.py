@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import InputError
 from .arrays import ArrayTable, Part
-from .tables import Column, LoggerFile, Table, library, numbers
+from .tables import Column, LoggerFile, LoggerTable, library, numbers
 
 __all__ = ["open_mdf"]
 
@@ -31,7 +31,7 @@ def open_mdf(path: Path) -> LoggerFile:
     return LoggerFile(path, f"MDF {file.version}", tables, {"started": str(started)})
 
 
-def _table(file: Any, index: int) -> Table | None:
+def _table(file: Any, index: int) -> LoggerTable | None:
     group = file.groups[index]
     rows = group.channel_group.cycles_nr
     master = file.masters_db.get(index)

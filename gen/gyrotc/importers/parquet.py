@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from .csvcells import kind_of_cells
-from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, Table, numbers
+from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
 __all__ = ["open_parquet"]
 
@@ -38,7 +38,7 @@ def open_parquet(path: Path) -> LoggerFile:
 
 
 @dataclass(frozen=True)
-class ParquetTable(Table):
+class ParquetTable(LoggerTable):
     """The rows of a Parquet file."""
 
     path: Path = Path()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .tables import Column, Table
+from .tables import Column, LoggerTable
 
-__all__ = ["Choice", "Plan"]
+__all__ = ["Choice", "ImportPlan"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Choice:
     """
 
     role: str
-    table: Table
+    table: LoggerTable
     column: Column
     unit: str | None
     why: str
@@ -34,7 +34,7 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ImportPlan:
     """What is read of a file.
 
     Attributes:
@@ -47,7 +47,7 @@ class Plan:
         left_out: Numeric columns of the main table that are not taken.
     """
 
-    main: Table
+    main: LoggerTable
     time: tuple[Choice, ...]
     temperature: Choice
     values: tuple[Choice, ...]

@@ -13,8 +13,8 @@ from ..dataset.units import NATIVE, UnitError, channel_unit, conversion
 from ..errors import InputError
 from .mapping import Map
 from .names import Meaning, meaning, split_unit, words
-from .plan import Choice, Plan
-from .tables import Column, LoggerFile, Table
+from .plan import Choice, ImportPlan
+from .tables import Column, LoggerFile, LoggerTable
 from .unitchoice import OPTIONS, Ask, Units, asked, said
 
 __all__ = ["propose"]
@@ -28,7 +28,7 @@ _CHANNELS = {
 _MOST_CHANNELS = 12  # that are proposed: a person has to read the list
 
 
-def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
+def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
     """What is read of a file under a map, the open choices made from names.
 
     Args:
@@ -67,10 +67,10 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> Plan:
     channels = tuple(_channels(file, main, chosen, taken))
     taken |= {c.column.name for c in channels}
     left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
-    return Plan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
+    return ImportPlan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
 
 
-def _tables(file: LoggerFile, chosen: Map) -> list[Table]:
+def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
     if chosen.table is None:
         return list(file.tables)
     found = [t for t in file.tables if t.name == chosen.table]
@@ -80,7 +80,7 @@ def _tables(file: LoggerFile, chosen: Map) -> list[Table]:
     return found
 
 
-def _find(file: LoggerFile, name: str, near: Table | None = None) -> tuple[Table, Column]:
+def _find(file: LoggerFile, name: str, near: LoggerTable | None = None) -> tuple[LoggerTable, Column]:
     """The column that a map names, in any table of the file.
 
     Raises:
@@ -95,7 +95,9 @@ def _find(file: LoggerFile, name: str, near: Table | None = None) -> tuple[Table
     raise InputError(file.path.name, f"no column {name!r}", f"one of: {', '.join(every[:40])}")
 
 
-def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tuple[str, Table, Column, str]]:
+def _values(
+    file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map
+) -> list[tuple[str, LoggerTable, Column, str]]:
     """Roles, tables, columns and reasons of what is measured; all of one table."""
     stated = chosen.columns.values()
     if stated:
@@ -119,7 +121,7 @@ def _values(file: LoggerFile, tables: Sequence[Table], chosen: Map) -> list[tupl
     return [(role, table, column, why) for role, column, why in columns]
 
 
-def _check_weight(file: LoggerFile, value: tuple[str, Table, Column, str], chosen: Map) -> None:
+def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str], chosen: Map) -> None:
     """Pulses have an angle.
 
     Raises:
@@ -130,7 +132,7 @@ def _check_weight(file: LoggerFile, value: tuple[str, Table, Column, str], chose
         raise InputError(file.path.name, found, "--pulse-weight-arcsec W")
 
 
-def _rates(table: Table, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
+def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
     """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
     pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
     if pulses:
@@ -165,12 +167,12 @@ def _rates(table: Table, file: Path) -> tuple[list[tuple[str, Column, str]], int
 
 
 def _temperature(
-    file: LoggerFile, tables: Sequence[Table], main: Table, chosen: Map
-) -> tuple[Table, Column, str]:
+    file: LoggerFile, tables: Sequence[LoggerTable], main: LoggerTable, chosen: Map
+) -> tuple[LoggerTable, Column, str]:
     if chosen.columns.temperature:
         return (*_find(file, chosen.columns.temperature, main), "named by the map")
     number = _instance(main.name)
-    likely: list[tuple[int, Table, Column]] = []
+    likely: list[tuple[int, LoggerTable, Column]] = []
     for table in file.tables:
         for column in table.columns:
             one = meaning(column.name, column.unit, table.name)
@@ -200,7 +202,9 @@ def _instance(name: str) -> str:
     return "".join(mark for mark in name if mark.isdigit())
 
 
-def _time(file: LoggerFile, main: Table, chosen: Map) -> tuple[list[tuple[Column, str]], float | None, str]:
+def _time(
+    file: LoggerFile, main: LoggerTable, chosen: Map
+) -> tuple[list[tuple[Column, str]], float | None, str]:
     """Columns of time with reasons; or rows per second with the reason."""
     if chosen.time.rate_hz is not None:
         return [], chosen.time.rate_hz, "rows are counted, as stated"
@@ -240,7 +244,7 @@ def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, st
     return [((clocks or stamps)[0], "it holds times of day")]
 
 
-def _channels(file: LoggerFile, main: Table, chosen: Map, taken: set[str]) -> Iterator[Choice]:
+def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str]) -> Iterator[Choice]:
     if chosen.channels is not None:
         for name, source in chosen.channels.items():
             table, column = _find(file, source, main)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, Table, library
+from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, library
 
 __all__ = ["open_rosbag"]
 
@@ -74,7 +74,7 @@ def open_rosbag(path: Path) -> LoggerFile:
 
 
 @dataclass(frozen=True)
-class BagTable(Table):
+class BagTable(LoggerTable):
     """The messages of one topic."""
 
     path: Path = Path()

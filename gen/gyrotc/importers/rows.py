@@ -16,10 +16,10 @@ from ..errors import InputError
 from .clock import Clock
 from .mapping import TimeMap
 from .names import meaning
-from .plan import Choice, Plan
-from .tables import Chunk, Column, Table
+from .plan import Choice, ImportPlan
+from .tables import Chunk, Column, LoggerTable
 
-__all__ = ["NAMES", "Rows", "conversion_of"]
+__all__ = ["NAMES", "ImportedRows", "conversion_of"]
 
 Floats = NDArray[np.float64]
 NAMES = {
@@ -33,7 +33,7 @@ NAMES = {
 
 
 @dataclass
-class Rows:
+class ImportedRows:
     """The rows of one file under a plan.
 
     Attributes:
@@ -48,7 +48,7 @@ class Rows:
     """
 
     file: str
-    plan: Plan
+    plan: ImportPlan
     stated: TimeMap
     count: int = 0
     left_out: dict[str, int] = field(default_factory=dict)
@@ -143,7 +143,7 @@ class Rows:
             values.append(one[good])
         return np.concatenate(times), np.concatenate(values)
 
-    def _clock_of(self, table: Table) -> Clock:
+    def _clock_of(self, table: LoggerTable) -> Clock:
         """The clock of another table, set to that of the main one."""
         columns = _same_time(self.plan, table)
         if not columns and table.rate_hz is None:
@@ -240,7 +240,7 @@ def conversion_of(choice: Choice) -> Conversion | None:
         return None
 
 
-def _same_time(plan: Plan, table: Table) -> list[Column]:
+def _same_time(plan: ImportPlan, table: LoggerTable) -> list[Column]:
     """The column of time of another table: of the same name, or the likeliest."""
     if not plan.time:
         return []

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["CHUNK_ROWS", "Chunk", "Column", "LoggerFile", "Table", "library"]
+__all__ = ["CHUNK_ROWS", "Chunk", "Column", "LoggerFile", "LoggerTable", "library"]
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
 Array = NDArray[Any]
@@ -65,7 +65,7 @@ class Chunk:
 
 
 @dataclass(frozen=True)
-class Table(ABC):
+class LoggerTable(ABC):
     """Rows of one rhythm.
 
     Attributes:
@@ -116,7 +116,7 @@ class LoggerFile:
 
     path: Path
     format: str
-    tables: tuple[Table, ...]
+    tables: tuple[LoggerTable, ...]
     facts: dict[str, str] = field(default_factory=dict)
     csv: dict[str, Any] = field(default_factory=dict)
     since_power_on: bool = False

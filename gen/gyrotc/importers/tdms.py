@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from .arrays import ArrayTable, Part
-from .tables import Column, LoggerFile, Table, library, numbers
+from .tables import Column, LoggerFile, LoggerTable, library, numbers
 
 __all__ = ["open_tdms"]
 
@@ -38,12 +38,12 @@ def open_tdms(path: Path) -> LoggerFile:
     return LoggerFile(path, "TDMS file", tables, facts)
 
 
-def _tables(group: Any) -> list[Table]:
+def _tables(group: Any) -> list[LoggerTable]:
     lengths: dict[int, list[Any]] = {}
     for channel in group.channels():
         if len(channel) > 1:
             lengths.setdefault(len(channel), []).append(channel)
-    tables: list[Table] = []
+    tables: list[LoggerTable] = []
     for rows, channels in lengths.items():
         columns, parts = [], {}
         for channel in channels:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import InputError
 from .arrays import ArrayTable, part_of
-from .tables import Column, LoggerFile, Table, library, numbers
+from .tables import Column, LoggerFile, LoggerTable, library, numbers
 
 __all__ = ["open_ulog"]
 
@@ -45,7 +45,7 @@ def open_ulog(path: Path) -> LoggerFile:
         raise InputError(path.name, f"cannot be read as ULog ({what})", "a whole PX4 log") from error
     topics = sorted(log.data_list, key=lambda d: (d.name, d.multi_id))
     gyros = {d.multi_id for d in topics if d.name == "sensor_gyro"}
-    tables: list[Table] = [
+    tables: list[LoggerTable] = [
         _table(topic) for topic in topics if not (topic.name == "sensor_combined" and gyros)
     ]
     if not tables:
@@ -58,7 +58,7 @@ def open_ulog(path: Path) -> LoggerFile:
     return LoggerFile(path, "PX4 ULog", tuple(tables), facts, since_power_on=True)
 
 
-def _table(topic: Any) -> Table:
+def _table(topic: Any) -> LoggerTable:
     units = _UNITS[topic.name]
     columns, parts = (
         [Column("timestamp", "us", _WHY)],

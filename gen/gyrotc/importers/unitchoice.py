@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from ..dataset.units import UnitError, conversion
 from ..errors import InputError
 from .names import meaning, split_unit
-from .tables import Column, Table
+from .tables import Column, LoggerTable
 
 __all__ = ["OPTIONS", "Ask", "Units", "asked", "said"]
 
@@ -26,7 +26,7 @@ class Units:
         self._file, self._stated, self._ask, self._missing = file, stated, ask, missing
         self._asked: dict[str, str] = {}
 
-    def of(self, kind: str, column: Column, table: Table) -> str:
+    def of(self, kind: str, column: Column, table: LoggerTable) -> str:
         """The unit of a column of a kind; empty (and noted as missing) where it stands nowhere."""
         if kind in self._stated:
             return self._checked(kind, self._stated[kind], OPTIONS[kind])

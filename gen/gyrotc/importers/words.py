@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .plan import Choice, Plan
-from .rows import NAMES, Rows
+from .plan import Choice, ImportPlan
+from .rows import NAMES, ImportedRows
 from .tables import LoggerFile
 
 __all__ = ["preview", "proposal", "summary"]
@@ -18,7 +18,7 @@ _NATIVE = {"time": "s", "temperature": "C", "rate": "deg/h"}
 _MOST_NAMES = 12  # that are listed in a line of a terminal
 
 
-def proposal(file: LoggerFile, plan: Plan, rows: Rows) -> Iterator[str]:
+def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator[str]:
     """How a file is read, a line for each column."""
     table = f", table {plan.main.name}" if plan.main.name else ""
     yield f"{file.path.name}: {file.format}{table}"
@@ -39,7 +39,7 @@ def proposal(file: LoggerFile, plan: Plan, rows: Rows) -> Iterator[str]:
         yield f"  {note}"
 
 
-def preview(rows: Rows) -> Iterator[str]:
+def preview(rows: ImportedRows) -> Iterator[str]:
     """The first rows as the file has them and as they become."""
     for k in range(min(3, len(next(iter(rows.raw.values()), [])))):
         before = ", ".join(f"{name} {values[k]}" for name, values in rows.raw.items())

@@ -42,7 +42,7 @@ from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
 from .uncertainty import figure_uncertainties
 
-__all__ = ["Replayed", "evaluate", "trace_name"]
+__all__ = ["ReplayedRun", "evaluate", "trace_name"]
 
 Progress = Callable[[str], None]
 _HOST = "host-gcc-O2"
@@ -51,7 +51,7 @@ _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensate
 
 
 @dataclass(frozen=True, slots=True)
-class Replayed:
+class ReplayedRun:
     """One run replayed, every row of the file.
 
     Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps (None: not
@@ -170,17 +170,17 @@ def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> It
 
 def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
-) -> Replayed:
+) -> ReplayedRun:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
     history = history_of(rows, run, model, table)
     if program is None:
         known = history.reference
-        return Replayed(table.decode_bias(known.bits), known.status, known.block_valid, None)
+        return ReplayedRun(table.decode_bias(known.bits), known.status, known.block_valid, None)
     try:
         replayed = replay_on(*program, history)
     except CheckFailed as error:
         raise CheckFailed(f"{run.file}: {error}") from error
-    return Replayed(
+    return ReplayedRun(
         bias_dph=table.decode_bias(replayed.bits),
         status=replayed.status,
         scored=history.reference.block_valid,
@@ -224,7 +224,7 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
     return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
 
 
-def _write_trace(path: Path, rows: Rows, replayed: Replayed, span: slice | NDArray[np.bool_]) -> None:
+def _write_trace(path: Path, rows: Rows, replayed: ReplayedRun, span: slice | NDArray[np.bool_]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     time, temperature = rows.time_s[span], rows.temperature_c[span]
     rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]

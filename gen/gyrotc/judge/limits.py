@@ -89,7 +89,7 @@ class Covers(_Part):
     slope_c_per_min: Slopes | None = None
 
 
-class Needs(_Part):
+class Required(_Part):
     """What must be there, and what must not."""
 
     arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
@@ -109,7 +109,7 @@ class Limits(_Part):
     at_most: AtMost = AtMost()
     at_least: AtLeast = AtLeast()
     covers: Covers = Covers()
-    needs: Needs = Needs()
+    needs: Required = Required()
     sha256: str = ""  # of the file
 
 
@@ -239,7 +239,7 @@ def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
         )
 
 
-def _needs(needs: Needs, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
+def _needs(needs: Required, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
     entries = verification.targets if verification else ()
     bounds = [error.numeric for error in verification.errors] if verification else []
     for numeric in needs.arithmetics:

@@ -22,7 +22,7 @@ from ..train.fitting import front_end, samples_of
 from ..train.ols import fit_ols
 from ..train.result import Outcome, network
 
-__all__ = ["AVERAGE_S", "METHODS", "Cell", "Experiment", "Group", "experiment"]
+__all__ = ["AVERAGE_S", "METHODS", "Cell", "Experiment", "PaperGroup", "experiment"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class PaperGroup:
     """One environment: blocks of set 1 and of set 2."""
 
     environment: str
@@ -91,20 +91,20 @@ def experiment(seed: int, noise: Noise, folder: Path) -> Experiment:
     return Experiment(cells, floor)
 
 
-def _groups(folder: Path) -> tuple[list[Group], float]:
+def _groups(folder: Path) -> tuple[list[PaperGroup], float]:
     dataset = load(folder)
     front = front_end(dataset.runs, _BLOCK_S)
     blocks = {
         (run.environment, run.role): samples_of(front.blocks(run), front.block_s, number)
         for number, run in enumerate(dataset.runs)
     }
-    groups = [Group(name, blocks[name, "train"], blocks[name, "exam"]) for name in ENVIRONMENTS]
+    groups = [PaperGroup(name, blocks[name, "train"], blocks[name, "exam"]) for name in ENVIRONMENTS]
     floor = simulated_floor(folder, [run.file for run in dataset.runs if run.role == "exam"], AVERAGE_S)
     assert floor is not None  # this data set was simulated
     return groups, floor
 
 
-def _trained(method: str, group: Group, seed: int) -> Fit:
+def _trained(method: str, group: PaperGroup, seed: int) -> Fit:
     """One model on one environment as the paper does, whatever the temperature tells there."""
     data = group.train
     scaling = scaling_of(data)
@@ -133,7 +133,7 @@ def _least_squares(data: TrainingData, variables: int) -> Outcome:
     return Outcome(networks=(network(weights[0], (weights[1], weights[2])),), curves={})
 
 
-def _cell(group: Group, trained: Fit) -> Cell:
+def _cell(group: PaperGroup, trained: Fit) -> Cell:
     return Cell(
         before=_means(group.exam, group.exam.bias_dph),
         predicted=_means(group.exam, _predicted(trained, group.exam)),

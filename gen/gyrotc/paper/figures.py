@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
 from ..pages.published import ENVIRONMENTS
-from ..simulate.instrument import Record
+from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
 from .experiment import AVERAGE_S, Cell, Experiment
 
@@ -95,7 +95,7 @@ def _line(
     axes[0].set_ylabel("1e-3 deg/h")
 
 
-def draw_run(record: Record, title: str, path: Path) -> None:
+def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
     """Writes one simulated run: temperatures, and the bias under its noise, over hours."""
     path.parent.mkdir(parents=True, exist_ok=True)
     hours = CELL_S * np.arange(len(record.cavity_c)) / 3600.0

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..diagnose.detect.detection_limits import Limit
+from ..diagnose.detect.detection_limits import CauseLimit
 from ..diagnose.screen.blocks import Record
 from ..diagnose.signatures.candidates import searched
 from ..results.planned import (
     Accuracy,
     Additions,
+    AssumedNoise,
     DetectionLimit,
     Hard,
-    NoiseLevels,
     Plan,
     PlanLimit,
     PlannedRun,
@@ -111,9 +111,9 @@ def _additions(
     return Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=hours, d=d) for n, hours, d in ranked))
 
 
-def _noise(programme: Programme) -> NoiseLevels:
+def _noise(programme: Programme) -> AssumedNoise:
     noise = programme.declared
-    return NoiseLevels(
+    return AssumedNoise(
         arw_deg_per_sqrt_h=noise.arw_deg_per_sqrt_h,
         bias_instability_dph=noise.bias_instability_dph,
         rate_random_walk_dph_per_sqrt_h=noise.rate_random_walk_dph_per_sqrt_h,
@@ -131,7 +131,7 @@ def _temperature(run: Record) -> Temperature:
 
 
 def _limits(sensitivity: Sensitivity) -> tuple[PlanLimit, ...]:
-    def shown(limit: Limit) -> DetectionLimit:
+    def shown(limit: CauseLimit) -> DetectionLimit:
         return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
 
     found = sensitivity.limits()

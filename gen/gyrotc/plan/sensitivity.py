@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.detect.detection_limits import Limit, amplitude_energy, limit_of
+from ..diagnose.detect.detection_limits import CauseLimit, amplitude_energy, limit_of
 from ..diagnose.detect.search import Search, open_search
 from ..diagnose.noise_colour.colours import COLOURS, Colour
 from ..diagnose.noise_colour.whitener import Whitener
@@ -50,7 +50,7 @@ class Sensitivity:
         white = whiten(np.column_stack([self.bank.map, columns])) / self.sigma
         self.grams = np.array([white[s].T @ white[s] for s in records.spans()])
 
-    def limits(self, runs: Sequence[int] | None = None) -> dict[str, Limit]:
+    def limits(self, runs: Sequence[int] | None = None) -> dict[str, CauseLimit]:
         """Detection limits of every cause for a choice of runs (with repetitions; None: all, once)."""
         energy = self._energies(range(len(self.grams)) if runs is None else runs)
         points: dict[str, list[tuple[Candidate, float]]] = {}

@@ -27,7 +27,7 @@ __all__ = ["Row", "additions", "separability"]
 
 Array = NDArray[np.float64]
 
-_D_LIMIT = 6.0  # about where most causes are found (`terms.search.Search.needed_d`)
+_D_LIMIT = 6.0  # about where most causes are found (`terms.search.SearchRule.needed_d`)
 _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
 
 

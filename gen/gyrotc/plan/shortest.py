@@ -10,14 +10,14 @@ import numpy as np
 from ..errors import InputError
 from .sensitivity import Sensitivity
 
-__all__ = ["Shortest", "shortest"]
+__all__ = ["FoundProfile", "shortest"]
 
 _MOST_RUNS = 60  # bounds the search
 _UNSEEN = 1e3  # times the required limit: what counts for a cause that would not be seen at all
 
 
 @dataclass(frozen=True)
-class Shortest:
+class FoundProfile:
     """Runs by name (with repetitions) and their hours; None where no number of these runs reaches the limits."""
 
     runs: tuple[str, ...] | None
@@ -25,7 +25,7 @@ class Shortest:
     reached: dict[str, float | None]
 
 
-def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortest:
+def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> FoundProfile:
     """Adds the run that helps most for its hours, until every limit is reached.
 
     Args:
@@ -48,7 +48,7 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
         chosen.append(best)
         now = after[best]
     if now > 0.0:
-        return Shortest(None, None, _values(sensitivity, chosen, required))
+        return FoundProfile(None, None, _values(sensitivity, chosen, required))
     for k in sorted(chosen, key=lambda k: -hours[k]):
         rest = [*chosen]
         rest.remove(k)
@@ -56,7 +56,7 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
             chosen = rest
     reached = _values(sensitivity, chosen, required)
     names = [run.name for run in sensitivity.programme.records.runs]
-    return Shortest(tuple(names[k] for k in chosen), sum(hours[k] for k in chosen), reached)
+    return FoundProfile(tuple(names[k] for k in chosen), sum(hours[k] for k in chosen), reached)
 
 
 def _values(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .. import status as status_bits
 from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream, period_us
 from ..frontend.numbers import Numbers
-from ..terms.recursion import Outcome
+from ..terms.recursion import TermOutcome
 from .maps import evaluate_map
 from .operations import recursions
 from .table import ARRAYS, Table, Words
@@ -76,9 +76,9 @@ def corrections(
 
 def _outcome(
     table: Table, steps: Steps, stream: Stream, channels: NDArray[Any], samples_per_block: int
-) -> Outcome:
+) -> TermOutcome:
     """What the terms make of every correction; of use where the map makes it."""
-    found = Outcome(steps.temperature, steps.slope, np.zeros_like(steps.temperature), steps.remarks)
+    found = TermOutcome(steps.temperature, steps.slope, np.zeros_like(steps.temperature), steps.remarks)
     terms = recursions(table)
     if not terms or steps.at.size == 0:
         return found

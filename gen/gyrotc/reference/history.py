@@ -17,7 +17,7 @@ from .table import Table, Words
 __all__ = ["Replay", "answers", "replay"]
 
 
-class Calls(Protocol):
+class CallSequence(Protocol):
     """Calls of the step functions, one entry each: bits of every channel, or `missed` samples (0: none)."""
 
     @property
@@ -27,7 +27,7 @@ class Calls(Protocol):
     def missed(self) -> NDArray[np.int64]: ...
 
 
-class Vectors(Protocol):
+class KnownInputs(Protocol):
     """Inputs of the known-answer test, as `gyrotc.emit.vectors` makes them."""
 
     @property
@@ -35,7 +35,7 @@ class Vectors(Protocol):
 
     def map_inputs(self, numeric: str) -> Words: ...
 
-    def calls(self, numeric: str) -> Calls: ...
+    def calls(self, numeric: str) -> CallSequence: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def _followed(
     return stream, follow(arithmetic, stream.samples, settings)
 
 
-def answers(table: Table, vectors: Vectors) -> NDArray[np.uint32]:
+def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
     """What `board_test.c` prints for a table: (status, bits) of every result, shape (n, 2).
 
     In order: the self-test; every map vector; `init`; every step of the history, whose status is that of
@@ -102,7 +102,7 @@ def answers(table: Table, vectors: Vectors) -> NDArray[np.uint32]:
     return np.concatenate([zero, maps, zero, history])
 
 
-def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray[np.uint32]:
+def _step_answers(table: Table, calls: CallSequence, samples_per_block: int) -> NDArray[np.uint32]:
     """Answers of the step functions; each call is a row, or samples missed before the next row."""
     settings = settings_of(table, samples_per_block)
     was_missed = calls.missed > 0

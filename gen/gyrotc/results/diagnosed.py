@@ -13,22 +13,22 @@ __all__ = [
     "Baseline",
     "ComparedStatistic",
     "ConsideredCause",
+    "CycleResult",
     "Diagnosed",
+    "DiagnosisVerdict",
     "Estimate",
     "ExtendedModel",
     "GainOnUnseen",
     "NamedCause",
     "ShippingTrial",
-    "SingleCycle",
     "StaticRate",
     "Statistic",
     "TriedMemories",
     "Unexplained",
-    "Verdict",
     "WithoutRate",
 ]  # fmt: skip
 
-Verdict = Literal[
+DiagnosisVerdict = Literal[
     "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"
 ]
 
@@ -157,7 +157,7 @@ class StaticRate(Part):
     criterion: float = Field(description="as that of the memories")
 
 
-class SingleCycle(Part):
+class CycleResult(Part):
     """What one chamber cycle tells."""
 
     map_rms_dph: float = Field(description="what a map of temperature alone leaves, deg/h")
@@ -197,7 +197,7 @@ class Diagnosed(Result):
     schema_: Annotated[Literal["gyrotc.diagnose/1"], Field(alias="schema")] = "gyrotc.diagnose/1"
     serial: str = Field(description="gyro serial")
     axis: Axis = Field(description="null where the recordings have one axis")
-    verdict: Verdict = Field(description="see docs/diagnosis.md")
+    verdict: DiagnosisVerdict = Field(description="see docs/diagnosis.md")
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Figure = Field(description="of the runs that were judged, deg/h")
@@ -211,7 +211,7 @@ class Diagnosed(Result):
         description="levels as `[noise]` of a scenario has them; null where nothing could be decided"
     )
     measured_on: Literal["exam", "left out"] | None = Field(description="where the gain was measured")
-    single_cycle: SingleCycle | None = Field(description="null where there are more cycles")
+    single_cycle: CycleResult | None = Field(description="null where there are more cycles")
     shipping: ShippingTrial | None = Field(description="null where nothing could be decided")
     unexplained: Unexplained | None = Field(description="null where everything has a name")
     text: str = Field(description="the finding in words")

@@ -9,12 +9,22 @@ from pydantic import Field
 from .base import Count, Figure, Part, Result
 
 __all__ = [
-    "Accuracy", "Additions", "DetectionLimit", "Hard", "NoiseLevels", "Plan", "PlanLimit", "PlannedRun", "Separability",
-    "Shortest", "Temperature", "TriedRun",
+    "Accuracy",
+    "Additions",
+    "AssumedNoise",
+    "DetectionLimit",
+    "Hard",
+    "Plan",
+    "PlanLimit",
+    "PlannedRun",
+    "Separability",
+    "Shortest",
+    "Temperature",
+    "TriedRun",
 ]  # fmt: skip
 
 
-class NoiseLevels(Part):
+class AssumedNoise(Part):
     """Noise that was assumed."""
 
     arw_deg_per_sqrt_h: float = Field(description="angle random walk, deg/√h")
@@ -116,7 +126,7 @@ class Plan(Result):
     axis: None = Field(description="of no axis")
     scenario: str = Field(description="name of the profile")
     hours: float = Field(description="chamber hours")
-    noise: NoiseLevels = Field(description="that was assumed")
+    noise: AssumedNoise = Field(description="that was assumed")
     bias_range_dph: tuple[float, float] = Field(
         description="lowest and highest bias of the simulated gyro, deg/h"
     )

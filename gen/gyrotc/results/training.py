@@ -10,7 +10,14 @@ from .base import Amount, Axis, Count, Figure, Part, Result
 from .evaluation import FoundIn, Pooled
 
 __all__ = [
-    "AllanPoint", "DeclaredUnits", "LeftOutRows", "NoiseTerms", "Outliers", "Rung", "Sensitivity", "SpanLeftOut",
+    "AllanPoint",
+    "BiasPlane",
+    "DeclaredUnits",
+    "LeftOutRows",
+    "NoiseTerms",
+    "Outliers",
+    "Rung",
+    "SpanLeftOut",
     "Training",
 ]  # fmt: skip
 
@@ -54,7 +61,7 @@ class NoiseTerms(Part):
     allan: tuple[AllanPoint, ...] = Field(description="at octaves of the block")
 
 
-class Sensitivity(Part):
+class BiasPlane(Part):
     """A plane through the bias before compensation; null where the input hardly changes."""
 
     bias_dph_per_c: Figure = Field(description="slope in temperature, deg/h/C")
@@ -114,7 +121,7 @@ class Training(Result):
     left_out: Pooled | None = Field(description="all of them, each judged by a fit without it")
     left_out_spans: tuple[Pooled, ...] = Field(description="each of them")
     noise: NoiseTerms = Field(description="of the compensated training runs")
-    sensitivity: Sensitivity = Field(description="of the bias before compensation")
+    sensitivity: BiasPlane = Field(description="of the bias before compensation")
     ladder: tuple[Rung, ...] = Field(
         description="what was tried, the simplest first; empty of a named method"
     )

@@ -9,14 +9,14 @@ from pydantic import Field
 from .base import Axis, Count, Part, Result
 
 __all__ = [
-    "Cost", "EmittedWith", "FunctionCost", "JointVerification", "LogPart", "MapError", "ReadLog", "ReplayedRows",
+    "CallCost", "EmittedWith", "FunctionCost", "JointVerification", "LogPart", "MapError", "ReadLog", "ReplayedRows",
     "SignatureCheck", "Verification", "VerifiedFile", "VerifiedTarget", "WorstError",
 ]  # fmt: skip
 
 PassOrFail = Literal["pass", "fail"]
 
 
-class Cost(Part):
+class CallCost(Part):
     """Cost of a call, less an empty one."""
 
     min: int = Field(description="of all calls")
@@ -63,15 +63,17 @@ class VerifiedTarget(Part):
     vectors: Count | None = Field(default=None, description="results that were compared")
     mismatches: Count | None = Field(default=None, description="results that differ from the reference")
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
-    instructions: Cost | None = Field(default=None, description="of a call of the map")
-    cycles: Cost | None = Field(default=None, description="of a call of the map")
-    ticks: Cost | None = Field(
+    instructions: CallCost | None = Field(default=None, description="of a call of the map")
+    cycles: CallCost | None = Field(default=None, description="of a call of the map")
+    ticks: CallCost | None = Field(
         default=None, description="of a call of the map, in units of the board's counter"
     )
     stack_bytes: Count | None = Field(default=None, description="of a call of the map")
-    step_instructions: Cost | None = Field(default=None, description="of a sample")
-    step_cycles: Cost | None = Field(default=None, description="of a sample")
-    step_ticks: Cost | None = Field(default=None, description="of a sample, in units of the board's counter")
+    step_instructions: CallCost | None = Field(default=None, description="of a sample")
+    step_cycles: CallCost | None = Field(default=None, description="of a sample")
+    step_ticks: CallCost | None = Field(
+        default=None, description="of a sample, in units of the board's counter"
+    )
     step_stack_bytes: Count | None = Field(default=None, description="of a sample")
     code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked")
     read_only_bytes: Count | None = Field(default=None, description="constants of them that are linked")
@@ -81,7 +83,7 @@ class VerifiedTarget(Part):
     replayed: ReplayedRows | None = Field(default=None, description="recordings, where some were given")
 
     @property
-    def map_cost(self) -> tuple[str, Cost] | None:
+    def map_cost(self) -> tuple[str, CallCost] | None:
         """What the counter of the target counts, and the cost of a call of the map in it."""
         found = {"instructions": self.instructions, "cycles": self.cycles, "ticks": self.ticks}
         return next(((unit, cost) for unit, cost in found.items() if cost), None)

@@ -15,12 +15,12 @@ from ..errors import InputError
 from ..outputs import json_text, result_folder
 from ..results.truth import SimulatedTruth, TrueRun
 from .biasmap import BiasMap, draw
-from .instrument import Record, record
+from .instrument import SimulatedRecord, record
 from .noise import CELL_S
 from .recording import RowLength, rows
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
-from .write import Format, RunFile
+from .write import Format, SimulatedRunFile
 
 __all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
 
@@ -100,7 +100,7 @@ def simulate(
     report(1.0)
 
 
-def campaign(plan: Scenario, seed: int) -> Iterator[Record]:
+def campaign(plan: Scenario, seed: int) -> Iterator[SimulatedRecord]:
     """The runs of a scenario, one after the other.
 
     Raises:
@@ -151,18 +151,22 @@ def _planned(plan: Scenario) -> list[dict[str, Any]]:
 
 
 def _write_run(
-    path: Path, format: Format, made: Record, length: RowLength, weight: float | None
+    path: Path, format: Format, made: SimulatedRecord, length: RowLength, weight: float | None
 ) -> Iterator[float]:
     """Writes the rows of a run; yields the share that is done."""
     total_s = CELL_S * len(made.reading_c)
     columns = list(made.channels)
-    with RunFile(path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=columns) as file:
+    with SimulatedRunFile(
+        path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=columns
+    ) as file:
         for chunk in rows(made, length):
             file.write(chunk)
             yield float(chunk.time_s[-1] + length.row_s) / total_s
 
 
-def _truth_of_run(folder: Path, file: str, made: Record, length: RowLength, weight: float | None) -> TrueRun:
+def _truth_of_run(
+    folder: Path, file: str, made: SimulatedRecord, length: RowLength, weight: float | None
+) -> TrueRun:
     """Writes the noise of a run (mean of each row, or of each second where rows are shorter)."""
     step_s = length.cells * CELL_S
     edges = made.angle_arcsec[:: length.cells]

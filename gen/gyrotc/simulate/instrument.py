@@ -13,16 +13,16 @@ from ..terms.operators import first_order
 from . import chamber, channels, noise, profile, thermal
 from .biasmap import BiasMap
 from .noise import CELL_S
-from .scenario import Cause, Gyro, Profile, Scenario
+from .scenario import Gyro, Profile, Scenario, ScenarioCause
 
-__all__ = ["Record", "record", "thermal_network"]
+__all__ = ["SimulatedRecord", "record", "thermal_network"]
 
 Array = NDArray[np.float64]
 _ARRAYS = 24  # of a value a second, besides nodes and channels
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class SimulatedRecord:
     """What one run is made of, once a second.
 
     Attributes:
@@ -56,7 +56,7 @@ class Record:
 
 def record(
     scenario: Scenario, run: Profile, bias_map: BiasMap, day: float, seeds: np.random.SeedSequence
-) -> Record:
+) -> SimulatedRecord:
     """Simulates one run of a profile, `day` days after the first one.
 
     What is drawn for the chamber, the sensor, the noise and each cause has its own seed: switching one of
@@ -77,7 +77,7 @@ def record(
     rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], slope)
     true = _integral(bias[inside])
     gathered = true + np.concatenate(([0.0], np.cumsum(rough.angle_arcsec)))
-    return Record(
+    return SimulatedRecord(
         reading_c=reading[inside][:-1],
         channels={name: values[inside][:-1] for name, values in readings.items()},
         air_c=air_c[inside],
@@ -93,7 +93,7 @@ def record(
     )
 
 
-def thermal_network(gyro: Gyro) -> thermal.Network:
+def thermal_network(gyro: Gyro) -> thermal.ThermalNetwork:
     """The network that a scenario describes."""
     names = tuple(gyro.node)
     between = np.zeros((len(names), len(names)))
@@ -103,7 +103,7 @@ def thermal_network(gyro: Gyro) -> thermal.Network:
             between[pair] += conductance
             between[pair[::-1]] += conductance
     nodes = list(gyro.node.values())
-    return thermal.Network(
+    return thermal.ThermalNetwork(
         names=names,
         capacity=np.array([node.heat_capacity_j_per_k for node in nodes]),
         to_air=np.array([node.to_air_w_per_k for node in nodes]),
@@ -181,7 +181,7 @@ def _bias(
     return scene, bias
 
 
-def _with_channel(scene: Scene, cause: Cause, true_channels: dict[str, Array]) -> Scene:
+def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, Array]) -> Scene:
     return scene if cause.channel is None else replace(scene, channel=true_channels[cause.channel])
 
 

@@ -37,7 +37,7 @@ class Ramp(_Strict):
     c_per_min: Positive
 
 
-class Jump(_Strict):
+class FastChange(_Strict):
     """Go to another temperature as fast as the chamber can."""
 
     step_to_c: Celsius
@@ -78,7 +78,7 @@ class Repeat(_Strict):
 _KINDS = {
     "hold_min": Hold,
     "ramp_to_c": Ramp,
-    "step_to_c": Jump,
+    "step_to_c": FastChange,
     "staircase_to_c": Staircase,
     "triangle_c": Triangle,
     "nested_c": Nested,
@@ -96,7 +96,7 @@ def _kind(step: Any) -> str | None:
 Step = Annotated[
     Annotated[Hold, Tag("hold_min")]
     | Annotated[Ramp, Tag("ramp_to_c")]
-    | Annotated[Jump, Tag("step_to_c")]
+    | Annotated[FastChange, Tag("step_to_c")]
     | Annotated[Staircase, Tag("staircase_to_c")]
     | Annotated[Triangle, Tag("triangle_c")]
     | Annotated[Nested, Tag("nested_c")]
@@ -122,7 +122,7 @@ def _legs(step: Any, now_c: float, fastest: float) -> Iterator[_Leg]:
     """The legs of one step that starts at `now_c`; the chamber can do `fastest` C/min."""
     if isinstance(step, Hold):
         yield 60.0 * step.hold_min, now_c
-    elif isinstance(step, Jump):
+    elif isinstance(step, FastChange):
         yield _ramp(now_c, step.step_to_c, fastest)
     elif isinstance(step, Repeat):
         yield from _repeat(step, now_c, fastest)

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import noise
-from .instrument import Record
+from .instrument import SimulatedRecord
 from .noise import CELL_S
 
-__all__ = ["Chunk", "RowLength", "rows"]
+__all__ = ["RecordingPart", "RowLength", "rows"]
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class RowLength:
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
+class RecordingPart:
     """Consecutive rows.
 
     Attributes:
@@ -72,7 +72,7 @@ class Chunk:
     edge_arcsec: Array
 
 
-def rows(record: Record, length: RowLength) -> Iterator[Chunk]:
+def rows(record: SimulatedRecord, length: RowLength) -> Iterator[RecordingPart]:
     """The rows of a record, in chunks; a last row that is not full is left out."""
     fine = _Fine(record, length.per_cell)
     whole = len(record.reading_c) - len(record.reading_c) % length.cells
@@ -82,7 +82,7 @@ def rows(record: Record, length: RowLength) -> Iterator[Chunk]:
         first = start * length.per_cell // length.cells
         count = (stop - start) * length.per_cell // length.cells
         edges = record.angle_arcsec[start : stop + 1 : length.cells]
-        yield Chunk(
+        yield RecordingPart(
             time_s=length.row_s * np.arange(first, first + count, dtype=np.float64),
             temperature_c=_held(record.reading_c[start:stop], length),
             channels={name: _held(values[start:stop], length) for name, values in record.channels.items()},
@@ -100,7 +100,7 @@ def _held(readings: Array, length: RowLength) -> Array:
 class _Fine:
     """Angle at the edges of rows shorter than a cell; at full seconds it is the record's own."""
 
-    def __init__(self, record: Record, parts: int) -> None:
+    def __init__(self, record: SimulatedRecord, parts: int) -> None:
         self._record = record
         self._parts = parts
         self._share = np.arange(1, parts) / parts

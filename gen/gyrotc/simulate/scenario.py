@@ -18,7 +18,7 @@ from ..inputs import read_toml, refuse_above
 from ..terms import CATALOGUE
 from .profile import Step
 
-__all__ = ["Cause", "Chamber", "Channel", "NoiseLevels", "Profile", "Scenario", "names", "read"]
+__all__ = ["Chamber", "Channel", "NoiseLevels", "Profile", "Scenario", "ScenarioCause", "names", "read"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -129,7 +129,7 @@ class Channel(_Strict):
     noise: NonNegative = 0.0
 
 
-class Cause(BaseModel):
+class ScenarioCause(BaseModel):
     """A cause of the catalogue that acts: its id, its parameters, the channel where it needs one."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
@@ -139,7 +139,7 @@ class Cause(BaseModel):
     __pydantic_extra__: dict[str, float] = Field(init=False)
 
     @model_validator(mode="after")
-    def _check(self) -> Cause:
+    def _check(self) -> ScenarioCause:
         if self.id not in CATALOGUE:
             raise ValueError(f"no cause {self.id!r}; there are {', '.join(CATALOGUE)}")
         term = CATALOGUE[self.id]
@@ -187,7 +187,7 @@ class Scenario(_Strict):
     sensor: Sensor = Field(default_factory=Sensor)
     noise: NoiseLevels = Field(default_factory=NoiseLevels)
     channel: list[Channel] = []
-    cause: list[Cause] = []
+    cause: list[ScenarioCause] = []
     profile: Annotated[dict[str, Profile], Field(min_length=1)]
     set: Annotated[list[RunSet], Field(min_length=1)]
 

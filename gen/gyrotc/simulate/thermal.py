@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-__all__ = ["Network"]
+__all__ = ["ThermalNetwork"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Network:
+class ThermalNetwork:
     """Nodes of the instrument in the chamber's air.
 
     Attributes:

@@ -12,9 +12,9 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from .recording import Chunk
+from .recording import RecordingPart
 
-__all__ = ["Format", "RunFile"]
+__all__ = ["Format", "SimulatedRunFile"]
 
 Format = Literal["csv", "parquet"]
 _RATE_DECIMALS = 9  # deg/h: far below the noise of any row
@@ -26,7 +26,7 @@ class _Writer(Protocol):
     def close(self) -> None: ...
 
 
-class RunFile:
+class SimulatedRunFile:
     """One run on disk, written chunk by chunk.
 
     Rates are stamped with the start of their row. Pulses are counts since the last row, stamped with the end
@@ -58,7 +58,7 @@ class RunFile:
             self._sink = path.open("wb")
             self._writer = pyarrow.parquet.ParquetWriter(self._sink, self._schema, use_dictionary=False)
 
-    def write(self, chunk: Chunk) -> None:
+    def write(self, chunk: RecordingPart) -> None:
         """Appends rows."""
         columns = [chunk.temperature_c, *chunk.channels.values()]
         rounded = [np.round(column, _DECIMALS) for column in columns]
@@ -76,7 +76,7 @@ class RunFile:
         arrays = [np.round(time_s, _DECIMALS), rounded[0], value, *rounded[1:]]
         self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
 
-    def __enter__(self) -> RunFile:
+    def __enter__(self) -> SimulatedRunFile:
         return self
 
     def __exit__(self, *error: object) -> None:

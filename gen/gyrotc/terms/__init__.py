@@ -1,6 +1,6 @@
-"""The catalogue of causes: every module of this package that has a `TERM` is one.
+"""The catalogue of causes: every module of this package that has a `CAUSE` is one.
 
-To add a cause, write its module (see `base.Term`); nothing else lists it.
+To add a cause, write its module (see `base.Cause`); nothing else lists it.
 """
 
 from __future__ import annotations
@@ -8,43 +8,43 @@ from __future__ import annotations
 import pkgutil
 from importlib import import_module
 
-from .base import Features, History, Needs, Parameter, Scene, Term
+from .base import Cause, Features, History, Needs, Parameter, Scene
 
 __all__ = [
     "CATALOGUE",
+    "Cause",
     "Features",
     "History",
     "Needs",
     "Parameter",
     "Scene",
-    "Term",
     "register",
     "separate_by",
 ]
 
 
-CATALOGUE: dict[str, Term] = {}
+CATALOGUE: dict[str, Cause] = {}
 """Every cause by its id, in the order in which results list them."""
 
 
-def register(term: Term) -> None:
+def register(cause: Cause) -> None:
     """Puts a cause into the catalogue, by its rank.
 
     Raises:
         ValueError: There is a cause of this id or rank.
     """
     for other in CATALOGUE.values():
-        if term.id == other.id or term.rank == other.rank:
-            raise ValueError(f"{term.id}, rank {term.rank}: {other.id} has rank {other.rank}")
-    ranked = sorted([*CATALOGUE.values(), term], key=lambda t: t.rank)
+        if cause.id == other.id or cause.rank == other.rank:
+            raise ValueError(f"{cause.id}, rank {cause.rank}: {other.id} has rank {other.rank}")
+    ranked = sorted([*CATALOGUE.values(), cause], key=lambda c: c.rank)
     CATALOGUE.clear()
-    CATALOGUE.update({t.id: t for t in ranked})
+    CATALOGUE.update({c.id: c for c in ranked})
 
 
 for _module in pkgutil.iter_modules(__path__):
-    _term = getattr(import_module(f"{__name__}.{_module.name}"), "TERM", None)
-    if _term is not None:
-        register(_term)
+    _cause = getattr(import_module(f"{__name__}.{_module.name}"), "CAUSE", None)
+    if _cause is not None:
+        register(_cause)
 
 
 def separate_by(one: str, other: str) -> str:

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
-from .search import Reach, Search
-from .words import Telling, Words
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .search import Reach, SearchRule
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 _STRAIGHT = math.inf
 
@@ -44,7 +44,7 @@ def _grid(reach: Reach) -> list[Values]:
     return [{"d0_day": _STRAIGHT}, {"d0_day": 2.0}]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="ageing",
     family="between_runs",
     rank=70,
@@ -55,7 +55,7 @@ TERM = Term(
         Parameter("d0_day", "day", 0.1, _STRAIGHT, default=_STRAIGHT),
         Parameter("slope_dph_per_day", "deg/h/day", 1e-7, 1e-2, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The bias drifts from run to run with the date",
         short="ageing",
         signature="means of the runs follow the calendar",
@@ -64,7 +64,7 @@ TERM = Term(
         telling=Telling.REPEATS,
         recording="record on three dates or more and note them (started)",
     ),
-    search=Search(price=1, grid=_grid),
+    search=SearchRule(price=1, grid=_grid),
     needs=Needs(runs=3, dates=3),
     bias=_bias,
     features=_features,

@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
 from .recursion import TableKind
-from .search import Search, anywhere
+from .search import SearchRule, anywhere
 from .tabled import Tabled
-from .words import Telling, Words
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _channel(channel: Array | None) -> Array:
@@ -42,7 +42,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [values["slope_dph_per_unit"], values["reference"]]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="auxiliary",
     family="auxiliary",
     rank=100,
@@ -53,7 +53,7 @@ TERM = Term(
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
         Parameter("reference", "unit", -1e9, 1e9, linear=True, logarithmic=False, default=0.0),
     ),
-    words=Words(
+    words=Wording(
         name="The bias follows a recorded channel",
         short="channel",
         signature="residual is proportional to the channel, and not to the channel shifted in time",
@@ -61,7 +61,7 @@ TERM = Term(
         experiment="vary the channel by hand at a constant temperature",
         telling=Telling.CHANNEL,
     ),
-    search=Search(price=1, grid=anywhere, planned=False),
+    search=SearchRule(price=1, grid=anywhere, planned=False),
     table=Tabled(TableKind.AUXILIARY, _record),
     needs=Needs(channel=True),
     bias=_bias,

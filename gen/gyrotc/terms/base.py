@@ -1,4 +1,4 @@
-"""What a cause of the catalogue is: everything that is known of it stands in one `Term`, in one module.
+"""What a cause of the catalogue is: everything that is known of it stands in one `Cause`, in one module.
 
 - `cavity`, `bias`, `record`: how the cause acts on a simulated instrument (`Scene`), at the simulation's own
   rate;
@@ -19,11 +19,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .search import Search
+from .search import SearchRule
 from .tabled import Tabled
-from .words import Words
+from .words import Wording
 
-__all__ = ["Features", "History", "Kind", "Needs", "Parameter", "Scene", "Term", "Values"]
+__all__ = ["Cause", "Features", "History", "Kind", "Needs", "Parameter", "Scene", "Values"]
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -128,7 +128,7 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
+class Cause:
     """A cause of the catalogue. A hook that a cause does not have is None.
 
     Attributes:
@@ -160,9 +160,9 @@ class Term:
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
-    words: Words
+    words: Wording
     needs: Needs = Needs()
-    search: Search | None = None
+    search: SearchRule | None = None
     table: Tabled | None = None
     centers: int | None = None
     cavity: Callable[[Scene, Values], Array] | None = None

@@ -5,15 +5,15 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 
 from __future__ import annotations
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
 from .memory import RATES, lagged
 from .operators import first_order
 from .recursion import TableKind
-from .search import Search, geometric
+from .search import SearchRule, geometric
 from .tabled import Tabled, blocks_per_tau, memory_gain
-from .words import Words
+from .words import Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _cavity(scene: Scene, values: Values) -> Array:
@@ -31,7 +31,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [memory_gain(block_s, values["tau_s"]), 0.0, blocks_per_tau(block_s, values["tau_s"])]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="cavity_lag",
     family="thermal_memory",
     rank=10,
@@ -39,14 +39,14 @@ TERM = Term(
     equation="tau dz/dt = T - z; bias = f(z, dz/dt)",
     source="first-order heat conduction from the sensor into the cavity; glass ceramics conduct poorly",
     parameters=(_TAU,),
-    words=Words(
+    words=Wording(
         name="The cavity lags the temperature sensor",
         short="lag",
         signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
         remedy="one first-order state: the map sees the cavity's temperature",
         experiment=RATES,
     ),
-    search=Search(
+    search=SearchRule(
         price=2,
         grid=geometric(_TAU, 22),
         over=_TAU.name,

@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from .base import Array, Parameter, Scene, Term, Values
+from .base import Array, Cause, Parameter, Scene, Values
 from .operators import first_order
-from .words import Telling, Words
+from .words import Telling, Wording
 
-__all__ = ["EARTH_RATE_DPH", "TERM"]
+__all__ = ["CAUSE", "EARTH_RATE_DPH"]
 
 EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
 _REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
@@ -31,7 +31,7 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
     return np.asarray(EARTH_RATE_DPH * angle)
 
 
-TERM = Term(
+CAUSE = Cause(
     id="earth_rate_tilt",
     family="bench",
     rank=120,
@@ -44,7 +44,7 @@ TERM = Term(
         Parameter("twist_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
         Parameter("tilt_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
     ),
-    words=Words(
+    words=Wording(
         name="The fixture turns the axis through Earth rate",
         short="tilt",
         signature="none on one axis: the static map holds it",

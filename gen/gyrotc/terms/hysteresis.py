@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
 from .operators import play
 from .recursion import TableKind
-from .search import Search, SingleCycle, geometric
+from .search import SearchRule, SingleCycle, geometric
 from .tabled import Tabled
-from .words import Telling, Words
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -44,7 +44,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [values["width_c"], values["amplitude_dph_per_c"]]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="hysteresis",
     family="hysteresis",
     rank=40,
@@ -55,7 +55,7 @@ TERM = Term(
         _WIDTH,
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The bias remembers the direction of the last temperature change",
         short="hyster.",
         signature="loops over T whose width does not depend on the rate; "
@@ -65,7 +65,7 @@ TERM = Term(
         telling=Telling.DIRECTION,
         beside={"turn_on_offset": _BOTH_SIDES + ", all within one power-on"},
     ),
-    search=Search(
+    search=SearchRule(
         price=2,
         grid=geometric(_WIDTH, 20),
         over=_WIDTH.name,

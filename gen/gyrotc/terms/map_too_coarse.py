@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
-from .search import Search, anywhere
-from .words import Telling, Words
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .search import SearchRule, anywhere
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -27,7 +27,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(np.maximum(0.0, 1.0 - distance), np.ones(len(history.time_s), dtype=bool))
 
 
-TERM = Term(
+CAUSE = Cause(
     id="map_too_coarse",
     family="static_map",
     rank=80,
@@ -39,7 +39,7 @@ TERM = Term(
         Parameter("at_c", "C", -40.0, 70.0, logarithmic=False, default=20.0),
         Parameter("amplitude_dph", "deg/h", 1e-5, 1e-2, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The static map is too coarse",
         short="map",
         signature="residual repeats over T, heating and cooling alike, finer than the map",
@@ -47,7 +47,7 @@ TERM = Term(
         experiment="one slow ramp over the full range in both directions",
         telling=Telling.STATIC,
     ),
-    search=Search(price=1, grid=anywhere, needed_d=9.0, planned=False),
+    search=SearchRule(price=1, grid=anywhere, needed_d=9.0, planned=False),
     centers=24,
     bias=_bias,
     features=_features,

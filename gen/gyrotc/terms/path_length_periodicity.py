@@ -13,13 +13,13 @@ import math
 
 import numpy as np
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
 from .recursion import TableKind
-from .search import Reach, Search
+from .search import Reach, SearchRule
 from .tabled import Tabled, turns
-from .words import Telling, Words
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -57,7 +57,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [1.0 / values["period_c"], turns(values["phase_rad"]), values["amplitude_dph"]]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="path_length_periodicity",
     family="static_map",
     rank=90,
@@ -69,7 +69,7 @@ TERM = Term(
         Parameter("amplitude_dph", "deg/h", 1e-6, 1e-2, linear=True),
         Parameter("phase_rad", "rad", -math.pi, math.pi, linear=True, default=0.0),
     ),
-    words=Words(
+    words=Wording(
         name="The bias is periodic in temperature",
         short="period",
         signature="residual waves over T with one period and the same phase heating and cooling",
@@ -78,7 +78,7 @@ TERM = Term(
         telling=Telling.STATIC,
         beside={"map_too_coarse": "one slow ramp over the full range (0.5 C/min)"},
     ),
-    search=Search(
+    search=SearchRule(
         price=3,
         grid=_grid,
         over=_PERIOD.name,

@@ -21,7 +21,7 @@ from ..status import HELD
 from .arithmetic import Operations
 from .operators import play
 
-__all__ = ["Course", "Outcome", "Recursion", "TableKind", "recursion_of"]
+__all__ = ["Course", "Recursion", "TableKind", "TermOutcome", "recursion_of"]
 
 Numbers = NDArray[Any]
 
@@ -57,7 +57,7 @@ class Course:
 
 
 @dataclass(slots=True)
-class Outcome:
+class TermOutcome:
     """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits."""
 
     temperature: Numbers
@@ -73,7 +73,7 @@ class Recursion:
         self.do = do
         self.p = parameters
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         """Changes the outcome of every correction; `channel`: samples of the term's channel, in their order."""
         raise NotImplementedError
 
@@ -84,7 +84,7 @@ class _Memory(Recursion):
     Where rate is not 0 the map sees z and (T - z) rate instead of T and its slope.
     """
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         _, amplitude, rate = self.p[:3]
         x, z = course.temperature, self.do.reading(self._states(course))
         if rate != 0:
@@ -106,7 +106,7 @@ class _Memory(Recursion):
 class _Play(Recursion):
     """z <- max(T - width, min(T + width, z)) once a block, from the first T on; adds amplitude (z - T)."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         steps = course.closes.copy()
         steps[:1] = True
         z = play(self.p[0], course.temperature[steps])[np.cumsum(steps) - 1]
@@ -116,21 +116,21 @@ class _Play(Recursion):
 class _WarmUp(Recursion):
     """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         outcome.added = outcome.added + self.do.fading(course.elapsed, self.p[0], self.p[1])
 
 
 class _Harmonic(Recursion):
     """Adds amplitude cos(2 pi (T frequency + phase)), phase in turns."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         outcome.added = outcome.added + self.do.wave(course.temperature, *self.p[:3])
 
 
 class _Auxiliary(Recursion):
     """Adds slope (mean - reference), the mean of the channel's last block of which at least half was there."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: Outcome) -> None:
+    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
         if channel is None:
             raise ValueError("a term of a channel without its channel")
         slope, reference = self.p[:2]

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .base import Parameter
 
-__all__ = ["Reach", "Search", "SingleCycle", "anywhere", "geometric"]
+__all__ = ["Reach", "SearchRule", "SingleCycle", "anywhere", "geometric"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class SingleCycle:
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class SearchRule:
     """How diagnosis looks for a cause.
 
     Attributes:

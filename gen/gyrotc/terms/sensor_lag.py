@@ -7,19 +7,19 @@ a static map absorbs it and nothing in its residual can show it. There is nothin
 
 from __future__ import annotations
 
-from .base import Array, Parameter, Scene, Term, Values
+from .base import Array, Cause, Parameter, Scene, Values
 from .memory import RATES
 from .operators import first_order
-from .words import Words
+from .words import Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _record(scene: Scene, values: Values) -> Array:
     return first_order(values["tau_s"], scene.time_s, scene.sensed_c)
 
 
-TERM = Term(
+CAUSE = Cause(
     id="sensor_lag",
     family="control",
     rank=110,
@@ -27,7 +27,7 @@ TERM = Term(
     equation="tau dT_s/dt = T - T_s; f(T) = f(T_s + tau dT_s/dt)",
     source="identity; a static map of (T_s, dT_s/dt) absorbs it",
     parameters=(Parameter("tau_s", "s", 10.0, 1000.0),),
-    words=Words(
+    words=Wording(
         name="The temperature sensor lags the cavity",
         short="sensor",
         signature="none: a static map absorbs it",

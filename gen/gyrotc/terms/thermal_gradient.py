@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
 from .memory import RATES, lagged
 from .operators import first_order
 from .recursion import TableKind
-from .search import Search, SingleCycle, geometric
+from .search import SearchRule, SingleCycle, geometric
 from .tabled import Tabled, half_block_before, memory_gain
-from .words import Words
+from .words import Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -48,7 +48,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     ]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="thermal_gradient",
     family="thermal_memory",
     rank=20,
@@ -60,14 +60,14 @@ TERM = Term(
         _TAU,
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The bias follows a temperature difference inside the gyro",
         short="gradient",
         signature="residual follows the ramp with the same size at every temperature and fades in holds",
         remedy="one first-order state and a linear term",
         experiment=RATES,
     ),
-    search=Search(
+    search=SearchRule(
         price=2,
         grid=geometric(_TAU, 24),
         over=_TAU.name,

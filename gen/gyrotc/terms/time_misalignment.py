@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
 from .memory import CORNERS, RATES
 from .operators import delayed
-from .search import Reach, Search
-from .words import Words
+from .search import Reach, SearchRule
+from .words import Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 _SHIFT_S, _SHIFTS = 50.0, 12  # of the grid, to either side
 _MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
@@ -45,7 +45,7 @@ def _unseen_s(values: Values) -> float:
     return abs(values["shift_s"]) + _MARGIN_S
 
 
-TERM = Term(
+CAUSE = Cause(
     id="time_misalignment",
     family="thermal_memory",
     rank=30,
@@ -53,7 +53,7 @@ TERM = Term(
     equation="T_recorded(t) = T(t - shift); bias = f(T, dT/dt)",
     source="clocks of two recorders, group delay of a filter in one channel only",
     parameters=(Parameter("shift_s", "s", 5.0, 1200.0, signed=True),),
-    words=Words(
+    words=Wording(
         name="Temperature and rate are not recorded at the same time",
         short="shift",
         signature="residual follows the second derivative of T at the corners of ramps",
@@ -62,7 +62,7 @@ TERM = Term(
         beside={"cavity_lag": CORNERS, "thermal_gradient": CORNERS},
         advice="Mend the clocks or filters of the recording; no term on the target stands for them.",
     ),
-    search=Search(
+    search=SearchRule(
         price=2,
         grid=_grid,
         over="shift_s",

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
-from .search import Search, anywhere
-from .words import Telling, Words
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .search import SearchRule, anywhere
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -29,7 +29,7 @@ def _amplitudes(weights: Array) -> dict[str, float]:
     return {"std_dph": float(np.sqrt(np.mean(weights**2)))}
 
 
-TERM = Term(
+CAUSE = Cause(
     id="turn_on_offset",
     family="between_runs",
     rank=60,
@@ -37,7 +37,7 @@ TERM = Term(
     equation="bias += o_run, o_run normal with standard deviation std",
     source="run-to-run bias repeatability, IEEE Std 647",
     parameters=(Parameter("std_dph", "deg/h", 1e-5, 1e-1, linear=True),),
-    words=Words(
+    words=Wording(
         name="Every power-on has its own offset",
         short="offsets",
         signature="means of the runs scatter more than their noise allows",
@@ -47,7 +47,7 @@ TERM = Term(
         beside={"ageing": "the same hold on at least five dates, several power cycles on each"},
         recording="record three runs or more, each with its own power-on",
     ),
-    search=Search(price=1, grid=anywhere, needed_d=10.0, imitates=True),
+    search=SearchRule(price=1, grid=anywhere, needed_d=10.0, imitates=True),
     needs=Needs(runs=3),
     bias=_bias,
     features=_features,

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Features, History, Needs, Parameter, Scene, Term, Values
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
 from .memory import COLD_STARTS
 from .recursion import TableKind
-from .search import Search, geometric
+from .search import SearchRule, geometric
 from .tabled import Tabled, half_block_before, octaves_per_block
-from .words import Telling, Words
+from .words import Telling, Wording
 
-__all__ = ["TERM"]
+__all__ = ["CAUSE"]
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
@@ -46,7 +46,7 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [octaves_per_block(block_s, tau_s), values["amplitude_dph"] * middle]
 
 
-TERM = Term(
+CAUSE = Cause(
     id="warm_up",
     family="power_on",
     rank=50,
@@ -57,7 +57,7 @@ TERM = Term(
         _TAU,
         Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True),
     ),
-    words=Words(
+    words=Wording(
         name="The bias settles after power-on whatever the temperature is",
         short="warm-up",
         signature="residuals of all runs agree over the time since power-on",
@@ -67,7 +67,7 @@ TERM = Term(
         beside={"thermal_gradient": COLD_STARTS, "cavity_lag": COLD_STARTS},
         recording="note the time of power-on of every run (power_on_s)",
     ),
-    search=Search(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True, shown=(1800.0,)),
+    search=SearchRule(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True, shown=(1800.0,)),
     table=Tabled(TableKind.WARM_UP, _record),
     needs=Needs(power_on=True),
     bias=_bias,

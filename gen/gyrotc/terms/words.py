@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-__all__ = ["Telling", "Words"]
+__all__ = ["Telling", "Wording"]
 
 
 class Telling(IntEnum):
@@ -21,7 +21,7 @@ class Telling(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class Wording:
     """For reports.
 
     Attributes:

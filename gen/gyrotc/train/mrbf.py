@@ -21,7 +21,7 @@ from .data import Scaling, TrainingData, scaling_of
 from .noise import not_white
 from .process import Process, fit_process
 from .result import Outcome, network
-from .simple import FLAT
+from .simple import without_rate
 
 __all__ = ["fit_mrbf", "fit_mrbf_t"]
 
@@ -95,15 +95,7 @@ def fit_mrbf_t(
     """A map of T alone, valid over the rates of the samples; arguments and errors as `fit_mrbf`."""
     still = replace(data, slope_c_per_min=np.zeros(len(data)))
     outcome = fit_mrbf(still, scaling_of(still), seed=seed, centers=centers, average_s=average_s)
-    flat = [
-        {
-            **one,
-            "linear": [one["linear"][0], 0.0],
-            "centers": [[t, 0.0] for t, _ in one["centers"]],
-            "widths": [[width, FLAT] for width, _ in one["widths"]],
-        }
-        for one in outcome.networks
-    ]
+    flat = [without_rate(one) for one in outcome.networks]
     return replace(outcome, networks=flat, process=None)
 
 

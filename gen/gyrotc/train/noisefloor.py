@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..metrics import LEAST_SPAN_C
-from ..results.training import AllanPoint, NoiseTerms, Sensitivity
+from ..results.training import AllanPoint, BiasPlane, NoiseTerms
 
 __all__ = ["allan_variance", "noise_terms", "sensitivities", "stretches"]
 
@@ -97,7 +97,7 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> NoiseTerms:
 
 def sensitivities(
     temperature_c: Floats, slope_c_per_min: Floats, bias_dph: Floats, weight: Floats
-) -> Sensitivity:
+) -> BiasPlane:
     """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane."""
     root = np.sqrt(weight)
     inputs = {"bias_dph_per_c": temperature_c, "bias_dph_per_c_per_min": slope_c_per_min}
@@ -108,7 +108,7 @@ def sensitivities(
     solution, *_ = np.linalg.lstsq(design * root[:, None], bias_dph * root, rcond=None)
     residual = bias_dph - design @ solution
     slopes = dict(zip(used, (float(value) for value in solution[1:]), strict=True))
-    return Sensitivity(
+    return BiasPlane(
         bias_dph_per_c=slopes.get("bias_dph_per_c"),
         bias_dph_per_c_per_min=slopes.get("bias_dph_per_c_per_min"),
         residual_rms_dph=float(np.sqrt(np.average(residual**2, weights=weight))),

@@ -7,19 +7,20 @@ three or four Gaussians in T so wide that they reproduce it to 2.4e-4 of its coe
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .data import Scaling, TrainingData, average
 from .noise import floor_dph
-from .result import Outcome, network
+from .result import Network, Outcome, network
 
-__all__ = ["FLAT", "SIMPLE", "design", "fit_simple", "solve"]
+__all__ = ["SIMPLE", "design", "fit_simple", "solve", "without_rate"]
 
 Floats = NDArray[np.float64]
 
-FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
+_FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "constant": ((0, 0),),
     "linear": ((0, 0), (1, 0)),
@@ -33,6 +34,16 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
 _GAUSSIANS = ((3, 1.5, 1.5), (4, 1.5, 2.0))
 _TOLERANCE = 0.01  # of the noise floor
 _GRID = 201  # points at which Gaussians are held against powers, a hundredth of a half range apart
+
+
+def without_rate(fitted: Network) -> dict[str, Any]:
+    """A network that was fitted where dT/dt is 0 everywhere, flat in dT/dt: a map of T alone."""
+    return {
+        **fitted,
+        "linear": [fitted["linear"][0], 0.0],
+        "centers": [[center, 0.0] for center, _ in fitted["centers"]],
+        "widths": [[width, _FLAT] for width, _ in fitted["widths"]],
+    }
 
 
 def design(name: str, t: Floats, r: Floats) -> Floats:
@@ -63,7 +74,7 @@ def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float
         extra, z, width, weights = _as_gaussians(by_power[2, 0], by_power[3, 0], _TOLERANCE * floor)
         w0, linear[0] = w0 + extra[0], linear[0] + extra[1]
         centers = np.stack([scaling.center_c + scaling.half_range_c * z, np.zeros(len(z))], axis=1)
-        widths = np.stack([np.full(len(z), width), np.full(len(z), FLAT)], axis=1)
+        widths = np.stack([np.full(len(z), width), np.full(len(z), _FLAT)], axis=1)
     means = len(average(data, average_s))
     return Outcome(
         networks=(network(w0, linear, centers, widths, weights),),

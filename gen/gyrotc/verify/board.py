@@ -15,8 +15,8 @@ from ..errors import CheckFailed
 from ..model import Model
 from ..outputs import scratch_folder
 from ..reference.table import Table
-from ..results.verification import Cost, FunctionCost, VerifiedTarget
-from .boardlog import BoardOutput, compare, read_output
+from ..results.verification import CallCost, FunctionCost, VerifiedTarget
+from .boardlog import BoardOutput, compared_words, read_output
 from .functions import function_costs
 from .source import board_files, checked_sources
 from .toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
@@ -94,7 +94,7 @@ def _ran(job: Job, target: Target, numeric: str, shared: list[Path], work: Path,
     output = _output_of(text if "begin " in text else run.stderr, job, numeric)
     if run.returncode != 0:
         raise CheckFailed(f"the program ended with status {run.returncode}: {run.stderr[:200]}")
-    comparison = compare(output, job.expected[numeric])
+    comparison = compared_words(output, job.expected[numeric])
     return {
         "status": "fail" if comparison.mismatches else "pass",
         "vectors": comparison.vectors,
@@ -134,7 +134,7 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for what, cost in output.costs.items():
         prefix = "" if what == "map" else f"{what}_"
-        found[prefix + target.counts] = Cost(
+        found[prefix + target.counts] = CallCost(
             min=round(cost.low / target.ticks_per_count),
             mean=round(cost.total / cost.calls / target.ticks_per_count, 1),
             max=round(cost.high / target.ticks_per_count),

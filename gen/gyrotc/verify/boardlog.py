@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed
 
-__all__ = ["BoardLog", "BoardOutput", "Comparison", "Cost", "compare", "read_log", "read_output"]
+__all__ = ["BoardComparison", "BoardLog", "BoardOutput", "Cost", "compared_words", "read_log", "read_output"]
 
 Words = NDArray[np.uint32]
 Line = tuple[int, str]
@@ -69,7 +69,7 @@ class BoardLog:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class BoardComparison:
     """Results compared, mismatches among them, and the first of them with all bits.
 
     Where only CRCs were printed, all results of a differing group count as mismatches.
@@ -202,7 +202,7 @@ def _costs(lines: list[Line], position: int) -> tuple[dict[str, Cost], int]:
     return costs, position
 
 
-def compare(output: BoardOutput, expected: Words) -> Comparison:
+def compared_words(output: BoardOutput, expected: Words) -> BoardComparison:
     """Compares the words of a board test with the reference's (status, bits), shape (n, 2).
 
     Raises:
@@ -217,10 +217,10 @@ def compare(output: BoardOutput, expected: Words) -> Comparison:
         f"vector {k}: status {got[0]:08x} bits {got[1]:08x}, reference {want[0]:08x} {want[1]:08x}"
         for k, got, want in ((int(k), output.words[k], expected[k]) for k in wrong[:_SHOWN_MISMATCHES])
     )
-    return Comparison(len(expected), int(wrong.size), first)
+    return BoardComparison(len(expected), int(wrong.size), first)
 
 
-def _compare_groups(crcs: Words, expected: Words) -> Comparison:
+def _compare_groups(crcs: Words, expected: Words) -> BoardComparison:
     mismatches, first = 0, []
     for k, got in enumerate(crcs):
         group = expected[k * _GROUP : (k + 1) * _GROUP]
@@ -231,4 +231,4 @@ def _compare_groups(crcs: Words, expected: Words) -> Comparison:
             first.append(
                 f"vectors {start} to {start + len(group) - 1}: CRC {int(got):08x}, reference {want:08x}"
             )
-    return Comparison(len(expected), mismatches, tuple(first[:_SHOWN_MISMATCHES]))
+    return BoardComparison(len(expected), mismatches, tuple(first[:_SHOWN_MISMATCHES]))

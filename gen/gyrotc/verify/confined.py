@@ -18,7 +18,7 @@ from typing import IO
 
 from ..errors import CheckFailed
 
-__all__ = ["LIMIT_S", "Run", "confined", "run_to_end"]
+__all__ = ["LIMIT_S", "ProgramRun", "confined", "run_to_end"]
 
 LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).
@@ -31,7 +31,7 @@ Stream = IO[bytes] | int
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ProgramRun:
     """How a program ended and what it printed."""
 
     returncode: int
@@ -69,7 +69,9 @@ def confined(
                     pipe.close()
 
 
-def run_to_end(command: Sequence[str], folder: Path, what: str, stdin: Stream = subprocess.DEVNULL) -> Run:
+def run_to_end(
+    command: Sequence[str], folder: Path, what: str, stdin: Stream = subprocess.DEVNULL
+) -> ProgramRun:
     """Runs a command in `folder` to its end.
 
     Raises:
@@ -87,7 +89,9 @@ def run_to_end(command: Sequence[str], folder: Path, what: str, stdin: Stream = 
                 raise CheckFailed(f"{what} did not end within {LIMIT_S} s") from error
         for stream in (stdout, stderr):
             stream.seek(0)
-        return Run(process.returncode, stdout.read(), stderr.read(_SAID_BYTES).decode("utf-8", "replace"))
+        return ProgramRun(
+            process.returncode, stdout.read(), stderr.read(_SAID_BYTES).decode("utf-8", "replace")
+        )
 
 
 def _environment(folder: Path) -> dict[str, str]:

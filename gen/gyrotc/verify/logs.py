@@ -11,9 +11,9 @@ from ..emit.vectors import Vectors
 from ..errors import CheckFailed
 from ..inputs import read_input
 from ..reference import answers
-from ..results.verification import Cost, LogPart, ReadLog, VerifiedTarget
+from ..results.verification import CallCost, LogPart, ReadLog, VerifiedTarget
 from .board import Job, check_identity
-from .boardlog import BoardLog, BoardOutput, Comparison, compare, read_log
+from .boardlog import BoardComparison, BoardLog, BoardOutput, compared_words, read_log
 
 __all__ = ["log_entries", "log_parts"]
 
@@ -34,7 +34,7 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[VerifiedTar
         compared = [(part, _compared(job, vectors, part)) for part in found.parts]
     except CheckFailed as error:
         raise CheckFailed(f"{log}: {error}") from error
-    groups: dict[tuple[str, str], list[tuple[BoardOutput, Comparison]]] = {}
+    groups: dict[tuple[str, str], list[tuple[BoardOutput, BoardComparison]]] = {}
     for part, comparison in compared:
         groups.setdefault((part.board or log.stem, part.numeric), []).append((part, comparison))
     whole = ReadLog(
@@ -61,7 +61,7 @@ def log_parts(log: Path) -> BoardLog:
     return read_log(read_input(log, "result_mib", "the output of board_test.c").decode("ascii", "replace"))
 
 
-def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> Comparison:
+def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> BoardComparison:
     """A part against the reference."""
     check_identity(part, job)
     table = job.tables.get(part.numeric)
@@ -73,10 +73,12 @@ def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> Comparison:
             f"line {part.line}: {part.random} random vectors were asked for, which makes {fixed + part.random} "
             f"results; the board test made {part.n_results}"
         )
-    return compare(part, answers(table, replace(vectors, n_random=part.random)))
+    return compared_words(part, answers(table, replace(vectors, n_random=part.random)))
 
 
-def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, Comparison]]) -> VerifiedTarget:
+def _entry(
+    job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, BoardComparison]]
+) -> VerifiedTarget:
     """What one board showed of one arithmetic; the cost of the calls is that of the last part."""
     mismatches = sum(c.mismatches for _, c in parts)
     several = len(parts) > 1
@@ -104,6 +106,6 @@ def _costs(output: BoardOutput) -> dict[str, Any]:
     for what, cost in output.costs.items():
         prefix = "" if what == "map" else f"{what}_"
         mean = round(cost.total / cost.calls, 1)
-        found[f"{prefix}ticks"] = Cost(min=cost.low, mean=mean, max=cost.high)
+        found[f"{prefix}ticks"] = CallCost(min=cost.low, mean=mean, max=cost.high)
         found[f"{prefix}stack_bytes"] = cost.stack
     return found

@@ -14,7 +14,7 @@ from ..errors import CheckFailed
 from ..reference.table import Table
 from ..results.verification import ReplayedRows, VerifiedTarget
 from .board import Job
-from .replay import History, history_of, replay_on, replay_program
+from .replay import ReplayCase, history_of, replay_on, replay_program
 from .toolchain import Target
 
 __all__ = ["replay_dataset"]
@@ -35,7 +35,7 @@ class _Lane:
     first: list[str] = field(default_factory=list)
     error: str | None = None
 
-    def run(self, file: str, history: History) -> None:
+    def run(self, file: str, history: ReplayCase) -> None:
         if self.program is None or self.error is not None:
             return
         try:

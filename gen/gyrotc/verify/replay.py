@@ -26,14 +26,14 @@ from ..texts import c_environment
 from .source import checked_sources, table_files
 from .toolchain import Target, compile_c, run_program
 
-__all__ = ["History", "Replayed", "history_of", "replay_on", "replay_program"]
+__all__ = ["ReplayCase", "Replayed", "history_of", "replay_on", "replay_program"]
 
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
 
 
 @dataclass(frozen=True, slots=True)
-class History:
+class ReplayCase:
     """A recording as the runtime sees it, and what it must answer.
 
     Bits of every row's channels, shape (n, n_channels); samples missed before each row, shape (n,).
@@ -59,7 +59,7 @@ class Replayed:
     first: tuple[str, ...]
 
 
-def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
+def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
     """Bits and answers of a recording.
 
     Where a term counts from power-on and this was before the first row, the blocks between are missing samples.
@@ -77,7 +77,7 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> History:
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
         missed[0] = before
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)
-    return History(channels, missed, per_block, answers)
+    return ReplayCase(channels, missed, per_block, answers)
 
 
 @contextmanager
@@ -104,7 +104,7 @@ def replay_program(
         yield program
 
 
-def replay_on(target: Target, program: Path, history: History) -> Replayed:
+def replay_on(target: Target, program: Path, history: ReplayCase) -> Replayed:
     """Feeds a recording to the compiled code and compares every step with the reference.
 
     Raises:
@@ -127,7 +127,7 @@ def replay_on(target: Target, program: Path, history: History) -> Replayed:
     return Replayed(bits, status, int(wrong.size), first)
 
 
-def _stream(history: History, word: np.dtype[np.uint32]) -> bytes:
+def _stream(history: ReplayCase, word: np.dtype[np.uint32]) -> bytes:
     """Standard input of the replay program."""
     n, n_channels = history.channels.shape
     stream = np.empty(2 + n * (1 + n_channels), dtype=word)

@@ -21,11 +21,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..errors import CheckFailed, InputError
 from ..inputs import read_toml
 from ..outputs import scratch_folder
-from .confined import Run, run_to_end
+from .confined import ProgramRun, run_to_end
 
 __all__ = [
     "C_FLAGS",
-    "Run",
+    "ProgramRun",
     "Symbol",
     "Target",
     "all_targets",
@@ -153,7 +153,7 @@ def compile_c(
     link(target, objects, program)
 
 
-def run_program(target: Target, program: Path, data: bytes = b"") -> Run:
+def run_program(target: Target, program: Path, data: bytes = b"") -> ProgramRun:
     """Runs a program with `data` on its standard input; bounded in time.
 
     Raises:

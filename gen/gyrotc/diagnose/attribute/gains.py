@@ -21,7 +21,7 @@ from ..orthonormal import orthonormal
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, searched
 
-__all__ = ["Gains", "Model", "Point"]
+__all__ = ["CauseSet", "Gains", "Point"]
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Point:
         return self.gain - sum(searched(m.id).price for m in self.members) * float(np.log(size))
 
 
-Model = tuple[Candidate, ...]
+CauseSet = tuple[Candidate, ...]
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class Gains:
             assert base.candidate is not None
             yield from self._on(base, (base.candidate,))
 
-    def _on(self, base: _Base, members: Model) -> Iterator[Point]:
+    def _on(self, base: _Base, members: CauseSet) -> Iterator[Point]:
         """Every candidate with columns of its own, added to what `base` holds already."""
         before = np.diag(self._gram)
         for candidate, at in self.plain:

@@ -12,7 +12,7 @@ from ..quantiles import CHI2_95_TWO
 from ..signatures.candidates import Candidate
 from .joined import Held
 from .project import project
-from .scores import Columns, Projection, draw_null, score
+from .scores import Projection, ScoredColumns, draw_null, score
 from .search import Search
 from .views import View, residual_log_likelihood
 
@@ -63,7 +63,7 @@ def detect(search: Search, held: Held) -> list[Found]:
     return [Found(search.joined.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
 
 
-def _refitted(projection: Projection, columns: Columns, view: View, size: int) -> Array:
+def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: int) -> Array:
     """Residual log-likelihood of a colour with map and candidate projected out, for every candidate."""
     gram, a = projection.gram, projection.a * view.scale
     alive, diagonal = projection.alive, np.diag(projection.gram)

@@ -1,7 +1,7 @@
 """What could still hide: the smallest amplitude of every cause that the search would find.
 
 d is the matched-filter signal-to-noise ratio of a cause after the static map is taken out; the search finds
-`terms.search.Search.needed_d` (6.3 for most causes) in 95 % of cases at a familywise level of 1 %.
+`terms.search.SearchRule.needed_d` (6.3 for most causes) in 95 % of cases at a familywise level of 1 %.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..signatures.candidates import Candidate, searched, shape_parameter
 from .project import project
 from .search import Search
 
-__all__ = ["Limit", "amplitude_energy", "detection_limits", "limit_of"]
+__all__ = ["CauseLimit", "amplitude_energy", "detection_limits", "limit_of"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _LARGEST = 1e150  # a norm whose square is finite stands for an infinite one
 
 
 @dataclass(frozen=True)
-class Limit:
+class CauseLimit:
     """Detection limit of one cause.
 
     Attributes:
@@ -40,7 +40,7 @@ class Limit:
     parameter: str | None
 
 
-def detection_limits(search: Search) -> dict[str, Limit]:
+def detection_limits(search: Search) -> dict[str, CauseLimit]:
     """Limits at the likeliest colour, by cause (channels: `auxiliary:name`)."""
     view, joined = search.likeliest, search.joined
     projection = project(search, view, "map and beside")
@@ -67,7 +67,7 @@ def amplitude_energy(cause: str, power: Array) -> float:
     return float(power.sum() if CATALOGUE[cause].kind == "random" else power.mean())
 
 
-def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
+def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> CauseLimit:
     """Limit from the energies of unit amplitudes over the grid of a cause."""
     d, unit = searched(cause).needed_d, CATALOGUE[cause].unit
     parameter = shape_parameter(cause)
@@ -75,15 +75,15 @@ def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> Limit:
         assert parameter is not None
         seen = [abs(c.values[parameter.name]) for c, power in points if np.sqrt(power) >= d]
         at = tuple((c.values[parameter.name], float(np.sqrt(power))) for c, power in points)
-        return Limit(min(seen) if seen else None, unit, at, parameter.name)
+        return CauseLimit(min(seen) if seen else None, unit, at, parameter.name)
     limits = [d / np.sqrt(power) if power > 0.0 else np.inf for _, power in points]
     finite = [v for v in limits if np.isfinite(v)]
     value = float(np.exp(np.median(np.log(finite)))) if finite else None
     if parameter is None:
-        return Limit(value, unit, (), None)
+        return CauseLimit(value, unit, (), None)
     at = tuple(
         (c.values[parameter.name], float(v))
         for (c, _), v in zip(points, limits, strict=True)
         if np.isfinite(v)
     )
-    return Limit(value, unit, at, parameter.name)
+    return CauseLimit(value, unit, at, parameter.name)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..signatures.candidates import Candidate
 from ..signatures.signature_bank import SignatureBank
-from .scores import Columns
+from .scores import ScoredColumns
 
-__all__ = ["Channels", "Held", "Joined", "Layout", "join"]
+__all__ = ["Channels", "Held", "Joined", "JoinedLayout", "join"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -31,7 +31,7 @@ _GONE = 1e-9  # share of a column's norm that the map must leave: less is roundi
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class JoinedLayout:
     """Where each kind of column stands among the joined columns."""
 
     static: slice
@@ -41,7 +41,7 @@ class Layout:
     beside: slice
 
     @classmethod
-    def of(cls, static: int, signatures: int, channels: int, inputs: int, beside: int) -> Layout:
+    def of(cls, static: int, signatures: int, channels: int, inputs: int, beside: int) -> JoinedLayout:
         """From how many columns of each kind there are."""
         ends = accumulate((0, static, signatures, channels, inputs, beside))
         return cls(*(slice(a, b) for a, b in pairwise(ends)))
@@ -76,14 +76,14 @@ class Joined:
         owners: Candidates in the order of `Scores`.
     """
 
-    layout: Layout
+    layout: JoinedLayout
     channels: Array
     inputs: Array
     beside: Array
     on_map: Array
     norm: Array
     added: tuple[Candidate, ...]
-    columns: Columns
+    columns: ScoredColumns
     owners: tuple[Candidate, ...]
 
     @property
@@ -103,7 +103,7 @@ def join(bank: SignatureBank, y: Array, channels: Channels | None, beside: Array
     norm = np.linalg.norm(rest, axis=0)
     norm = np.where(norm > _GONE * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
     length = np.linalg.norm(held, axis=0)
-    layout = Layout.of(
+    layout = JoinedLayout.of(
         bank.map.shape[1], bank.signatures.shape[1], own.shape[1], len(bank.inputs), held.shape[1]
     )
     added = (*names, *bank.inputs)
@@ -129,8 +129,8 @@ def _changes(bank: SignatureBank, y: Array) -> list[Array]:
 
 
 def _candidates(
-    bank: SignatureBank, layout: Layout, added: tuple[Candidate, ...]
-) -> tuple[Columns, tuple[Candidate, ...]]:
+    bank: SignatureBank, layout: JoinedLayout, added: tuple[Candidate, ...]
+) -> tuple[ScoredColumns, tuple[Candidate, ...]]:
     """Where single columns, pairs and groups of one variance stand, and whose they are."""
     single: list[tuple[int, Candidate]] = []
     pairs: list[tuple[Index, Candidate]] = []
@@ -145,7 +145,7 @@ def _candidates(
         elif candidate.role == "variance":
             variance.append((at, candidate))
     single += list(enumerate(added, start=layout.channels.start))
-    columns = Columns(
+    columns = ScoredColumns(
         np.array([at for at, _ in single]),
         np.array([at for at, _ in pairs], dtype=np.int64).reshape(-1, 2),
         tuple(at for at, _ in variance),

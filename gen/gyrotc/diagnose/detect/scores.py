@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-__all__ = ["Columns", "Projection", "Scores", "draw_null", "score"]
+__all__ = ["Projection", "ScoredColumns", "Scores", "draw_null", "score"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -27,7 +27,7 @@ _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units 
 
 
 @dataclass(frozen=True)
-class Columns:
+class ScoredColumns:
     """Which columns belong together: index sets into the joined columns of a view.
 
     Attributes:
@@ -95,7 +95,7 @@ class Scores:
         return np.concatenate([self.single, self.pairs, self.variance, self.structure], axis=-1)
 
 
-def score(projection: Projection, columns: Columns, a: Array) -> Scores:
+def score(projection: Projection, columns: ScoredColumns, a: Array) -> Scores:
     """Scores for inner products `a`, shape (P,) or (draws, P)."""
     size = np.diag(projection.gram)
     alive = projection.alive
@@ -162,7 +162,7 @@ def _structure(projection: Projection, a: Array) -> Array:
     return np.asarray(-log_ndtr(-np.sqrt(ratio)))
 
 
-def draw_null(projection: Projection, columns: Columns, seed: int, draws: int = _DRAWS) -> Array:
+def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: int = _DRAWS) -> Array:
     """Largest score in data without effect, shape (draws,)."""
     used = np.flatnonzero(projection.alive)
     gram = projection.gram[np.ix_(used, used)]

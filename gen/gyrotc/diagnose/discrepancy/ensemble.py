@@ -20,11 +20,11 @@ from ..noise_colour.whitener import Whitener
 from ..orthonormal import orthonormal
 from ..screen.blocks import Records, centred_slope
 
-__all__ = ["Discrepancy", "Ensemble", "compare"]
+__all__ = ["Discrepancy", "Ensemble", "ensemble_of"]
 
 Array = NDArray[np.float64]
-Blocks = NDArray[np.bool_]
-Statistic = Callable[[Array], Array]
+BlockMask = NDArray[np.bool_]
+OfResiduals = Callable[[Array], Array]
 
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
@@ -62,7 +62,7 @@ class Ensemble:
     discrepancies: tuple[Discrepancy, ...]
 
 
-def compare(
+def ensemble_of(
     search: Search,
     declared: Declared | None,
     *,
@@ -115,12 +115,12 @@ def _discrepancy(name: str, measured: float, simulated: Array, rounding: float) 
     return Discrepancy(name, measured, float(simulated.mean()), float(low), float(high), p)
 
 
-def _statistics(search: Search) -> dict[str, Statistic]:
+def _statistics(search: Search) -> dict[str, OfResiduals]:
     """Statistics of residuals, shape (N, members), by name: each gives one number for each member."""
     records = search.records
     spans = records.spans()
     slow = max(round(_SLOW_S / records.block_s), 2)
-    found: dict[str, Statistic] = {
+    found: dict[str, OfResiduals] = {
         "residual_rms_dph": _rms,
         "residual_autocorrelation": partial(_autocorrelation, spans=spans),
         "half_hour_means_rms_dph": partial(_rms_of_means, spans=spans, width=slow),
@@ -163,13 +163,13 @@ def _rms_of_runs(e: Array, spans: Sequence[slice]) -> Array:
     return _rms(np.array([e[s].mean(axis=0) for s in spans])) if len(spans) > 1 else _unknown(e)
 
 
-def _loop(e: Array, branches: Sequence[tuple[Blocks, Blocks]]) -> Array:
+def _loop(e: Array, branches: Sequence[tuple[BlockMask, BlockMask]]) -> Array:
     """RMS over temperature of the mean difference between heating and cooling."""
     gaps = [e[up].mean(axis=0) - e[down].mean(axis=0) for up, down in branches]
     return _rms(np.array(gaps)) if gaps else _unknown(e)
 
 
-def _branches(records: Records) -> list[tuple[Blocks, Blocks]]:
+def _branches(records: Records) -> list[tuple[BlockMask, BlockMask]]:
     """Blocks that heat and that cool, shape (N,) each, for every cell of temperature that has enough of both."""
     slope = records.average([centred_slope(r.history) for r in records.runs])
     temperature = records.average([r.history.temperature_c for r in records.runs])

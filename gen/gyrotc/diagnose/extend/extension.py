@@ -21,7 +21,7 @@ from ...train.fitting import FitOptions
 from ..attribute.refine import Refined
 from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
-from .refit import Effect, samples, score
+from .refit import Effect, samples, scored_means
 from .refitting import FEW_RUNS, Chain, Refitting, folds_of
 from .shipping import Shipping, shipping
 
@@ -140,7 +140,7 @@ def _crossed(refitting: Refitting, count: int) -> Chain:
 
 def _score_self(refitting: Refitting) -> list[Averages]:
     """Where nothing can be left out (one very short run): the training samples themselves, without gain."""
-    return score(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
+    return scored_means(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
 
 
 def _rate_left_out(refitting: Refitting, count: int, floor: float) -> tuple[str, Gain] | None:

@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 from ...dataset import Dataset, Run
 from ...frontend import blocks_since_power_on
 from ...metrics import Averages, average
-from ...terms import CATALOGUE, Scene, Term
-from ...terms.recursion import Course, Outcome
+from ...terms import CATALOGUE, Cause, Scene
+from ...terms.recursion import Course, TermOutcome
 from ...train import Fit, TrainingData, fit, predict
 from ...train.data import joined
 from ...train.fitting import FrontEnd, samples_of
+from ...train.simple import without_rate
 from ..attribute.refine import Refined
 
-__all__ = ["Effect", "Played", "fit_extended", "play_runs", "samples", "score"]
+__all__ = ["Effect", "Played", "fit_extended", "play_runs", "samples", "scored_means"]
 
 Array = NDArray[np.float64]
 
 _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
-_FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Effect:
         return Effect(cause.candidate.id, cause.candidate.values | values, cause.candidate.channel)
 
     @property
-    def term(self) -> Term:
+    def term(self) -> Cause:
         """What the catalogue knows of the cause."""
         return CATALOGUE[self.id]
 
@@ -73,9 +73,9 @@ class Played:
     channels: Mapping[str, Array]
     block_s: float
     environment: str
-    _outcomes: list[tuple[Effect, Outcome]] = field(default_factory=list)
+    _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
-    def outcome(self, effect: Effect) -> Outcome:
+    def outcome(self, effect: Effect) -> TermOutcome:
         """What a term makes of every correction; the last few are remembered."""
         for known, outcome in self._outcomes:
             if known == effect:
@@ -83,7 +83,7 @@ class Played:
         table = effect.term.table
         assert table is not None
         x = self.course.temperature
-        made = Outcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
+        made = TermOutcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
         channel = None if effect.channel is None else self.channels[effect.channel]
         table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
         self._outcomes[:0] = [(effect, made)]
@@ -171,15 +171,7 @@ def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
     """A map of T alone, valid over the rates of the samples."""
     slope = data.slope_c_per_min
     fitted = fit(replace(data, slope_c_per_min=np.zeros_like(slope)), **arguments)
-    flat = [
-        {
-            **n,
-            "linear": [n["linear"][0], 0.0],
-            "centers": [[c[0], 0.0] for c in n["centers"]],
-            "widths": [[w[0], _FLAT] for w in n["widths"]],
-        }
-        for n in fitted.networks
-    ]
+    flat = [without_rate(one) for one in fitted.networks]
     scaling = replace(
         fitted.scaling,
         half_range_c_per_min=max(float(np.abs(slope).max()), fitted.scaling.half_range_c_per_min),
@@ -188,7 +180,7 @@ def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
     return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
 
 
-def score(
+def scored_means(
     fitted: Fit,
     runs: Sequence[Played],
     effects: Sequence[Effect],

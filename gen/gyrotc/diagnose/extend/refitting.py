@@ -19,7 +19,7 @@ from ..attribute.refine import Refined
 from ..attribute.single_cycle import cycle_of
 from ..pipeline import search_of
 from ..screen.blocks import Records
-from .refit import Effect, Played, fit_extended, play_runs, score
+from .refit import Effect, Played, fit_extended, play_runs, scored_means
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 
@@ -104,7 +104,7 @@ class Refitting:
         beside: bool | None = None,
     ) -> list[Averages]:
         fitted = self.fit(effects, kept, beside=beside)
-        return score(fitted, runs, effects, self.average_s, scored)
+        return scored_means(fitted, runs, effects, self.average_s, scored)
 
     def _chosen(self, held: list[Mask], count: int) -> tuple[Refined, ...]:
         """Best `count` causes on the records without the held-out samples."""

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...terms import CATALOGUE, Term
+from ...terms import CATALOGUE, Cause
 from ...terms.base import History, Parameter, Values
-from ...terms.search import Reach, Search
+from ...terms.search import Reach, SearchRule
 from ..screen.blocks import Records
 
 __all__ = [
@@ -47,7 +47,7 @@ class Candidate:
     channel: str | None = None
 
 
-def diagnosed() -> dict[str, Term]:
+def diagnosed() -> dict[str, Cause]:
     """The causes of the catalogue that diagnosis looks for, in the order in which results list them."""
     return {id: term for id, term in CATALOGUE.items() if term.search is not None}
 
@@ -57,7 +57,7 @@ def planned() -> list[str]:
     return [id for id in diagnosed() if searched(id).planned]
 
 
-def searched(cause: str) -> Search:
+def searched(cause: str) -> SearchRule:
     """How diagnosis looks for a cause."""
     search = CATALOGUE[cause].search
     assert search is not None

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...metrics import MAD_TO_SIGMA
 
-__all__ = ["FIGURES", "Outlier", "outliers", "spread"]
+__all__ = ["FIGURES", "FleetOutlier", "outliers", "spread"]
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
@@ -29,7 +29,7 @@ _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike
 
 
 @dataclass(frozen=True, slots=True)
-class Outlier:
+class FleetOutlier:
     """A figure of a serial, the fleet's median of it, and the distance in robust standard deviations."""
 
     name: str
@@ -47,7 +47,7 @@ def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] |
     return {"median": float(np.median(values)), "least": float(min(values)), "largest": float(max(values))}
 
 
-def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
+def outliers(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
     """Serials that stand apart, the farthest first; each serial with each of its figures that does."""
     found = []
     for figure, by_ratio in FIGURES.items():
@@ -61,7 +61,9 @@ def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
         if sigma == 0.0:
             continue
         found += [
-            Outlier(entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma))
+            FleetOutlier(
+                entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma)
+            )
             for entry, value, distance in zip(known, values, apart, strict=True)
             if distance > _SIGMAS * sigma
         ]
