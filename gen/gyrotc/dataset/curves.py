@@ -13,7 +13,7 @@ from .schema import Description, RunEntry
 
 __all__ = ["curves_of"]
 
-_PLACE_C = 1.0
+_PLACE_C = 1.0  # what counts as the same temperature, as in `judge.findings`
 
 
 def curves_of(

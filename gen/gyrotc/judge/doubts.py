@@ -36,17 +36,17 @@ __all__ = ["Doubt", "Envelope", "doubts_of_data_set", "looked_at", "where_of"]
 Envelope = tuple[tuple[float, float], tuple[float, float]]
 """Lowest and highest temperature (C), lowest and highest temperature rate (C/min)."""
 
-_COARSE_STEP_C = 0.25
-_HOLDS = 0.8
-_STUCK_S = 60.0
-_STUCK_ROWS = 30
+_COARSE_STEP_C = 0.25  # at 1 C/min a slope over 100 s then rests on fewer than seven steps
+_HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
+_STUCK_S = 60.0  # longer than any thermometer waits between two readings
+_STUCK_ROWS = 30  # and not fewer rows, so that slow loggers are not doubted
 _LATE_S = 3.0e8  # ten years: a time since some epoch, not since power-on
 _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
-_PERIODS = 0.01
-_ENVELOPE_CELLS = (20, 8)
-_ENVELOPE_MARGIN = 0.05
+_PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample rate by more
+_ENVELOPE_CELLS = (20, 8)  # of T and of dT/dt: 5 C and 1.25 C/min of the paper's range
+_ENVELOPE_MARGIN = 0.05  # share of the range: chambers do not reach their ends to the degree
 _BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
-_LINES = 20
+_LINES = 20  # that are offered to be pasted: more are a fault of the recording
 
 
 @dataclass(frozen=True, slots=True)

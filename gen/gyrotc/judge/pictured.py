@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Span = tuple[float, float]
 
 _POINTS = 600  # of a strip; a picture has about as many columns
-_ZOOM_WIDTHS, _ZOOM_ROWS = 4.0, 30
+_ZOOM_WIDTHS, _ZOOM_ROWS = 4.0, 30  # what is drawn around a mark: widths of it, and rows at least
 _ZOOM_SHARE = 0.6  # of the whole; a zoom that shows more shows nothing new
 _MOST_FILES = 2  # of one finding
 _AROUND = 60  # rows of a column before and behind a wrong one

@@ -38,7 +38,7 @@ _FEWEST_VALUES = 10  # a channel of fewer values says nothing
 
 _COARSE_ROWS = 2**17  # rows that the resolution is told from
 _REPEATS = 0.6  # share of rows that repeat the one before: the noise is below a third of a step
-_ONE_STEP = 1.5
+_ONE_STEP = 1.5  # a reading that moves by less at a time moves by one step of its resolution
 
 
 def exclude_line(from_s: float, to_s: float, reason: str) -> str:

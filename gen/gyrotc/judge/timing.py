@@ -18,13 +18,16 @@ Floats = NDArray[np.float64]
 _GAP = 1.5  # row periods
 _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
 _LEAST_JUMP_C, _JUMP_SIGMAS = 1.0, 20.0  # what the time would have done to the temperature, had it passed
+# Of the change that the gap should have brought: less is none; and of its noise
 _UNMOVED, _UNMOVED_SIGMAS = 0.1, 5.0
-_SLOPES_APART = 2.0
+_SLOPES_APART = 2.0  # ratio of dT/dt before and after: beyond it the temperature turned within the gap
+# Of a run, and rows in each: enough for a median that is sure to a tenth of its scatter
 _PARTS, _LEAST_STEPS = 50, 40
 _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
+# Of a row period, and of the rows: a clock of coarser ticks than the rows
 _COARSE, _COARSE_SHARE = 0.4, 0.05
-_TOLD = 20
-_HOUR_S = 3600.0
+_TOLD = 20  # that are told: enough to see a pattern
+_HOUR_S = 3600.0  # a change of summer time
 
 
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:

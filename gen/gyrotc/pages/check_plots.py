@@ -14,9 +14,9 @@ from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["picture"]
 
-_WIDE = 10.0
+_WIDE = 10.0  # inches, as every picture of a page
 _NARROW = 0.004  # of the picture's width: spans below it get a mark above
-_MOST_OTHERS = 40
+_MOST_OTHERS = 40  # curves: more are a grey area
 
 
 def picture(shown: Seen | Columned | Compared | Covered) -> str:
