@@ -25,6 +25,7 @@ from gyrotc.dataset.schema import parse_description
 from gyrotc.dataset.text import dataset_toml
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import InputError
+from gyrotc.inputs import checked
 from gyrotc.jobs.diagnosis import extended_scenario
 from gyrotc.jobs.fleet.manifest import load_manifest
 from gyrotc.jobs.fleet.page import write_summary
@@ -36,6 +37,7 @@ from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
 from gyrotc.results.base import checked_result
 from gyrotc.results.diagnosed import Diagnosed, Estimate
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.texts import (
@@ -188,7 +190,14 @@ class _Page(HTMLParser):
         self.elements.append(("!--", data))
 
 
-_KEPT = ("schema", "verdict", "family", "status", "measured_on")  # words that decide what a page shows
+_KEPT = (
+    "schema",
+    "verdict",
+    "family",
+    "status",
+    "measured_on",
+    "judged_on",
+)  # words that decide what a page shows
 
 
 def _with(value: Any, text: Callable[[], str], key: str = "") -> Any:
@@ -404,7 +413,7 @@ def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str
         {
             "name": "n",
             "serial": "s",
-            "axis": "x",
+            "axis": None,
             "status": "done",
             "judged_on": "exam",
             "before_rms_dph": 1.0,
@@ -423,7 +432,7 @@ def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str
     ]
 
     def fleet(text: Callable[[], str]) -> str:
-        write_summary(tmp_path, _with(entries, text))
+        write_summary(tmp_path, [checked(FleetEntry, _with(entry, text), "entry.json") for entry in entries])
         return (tmp_path / "fleet.html").read_text("utf-8")
 
     def axes(text: Callable[[], str]) -> str:

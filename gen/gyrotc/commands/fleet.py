@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import CheckFailed
 from .base import JsonOption, OutOption, app, progress, tell, write_json
+
+if TYPE_CHECKING:
+    from ..results.fleet import FleetEntry
 
 
 @app.command()
@@ -39,34 +42,33 @@ def fleet(
         say(f"{len(wanted.units)} gyros")
         entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=_tell_entry)
     summary = summary_of(entries)
-    write_json(json_file, summary)
-    for outlier in summary["outliers"]:
+    write_json(json_file, summary.content())
+    for outlier in summary.outliers:
         tell(
-            f"stands apart: {outlier['name']}: {outlier['figure']} {outlier['value']:.4g}, median of the fleet "
-            f"{outlier['median']:.4g} ({outlier['sigmas']:.1f} robust standard deviations)"
+            f"stands apart: {outlier.name}: {outlier.figure} {outlier.value:.4g}, median of the fleet "
+            f"{outlier.median:.4g} ({outlier.sigmas:.1f} robust standard deviations)"
         )
-    for copy in summary["copies"]:
+    for copy in summary.copies:
         tell(
-            f"copy of another: {copy['name']} (serial {copy['serial']}) has about {copy['share']:.0%} of its rows in "
-            f"common with {copy['other']} (serial {copy['other_serial']}): one gyro under two serials"
+            f"copy of another: {copy.name} (serial {copy.serial}) has about {copy.share:.0%} of its rows in "
+            f"common with {copy.other} (serial {copy.other_serial}): one gyro under two serials"
         )
-    tell(f"{summary['done']} of {summary['units']} done, {summary['failed']} failed: {out / 'fleet.html'}")
-    if summary["failed"]:
-        raise CheckFailed(f"{summary['failed']} of {summary['units']} gyros failed")
+    tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
+    if summary.failed:
+        raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed")
 
 
-def _tell_entry(entry: dict[str, Any]) -> None:
+def _tell_entry(entry: FleetEntry) -> None:
     """One line a gyro."""
-    kept = " (done before)" if entry.get("kept") else ""
-    text = f"{entry['name']}: {entry['status']}{kept}"
-    if entry.get("after_rms_dph") is not None:
-        floor = "" if entry["rms_over_floor"] is None else f" = {entry['rms_over_floor']:.3f} x noise floor"
+    text = f"{entry.name}: {entry.status}{' (done before)' if entry.kept else ''}"
+    if entry.after_rms_dph is not None:
+        floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
         text += (
-            f"; RMS {entry['before_rms_dph']:.3e} -> {entry['after_rms_dph']:.3e} deg/h{floor}, "
-            f"{entry['centers']} centers, {entry['table_bytes']} bytes"
+            f"; RMS {entry.before_rms_dph:.3e} -> {entry.after_rms_dph:.3e} deg/h{floor}, "
+            f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
-    if entry["status"] != "done":
-        text += f"; {entry['reason']}"
-    if entry.get("aside"):
-        text += f"; its earlier result had been changed and is now {entry['aside']}"
+    if entry.status != "done":
+        text += f"; {entry.reason}"
+    if entry.aside:
+        text += f"; its earlier result had been changed and is now {entry.aside}"
     tell(text)

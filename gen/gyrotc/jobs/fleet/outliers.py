@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...metrics import MAD_TO_SIGMA
+from ...results.fleet import FleetOutlier, FleetUnit, Spread
 
-__all__ = ["FIGURES", "FleetOutlier", "outliers", "spread"]
+__all__ = ["FIGURES", "outliers", "spread"]
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
@@ -28,43 +27,32 @@ _SIGMAS = 5.0
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
 
-@dataclass(frozen=True, slots=True)
-class FleetOutlier:
-    """A figure of a serial, the fleet's median of it, and the distance in robust standard deviations."""
-
-    name: str
-    figure: str
-    value: float
-    median: float
-    sigmas: float
-
-
-def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] | None:
+def spread(units: Sequence[FleetUnit], figure: str) -> Spread | None:
     """Median, least and largest value of a figure; None where no serial has it."""
-    values = [entry[figure] for entry in entries if entry.get(figure) is not None]
+    values = [value for unit in units if (value := getattr(unit, figure)) is not None]
     if not values:
         return None
-    return {"median": float(np.median(values)), "least": float(min(values)), "largest": float(max(values))}
+    return Spread(median=float(np.median(values)), least=float(min(values)), largest=float(max(values)))
 
 
-def outliers(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
+def outliers(units: Sequence[FleetUnit]) -> list[FleetOutlier]:
     """Serials that stand apart, the farthest first; each serial with each of its figures that does."""
-    found = []
+    found: list[FleetOutlier] = []
     for figure, by_ratio in FIGURES.items():
-        known = [e for e in entries if e.get(figure) is not None and (e[figure] > 0.0 or not by_ratio)]
+        pairs = [(unit.name, float(value)) for unit in units if (value := getattr(unit, figure)) is not None]
+        known = [(name, value) for name, value in pairs if value > 0.0 or not by_ratio]
         if len(known) < _LEAST:
             continue
-        values = np.array([entry[figure] for entry in known])
+        values = np.array([value for _, value in known])
         scaled = np.log(values) if by_ratio else values
         apart = np.abs(scaled - np.median(scaled))
         sigma = max(MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
         if sigma == 0.0:
             continue
+        median = float(np.median(values))
         found += [
-            FleetOutlier(
-                entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma)
-            )
-            for entry, value, distance in zip(known, values, apart, strict=True)
+            FleetOutlier(name=name, figure=figure, value=value, median=median, sigmas=float(distance / sigma))
+            for (name, value), distance in zip(known, apart, strict=True)
             if distance > _SIGMAS * sigma
         ]
     return sorted(found, key=lambda o: (-o.sigmas, o.name))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Model
-from .entry import Entry
+from ...results.fleet import FleetEntry
 
 __all__ = ["curve_of", "turned", "with_turned"]
 
@@ -31,19 +31,17 @@ def curve_of(model: Model) -> list[float | None]:
     return [float(b) if low <= t <= high else None for t, b in zip(_PLACES_C, bias, strict=True)]
 
 
-def turned(entries: Sequence[Entry]) -> list[str]:
+def turned(entries: Sequence[FleetEntry]) -> list[str]:
     """Names of gyros whose curve is the lot's turned over, axis by axis; none where the lot has no common one."""
     names: list[str] = []
-    for axis in dict.fromkeys(entry.get("axis") for entry in entries):
-        lot = [e for e in entries if e.get("axis") == axis and e.get("curve")]
+    for axis in dict.fromkeys(entry.axis for entry in entries):
+        lot = [e for e in entries if e.axis == axis and e.curve]
         names += _turned_of(lot) if len(lot) >= _LEAST else []
     return names
 
 
-def _turned_of(lot: Sequence[Entry]) -> list[str]:
-    curves = np.array(
-        [[np.nan if b is None else b for b in entry["curve"]] for entry in lot], dtype=np.float64
-    )
+def _turned_of(lot: Sequence[FleetEntry]) -> list[str]:
+    curves = np.array([[np.nan if b is None else b for b in entry.curve] for entry in lot], dtype=np.float64)
     known = np.mean(np.isfinite(curves), axis=0) >= _KNOWN
     curves = curves[:, known]
     if curves.shape[1] < _LEAST_PLACES:
@@ -59,15 +57,15 @@ def _turned_of(lot: Sequence[Entry]) -> list[str]:
     if float(np.median(alike)) < _ALIKE:
         return []
     even = (swing < _SWING * size) & (swing > size / _SWING)
-    return [str(lot[whole[k]]["name"]) for k in np.flatnonzero((alike < -_ALIKE) & even)]
+    return [lot[whole[k]].name for k in np.flatnonzero((alike < -_ALIKE) & even)]
 
 
-def with_turned(entries: Sequence[Entry]) -> list[Entry]:
+def with_turned(entries: Sequence[FleetEntry]) -> list[FleetEntry]:
     """The entries, those of turned gyros with the finding `sign_reversed`."""
     names = set(turned(entries))
     return [
-        entry | {"findings": [*entry["findings"], "sign_reversed"]}
-        if entry["name"] in names and "sign_reversed" not in entry["findings"]
+        entry.model_copy(update={"findings": (*entry.findings, "sign_reversed")})
+        if entry.name in names and "sign_reversed" not in entry.findings
         else entry
         for entry in entries
     ]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from ...dataset import load
 from ...errors import CheckFailed, GyrotcError, InputError
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ...results.evaluation import Evaluation
+from ...results.fleet import FleetEntry
 from ...results.verification import Verification
 from ..build import build_into
 from .aside import set_aside
-from .entry import Entry, kept_entry, write_entry
+from .entry import kept_entry, write_entry
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
 from .turned import curve_of
@@ -38,7 +40,7 @@ class Task:
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 
-def done_before(task: Task) -> Entry | None:
+def done_before(task: Task) -> FleetEntry | None:
     """The entry of an earlier call that still holds; None if the job must be done.
 
     It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
@@ -47,10 +49,10 @@ def done_before(task: Task) -> Entry | None:
         entry = None if task.unit.refused else kept_entry(task.out, task.key())
     except OSError:
         return None
-    return entry and entry | _who(task)
+    return entry and entry.model_copy(update=_who(task))
 
 
-def do_unit(task: Task) -> Entry:
+def do_unit(task: Task) -> FleetEntry:
     """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
     try:
         if task.unit.refused:
@@ -66,16 +68,16 @@ def do_unit(task: Task) -> Entry:
         return failed(task, f"{type(error).__name__}: {error}")
 
 
-def failed(task: Task, reason: str) -> Entry:
+def failed(task: Task, reason: str) -> FleetEntry:
     """The entry of a job that came to nothing; an earlier result of the gyro stays as it was."""
     try:
         stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
     except OSError:
         stays = ""
-    return _who(task) | {"status": "failed", "reason": printable(reason) + stays}
+    return FleetEntry(**_who(task), status="failed", reason=printable(reason) + stays)
 
 
-def _who(task: Task) -> Entry:
+def _who(task: Task) -> dict[str, Any]:
     return {
         "name": task.unit.name,
         "dataset": printable(str(task.unit.dataset)),
@@ -83,7 +85,7 @@ def _who(task: Task) -> Entry:
     }
 
 
-def _built(task: Task) -> Entry:
+def _built(task: Task) -> FleetEntry:
     """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
     key = task.key()
     dataset = load(task.unit.dataset, axis=task.unit.axis)
@@ -101,23 +103,27 @@ def _built(task: Task) -> Entry:
         )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        failed_checks = "; ".join(built.failures)
-        status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
-        figures: Entry = {"serial": dataset.serial} | _figures(
-            built.model, built.evaluation, built.verification
+        entry = FleetEntry(
+            **_who(task),
+            status="done",
+            key=key,
+            sketch="".join(f"{word:016x}" for word in dataset.sketch),
+            curve=tuple(curve_of(built.model)),
+            **_figures(built.model, built.evaluation, built.verification),
         )
-        figures["curve"] = curve_of(built.model)
-        figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
-        entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
-    return entry | {"aside": aside} if aside else entry
+        if built.failures:
+            entry = entry.model_copy(update={"status": "failed", "reason": "; ".join(built.failures)})
+        write_entry(stage.folder, entry)
+    return entry.model_copy(update={"aside": aside}) if aside else entry
 
 
-def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> Entry:
+def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> dict[str, Any]:
     """What the summary shows and outliers are sought in."""
     role, judged = evaluation.judged() or (None, None)
     floor = evaluation.noise_floor_dph
     after = judged.after.rms_dph if judged else None
     return {
+        "serial": model.serial,
         "judged_on": role,
         "before_rms_dph": judged.before.rms_dph if judged else None,
         "after_rms_dph": after,
@@ -129,6 +135,6 @@ def _figures(model: Model, evaluation: Evaluation, verification: Verification) -
         "table_bytes": evaluation.model.table_bytes,
         "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
         "error_bound_dph": verification.error_bound_dph,
-        "findings": [finding.id for finding in evaluation.findings],
+        "findings": tuple(finding.id for finding in evaluation.findings),
         "model_hash": model.hash,
     }
