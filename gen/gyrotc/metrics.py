@@ -88,7 +88,7 @@ def average(
 
 
 def statistics(values: Array) -> dict[str, float | None]:
-    """mean, standard deviation, RMS and largest magnitude, deg/h; None where there is no sample."""
+    """Mean, standard deviation, RMS and largest magnitude, deg/h; None where there is no sample."""
     if values.size == 0:
         return dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
     return {

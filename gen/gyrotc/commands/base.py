@@ -38,11 +38,11 @@ OUT = _Console(width=None if sys.stdout.isatty() else 120)
 ERR = _Console(stderr=True)
 
 DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
-OutOption = Annotated[Path, typer.Option("--out", help="Where the result goes.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the result.")]
 
 
 def written_place(path: Path | None) -> Path | None:
-    """Before the work: what stands there was written by gyrotc."""
+    """Checks, before the work begins, that gyrotc wrote what stands in the place of the result."""
     if path is not None:
         check_replaceable(path)
     return path
@@ -56,7 +56,8 @@ AxisOption = Annotated[
     str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
 ]
 AverageOption = Annotated[
-    float, typer.Option("--average-s", min=0.001, help="Averaging of all RMS figures, s.")
+    float,
+    typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
 ]
 MethodOption = Annotated[
     str,
@@ -72,10 +73,14 @@ SeedOption = Annotated[
     ),
 ]
 CentersOption = Annotated[
-    int | None, typer.Option("--centers", min=0, max=512, help="Number of centers; default: chosen.")
+    int | None,
+    typer.Option("--centers", min=0, max=512, help="Number of centers; by default the data decide."),
 ]
 RhoOption = Annotated[
-    float | None, typer.Option("--rho", min=0.0, max=1.0, help="The paper's threshold, eq. (16).")
+    float | None,
+    typer.Option(
+        "--rho", min=0.0, max=1.0, help="Threshold of error reduction, eq. (16) of Ding et al. 2014."
+    ),
 ]
 BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
 NumericOption = Annotated[
@@ -92,7 +97,7 @@ TrustOption = Annotated[
     ),
 ]
 TrustUnitsOption = Annotated[
-    bool, typer.Option("--trust-units", help="Take units that the values contradict; it is recorded.")
+    bool, typer.Option("--trust-units", help="Take units that the values contradict; the result records it.")
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 

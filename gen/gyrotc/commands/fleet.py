@@ -20,16 +20,18 @@ def fleet(
         Path, typer.Argument(help="A manifest (TOML), or a folder with a data set in each of its folders.")
     ],
     out: OutOption,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, max=256, help="Processes on this machine.")] = 2,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, max=256, help="Number of processes on this machine.")
+    ] = 2,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
+        bool, typer.Option("--full", help="Make a whole build of each: compiled, verified, with its report.")
     ] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
+    """Read, fit, emit and check many gyros; write one summary, and name those that stand apart.
 
     What is done is not done again, and one that fails does not stop the others.
 

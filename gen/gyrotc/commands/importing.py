@@ -25,11 +25,15 @@ def import_(
         Path | None, typer.Option("--map", help="The map.toml of an earlier import from this logger.")
     ] = None,
     serial: Annotated[str | None, typer.Option("--serial", help="Serial of the gyro.")] = None,
-    rate_unit: Annotated[str | None, typer.Option("--rate-unit", help="deg/h, deg/s, rad/s, ...")] = None,
-    temperature_unit: Annotated[
-        str | None, typer.Option("--temperature-unit", help="degC, K, degF, ...")
+    rate_unit: Annotated[
+        str | None, typer.Option("--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, ...")
     ] = None,
-    time_unit: Annotated[str | None, typer.Option("--time-unit", help="s, ms, us, min, 0.01 s, ...")] = None,
+    temperature_unit: Annotated[
+        str | None, typer.Option("--temperature-unit", help="Unit of temperatures: degC, K, degF, ...")
+    ] = None,
+    time_unit: Annotated[
+        str | None, typer.Option("--time-unit", help="Unit of times: s, ms, us, min, 0.01 s, ...")
+    ] = None,
     column: Annotated[
         list[str] | None,
         typer.Option(
@@ -57,7 +61,7 @@ def import_(
             help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
         ),
     ] = None,
-    format: Annotated[str, typer.Option("--format", help="Of the runs written: parquet or csv.")] = "parquet",
+    format: Annotated[str, typer.Option("--format", help="Format of the runs: parquet or csv.")] = "parquet",
     pulse_weight: Annotated[
         float | None,
         typer.Option(

@@ -148,7 +148,7 @@ def compare(
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """The paper's Table 1 on this data: every training method side by side.
+    """Train every method on this data and show them side by side, as in the paper's Table 1.
 
     Example: gyrotc compare recordings --out comparison
     """
@@ -179,7 +179,12 @@ def compare(
 @app.command()
 def diagnose(  # long: the parts of a command in the order in which they are printed
     dataset: DatasetArg,
-    model: Annotated[Path | None, typer.Option("--model", help="A model.json made before.")] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", help="A model.json made before, whose method, block and number of centers are used."
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
@@ -194,7 +199,7 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """What the simulation gets wrong about recordings, the named cause, the extended model, the measured gain.
+    """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
 
     Example: gyrotc diagnose recordings --out diagnosis
     """

@@ -18,7 +18,7 @@ _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next t
 
 
 def limits_of(texts: Sequence[str]) -> dict[str, float]:
-    """`cause=value` options.
+    """Reads `cause=value` options: required detection limits by cause.
 
     Raises:
         InputError: One is not of this form.
@@ -36,7 +36,7 @@ def limits_of(texts: Sequence[str]) -> dict[str, float]:
 
 
 def pair_of(text: str | None) -> tuple[str, str] | None:
-    """`cause,cause`.
+    """Reads `cause,cause`: two causes that are to be told apart.
 
     Raises:
         InputError: Not two different names.

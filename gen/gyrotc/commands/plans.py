@@ -1,4 +1,4 @@
-"""Before anything is recorded: plan."""
+"""The command that works before anything is recorded: `plan`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def plan(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """What a programmed profile will be able to tell, before it is run.
+    """Say what a programmed profile will be able to tell, before it is run.
 
     Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
     """

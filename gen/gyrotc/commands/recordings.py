@@ -29,9 +29,11 @@ def simulate(
     out: OutOption,
     seed: SeedOption = 1,
     row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
-    raw_hz: Annotated[float | None, typer.Option("--raw-hz", help="Rows at this rate instead.")] = None,
-    pulses: Annotated[bool, typer.Option("--pulses", help="Integer pulses instead of a rate.")] = False,
-    format: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "csv",
+    raw_hz: Annotated[
+        float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")
+    ] = None,
+    pulses: Annotated[bool, typer.Option("--pulses", help="Write integer pulses instead of a rate.")] = False,
+    format: Annotated[str, typer.Option("--format", help="Format of the files: csv or parquet.")] = "csv",
     noise: Annotated[
         str, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
     ] = "paper",

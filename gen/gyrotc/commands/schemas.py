@@ -18,7 +18,7 @@ def schema(
         str | None, typer.Argument(help="A result, e.g. limits; without it all, by name.")
     ] = None,
 ) -> None:
-    """JSON Schema of a result, on stdout.
+    """Print the JSON Schema of a result, or of all of them.
 
     Example: gyrotc schema limits
     """

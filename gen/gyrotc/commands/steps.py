@@ -61,7 +61,7 @@ def fit(
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Train a model: DIR/model.json and DIR/training.json; what followed from an earlier model there goes.
+    """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
 
     Example: gyrotc fit recordings --out result
     """
@@ -88,7 +88,7 @@ def fit(
 
 @app.command()
 def emit(
-    model: Annotated[Path, typer.Argument(help="A model.json.")],
+    model: Annotated[Path, typer.Argument(help="The model.json to emit.")],
     out: OutOption,
     numeric: NumericOption = None,
     zero_at: Annotated[
@@ -214,7 +214,10 @@ def evaluate(
     dataset: DatasetArg,
     numeric: NumericOption = None,
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
-    average_s: Annotated[float | None, typer.Option("--average-s", min=0.001, help="Averaging, s.")] = None,
+    average_s: Annotated[
+        float | None,
+        typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
+    ] = None,
     applied: AppliedOption = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,

@@ -31,7 +31,7 @@ def in_entry(entry: RunEntry, time_s: Floats) -> NDArray[np.bool_]:
 def check_description(
     description: Description, applied: Applied | None, exam_only: bool, problems: Problems
 ) -> None:
-    """A training run is there, Earth's rate can be computed, the model given is the one subtracted."""
+    """Checks that there is a training run, that Earth's rate can be computed, that the model given was subtracted."""
     if not exam_only and all(entry.role != "train" for entry in description.run):
         expected = "at least one training run"
         problems.add(InputError(f"{FILE}, field role", "no run has the role train", expected))
@@ -48,7 +48,7 @@ def check_description(
 
 
 def check_spans(description: Description, problems: Problems) -> None:
-    """Spans and exclusions have a length, and no row of a file belongs to two runs."""
+    """Checks that spans and exclusions have a length, and that no row of a file belongs to two runs."""
     for index, entry in enumerate(description.run):
         stretches = [("from_s", entry.from_s, entry.to_s)]
         stretches += [(f"exclude.{k}.from_s", gap.from_s, gap.to_s) for k, gap in enumerate(entry.exclude)]

@@ -187,7 +187,7 @@ class SharedRows:
         rows: First and last of its rows, counted from 1.
         span_s: Their times on its clock, s: first row, row after the last.
         other_file: The other file, or the same.
-        other_rows: As `rows`, in that.
+        other_rows: First and last row in the other file, as `rows`.
         other_span_s: As `span_s`.
     """
 
@@ -200,7 +200,7 @@ class SharedRows:
 
     @property
     def marks(self) -> tuple[Mark, Mark]:
-        """Both stretches."""
+        """The marks of both stretches."""
         return (
             Mark(self.file, self.rows, self.span_s),
             Mark(self.other_file, self.other_rows, self.other_span_s),

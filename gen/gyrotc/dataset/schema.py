@@ -32,7 +32,7 @@ _SERIAL_FORM = "1 to 64 of the characters A-Z a-z 0-9 . _ -, at least one of the
 
 
 def check_serial(serial: str) -> str:
-    """The serial itself.
+    """Checks a serial and returns it.
 
     Raises:
         ValueError: It is no legal serial; the message says what is expected.

@@ -21,7 +21,7 @@ Doubted = tuple[str, Suspicion]
 def check_channel_units(
     description: Description, recordings: Mapping[str, Recording], problems: Problems
 ) -> None:
-    """Every unit is that of a column: a typing error must not pass."""
+    """Checks that every unit is that of a column: a typing error must not pass."""
     channels = {name for r in recordings.values() for name in r.layout.channels}
     for name in description.units:
         if name not in NATIVE and name not in channels:

@@ -39,8 +39,8 @@ def next_steps(
     """Sentences, the most telling first.
 
     Args:
-        verdict: Of the interface.
-        causes: As in the result.
+        verdict: One of `VERDICTS`.
+        causes: Causes and kinds of noise that were found.
         untestable: Ids of the causes that these recordings cannot test.
         shipped: Whether an extension is.
     """

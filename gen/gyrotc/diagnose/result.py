@@ -30,7 +30,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Result, and what the pictures are made of.
+    """The result of a diagnosis, and what its pictures are made of.
 
     Attributes:
         result: What `diagnose.json` holds.

@@ -40,7 +40,7 @@ class Options(BaseModel):
 
     @property
     def text(self) -> str:
-        """As they are typed, with a blank before each."""
+        """The options as they are typed, with a blank before each."""
         numeric = f" --numeric {','.join(self.numeric)}" if self.numeric is not None else ""
         return numeric + (f" --zero-at {self.zero_at_c!r}" if self.zero_at_c is not None else "")
 

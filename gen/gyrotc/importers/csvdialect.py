@@ -61,7 +61,7 @@ class Dialect:
     facts: dict[str, str] = field(default_factory=dict)
 
     def to_map(self) -> dict[str, Any]:
-        """As `[csv]` of a map."""
+        """The dialect as `[csv]` of a map."""
         comment: Any = self.comment[0] if len(self.comment) == 1 else list(self.comment)
         found = {
             "encoding": self.encoding,
@@ -80,7 +80,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     """The dialect of a file.
 
     Args:
-        name: Of the file, for messages.
+        name: Name of the file, for messages.
         head: Its first bytes.
         given: `[csv]` of a map; its keys are not guessed.
         whole: Whether the head is all of the file.

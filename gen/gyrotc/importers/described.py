@@ -101,7 +101,7 @@ def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def sha256_of(path: Path) -> str:
-    """Of a file; of a folder: of its files one after the other, in the order of their names."""
+    """SHA-256 of a file, or of the files of a folder one after the other in the order of their names."""
     digest = hashlib.sha256()
     for one in sorted(path.iterdir()) if path.is_dir() else [path]:
         with one.open("rb") as file:

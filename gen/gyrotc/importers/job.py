@@ -35,7 +35,7 @@ class ImportOptions:
 
     Attributes:
         serial: Serial of the gyro; else that of the map, of the file, or the name of the folder.
-        format: Of the runs that are written.
+        format: Format of the runs that are written.
         trust_units: Values that contradict their units are taken; it is recorded.
         dry_run: Tell what would be read and how, and write nothing.
     """

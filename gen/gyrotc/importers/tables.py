@@ -32,7 +32,7 @@ class Column:
     """One column of a table.
 
     Attributes:
-        name: As the file names it.
+        name: Name as the file has it.
         unit: As the file gives it, None where it gives none.
         why: Where the unit stands.
         kind: What its cells hold; "stamp": dates and times of day.

@@ -83,7 +83,7 @@ def earlier_models(folder: Path) -> dict[str, Model]:
 
 
 def refuse_another(models: Mapping[str, Model], serial: str) -> None:
-    """An earlier result is of the same gyro.
+    """Refuses an earlier result that is of another gyro.
 
     Raises:
         InputError: It is not.

@@ -35,10 +35,10 @@ def decided(
     rule: DecisionRule,
     known: FigureUncertainty | str | None,
 ) -> Limit:
-    """A limit of an amount.
+    """Holds an amount with its uncertainty against a limit, by a decision rule.
 
     Args:
-        name: As in the limits file.
+        name: Name of the limit, as in the limits file.
         measured: What was measured, None if it was not.
         bound: The limit.
         sign: 1 for an upper limit, -1 for a lower one.
@@ -97,5 +97,5 @@ def _verdict(room: float, band: float, rule: DecisionRule) -> Verdict:
 
 
 def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict:
-    """The verdict of a whole; of nothing: a pass."""
+    """The gravest of several verdicts; a pass where there is none."""
     return max((v for v in verdicts if v), key=_ORDER.index, default="PASS")

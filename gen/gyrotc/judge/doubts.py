@@ -69,7 +69,7 @@ class Doubt:
 
 
 def where_of(file: str, from_s: float | None) -> str:
-    """A run, for messages."""
+    """The run as messages name it."""
     return file if from_s is None else f"{file} from {from_s:.6g} s"
 
 

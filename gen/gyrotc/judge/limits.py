@@ -101,7 +101,7 @@ class Required(_Part):
 
 
 class Limits(_Part):
-    """A limits file."""
+    """The content of a limits file."""
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     product: str = ""

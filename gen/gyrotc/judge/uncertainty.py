@@ -40,7 +40,7 @@ def figure_uncertainties(
 
     Args:
         judged: Means over `average_s` of the runs that the model is judged by.
-        runs: The same runs as they were evaluated.
+        runs: These runs as they were evaluated.
         average_s: Averaging, s.
         scale: 1, or the RMS of spans left out over that of `judged`, where these are training runs that stand in for
             them.

@@ -65,7 +65,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """A file that `--json` or `--plots` names must not be one that gyrotc did not write: it would be lost.
+    """Refuses to replace a file, named by `--json` or `--plots`, that gyrotc did not write.
 
     Raises:
         InputError: There is such a file, or a folder.

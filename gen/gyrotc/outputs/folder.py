@@ -53,7 +53,7 @@ class Stage:
         parts[self._part] = replace(parts[self._part], serial=serial, axis=axis)
 
     def stale(self) -> None:
-        """What else gyrotc wrote into the folder no longer holds: it goes when the new files come.
+        """Says that what else gyrotc wrote into the folder no longer holds: it is removed when the new files come.
 
         Raises:
             InputError: Some of it was changed since.
@@ -181,14 +181,14 @@ class _Job:
         return Stage(path, self, name)
 
     def whole(self) -> None:
-        """All that gyrotc wrote is replaced, not only the entries asked for."""
+        """From now on all that gyrotc wrote is replaced, not only the entries asked for."""
         if self._entries is not None and self.earlier is not None:
             names = self._entries | self.earlier.entries()
             self.earlier = check_contents(self.out, self.place, None, names)
             self._entries = names
 
     def prepare(self) -> None:
-        """What was written gets its markers, and is on disk."""
+        """Gives what was written its markers, and sees to it that all is on disk."""
         tops = {path.name for path in self.work.iterdir()} - OWN
         if self._entries is not None and tops - self._entries:
             raise ValueError(f"{sorted(tops - self._entries)} is not among the entries of this job")
@@ -233,7 +233,7 @@ class _Job:
         self.work = aside if old is None else self.place.parent / old
 
     def end(self) -> None:
-        """Removes what is left of the work, or of the earlier result; lets the place go."""
+        """Removes what is left of the work, or of the earlier result, and releases the place."""
         _open.remove(self)
         unfinished.remove(self._begun)
         try:

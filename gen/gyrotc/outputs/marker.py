@@ -74,7 +74,7 @@ class Marker:
     unfinished: bool = False
 
     def text(self) -> str:
-        """As JSON."""
+        """The marker as JSON."""
         content: dict[str, Any] = {
             "schema": SCHEMA,
             "gyrotc_version": __version__,

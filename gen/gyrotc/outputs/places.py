@@ -28,7 +28,7 @@ def prefix_of(place: Path) -> str:
 
 
 def check_apart(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) -> None:
-    """`out` is no file, and not the same as, above or inside what the job reads or gyrotc's own sources.
+    """Refuses an `out` that is a file, or is, holds or lies in what the job reads or gyrotc's own sources.
 
     Args:
         whole: The folder is replaced. A job that only adds to it may stand above: a project with its `.venv`.
@@ -58,7 +58,7 @@ def _sources() -> list[Path]:
 
 
 def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[str] | None) -> Marker | None:
-    """The marker of what stands at `place`, all of which (or all of whose `entries`) gyrotc wrote.
+    """The marker of what stands at `place`, once it is seen that gyrotc wrote all of it, or all of its `entries`.
 
     Raises:
         InputError: Something there would be lost that gyrotc did not write, or it is another kind of result.
@@ -91,7 +91,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
 
 
 def check_serial(out: Path, marker: Marker | None, serial: str) -> None:
-    """A result of one gyro does not take the place of another's.
+    """Refuses to put a result of one gyro into the place of another's.
 
     Raises:
         InputError: It would.

@@ -59,7 +59,11 @@ class Update:
             self._after = replace(self._after, serial=self._before.serial, axis=self._before.axis)
 
     def commit(self, put: Callable[[], None]) -> None:
-        """Args: put: Puts `work` into the place as a whole."""
+        """Puts the new entries into their places.
+
+        Args:
+            put: Puts `work` into the place as a whole.
+        """
         several = len(self._changed) > 1 or not can_exchange(self._work)
         if self._marked and several and self._all_listed():
             self._link_others()

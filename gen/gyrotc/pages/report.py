@@ -100,7 +100,7 @@ def page_environment() -> jinja2.Environment:
 
 @contextmanager
 def page_from(source: Path) -> Iterator[None]:
-    """Drawing computes nothing: where it stumbles, the results it is given are not as they were written.
+    """Refuses results with which drawing stumbles: it computes nothing, so they are not as they were written.
 
     Raises:
         InputError: It stumbled.

@@ -35,7 +35,7 @@ _SHARE = 4.0 * _UNIT  # relative error of a share of a bank: two differences, th
 
 
 def table_of(model: Model) -> Table:
-    """The table, without known answers.
+    """The table of a model in float32, without known answers.
 
     Raises:
         CheckFailed: The model needs what the float32 runtime does not have.

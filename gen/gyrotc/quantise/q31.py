@@ -53,7 +53,7 @@ class _Gaussians:
     fraction: int
 
     def fits(self) -> bool:
-        """Whether every argument, and every factor of one, keeps to its word."""
+        """Whether every argument, and every factor of one, fits its word."""
         reach = np.maximum(np.abs(self.offset), np.abs(self.offset + self.factor * (POSITIONS - 1)))
         return bool(
             np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR
@@ -77,7 +77,7 @@ class _Fixed:
 
 
 def table_of(model: Model) -> Table:
-    """The table, without known answers.
+    """The table of a model in fixed point, without known answers.
 
     Raises:
         CheckFailed: The model cannot be held in fixed point, with the reason.

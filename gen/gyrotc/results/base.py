@@ -63,7 +63,7 @@ class Numbered(Part):
 
 
 class Result(Numbered):
-    """A whole result."""
+    """A whole result, with the version that wrote it."""
 
     gyrotc_version: str = Field(description="of the gyrotc that wrote it")
 
@@ -78,7 +78,7 @@ def read_result(path: Path, kind: type[R]) -> R:
 
 
 def read_optional(path: Path, kind: type[R]) -> R | None:
-    """The same; None where it is absent."""
+    """A result that a command wrote; None where the file is absent. Raises as `read_result`."""
     return read_result(path, kind) if path.exists() or path.is_symlink() else None
 
 

@@ -20,7 +20,7 @@ class Published(Part):
 
 
 class Group(Part):
-    """One environment."""
+    """What one method makes of one environment."""
 
     environment: str = Field(description="free text of the data set")
     samples: Count = Field(description="means over `average_s`")
@@ -35,7 +35,7 @@ class Group(Part):
 
 
 class Method(Part):
-    """One training method."""
+    """What one training method makes of all environments."""
 
     id: str = Field(description="as `--method` takes it")
     groups: tuple[Group, ...] = Field(description="environment by environment")

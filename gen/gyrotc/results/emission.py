@@ -12,7 +12,7 @@ __all__ = ["Emitted", "EmittedTable"]
 
 
 class EmittedTable(Part):
-    """One table."""
+    """Size and error bound of one table."""
 
     numeric: Arithmetic = Field(description="its arithmetic")
     table_bytes: Count = Field(description="size of the table, bytes (section 3)")

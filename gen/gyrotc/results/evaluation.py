@@ -40,7 +40,7 @@ class Pooled(Part):
 
 
 class EvaluatedRun(Part):
-    """One run."""
+    """One run before and after compensation."""
 
     file: str = Field(description="as in `dataset.toml`")
     role: Literal["train", "exam"] = Field(description="of the run")
@@ -61,7 +61,7 @@ class FigureUncertainty(Part):
 
 
 class FoundIn(Part):
-    """A finding."""
+    """Something that a person should know, with the figures behind it."""
 
     id: str = Field(description="its stable name")
     text: str = Field(description="what was found, and what to do")

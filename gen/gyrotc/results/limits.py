@@ -21,7 +21,7 @@ Value = bool | int | float | str | tuple[float, ...] | tuple[str, ...] | None
 
 
 class Limit(Part):
-    """One limit."""
+    """One limit with what was measured."""
 
     limit: str = Field(description="name in the limits file, such as `at_most.rms_dph`")
     measured: Value = Field(description="figure, range, or what was found; null where it was not measured")

@@ -58,7 +58,7 @@ class DetectionLimit(Part):
 
 
 class PlanLimit(Part):
-    """One cause."""
+    """From which size on the profile will show a cause."""
 
     id: str = Field(description="of the catalogue of causes")
     family: str = Field(description="of the cause")
@@ -104,7 +104,7 @@ class Shortest(Part):
 
 
 class TriedRun(Part):
-    """A further run."""
+    """What a further run would tell about the pair."""
 
     profile: str = Field(description="its name")
     hours: float = Field(description="h")

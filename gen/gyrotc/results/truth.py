@@ -12,7 +12,7 @@ __all__ = ["SimulatedTruth", "TrueRun"]
 
 
 class TrueRun(Part):
-    """One run."""
+    """What was simulated in one run."""
 
     file: str = Field(description="as in `dataset.toml`")
     noise: str = Field(description="file of its noise, mean of every step, deg/h, by its path in the folder")

@@ -62,7 +62,7 @@ class RecordingPart:
     Attributes:
         time_s: Start of each row on the record's clock, s, shape (n,).
         temperature_c: Mean of the temperature readings in each row, C, shape (n,).
-        channels: The same of the auxiliary channels.
+        channels: Samples of the auxiliary channels, likewise.
         edge_arcsec: Angle read at the rows' edges, arcsec, shape (n + 1,).
     """
 

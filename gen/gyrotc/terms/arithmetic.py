@@ -29,7 +29,7 @@ class Operations(Protocol):
     def array(self, x: Sequence[Any]) -> Numbers: ...
 
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
-        """Which samples of a channel are none."""
+        """Which samples of a channel are missing."""
 
     def settle(self, x: Any) -> Any:
         """A memory at rest at x."""

@@ -22,7 +22,7 @@ class Telling(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """For reports.
+    """The words of a cause in reports.
 
     Attributes:
         name: One clause.

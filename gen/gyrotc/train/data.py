@@ -139,7 +139,7 @@ def scaling_of(data: TrainingData) -> Scaling:
 
 
 def average(data: TrainingData, length_s: float) -> TrainingData:
-    """Weighted means over `length_s` within each run, in cells of the run's clock; samples that long stay.
+    """Weighted means over `length_s` within each run, in cells of the run's clock; longer samples stay as they are.
 
     Args:
         data: Samples as `cleaned` returns them.

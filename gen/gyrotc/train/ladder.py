@@ -52,7 +52,7 @@ _LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by ro
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """What was tried.
+    """What every rung leaves on every stretch of history, and the choice among them.
 
     Attributes:
         folds: Stretches that were left out.
@@ -190,8 +190,8 @@ def climb(
     """Fits every rung without every stretch of history.
 
     Args:
-        samples: As `cleaned` returns them.
-        scaling: Of all of them.
+        samples: Samples as `cleaned` returns them.
+        scaling: Scaling of all samples.
         process: The evidence process of all samples; None: it could not be fitted, and no map is tried.
         power_on: Number of the power-on of each run, by the run's index; None: each run is one.
         average_s: Averaging of what is judged, s.

@@ -53,9 +53,9 @@ def chosen_by_ladder(
 
     Args:
         samples: As `cleaned` returns them; their temperature spans at least 2 C.
-        scaling: Of these samples.
+        scaling: Scaling of these samples.
         power_on: Number of the power-on of each run, by its index; None: each run is one.
-        seed: Of the Kohonen network.
+        seed: Seed of the Kohonen network.
         average_s: Averaging of RMS figures, s.
     """
     refused: dict[str, str] = {}

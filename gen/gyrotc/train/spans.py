@@ -74,7 +74,7 @@ class Span:
         return np.asarray((run == self.run) & (time_s >= self.from_s - gap) & (time_s < self.to_s + gap))
 
     def result(self) -> SpanLeftOut:
-        """For `training.json`."""
+        """The span as `training.json` has it."""
         return SpanLeftOut(
             file=self.file, from_s=self.from_s, to_s=self.to_s, kind=self.kind, guard_s=self.guard_s
         )

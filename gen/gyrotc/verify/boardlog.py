@@ -90,7 +90,7 @@ def read_output(text: str) -> list[BoardOutput]:
 
 
 def read_log(text: str) -> BoardLog:
-    """The same of a log that was recorded elsewhere, every line accounted for.
+    """The parts of a log that was recorded elsewhere, with every line of it accounted for.
 
     From a `begin` (with the `board` before it) to `done` every line must be understood. Outside, a board may print what
     it likes but for lines that look like results: these have lost their `begin`.

@@ -36,12 +36,12 @@ _MISFIT = 0.01  # p-value of what is left below which further causes are looked 
 
 @dataclass(frozen=True)
 class Attribution:
-    """What was found.
+    """What the search found, and how sure that is.
 
     Attributes:
         first: The search before any cause is taken, best first.
         causes: The chosen causes, strongest first.
-        p_values: Of each, adjusted for the whole search.
+        p_values: The p-value of each cause, adjusted for the whole search.
         rivals: For each, other causes in its place, nearest first.
         gain: Twice the log-likelihood ratio of all causes together.
         misfit_p: p-value of what is left against the dictionary.

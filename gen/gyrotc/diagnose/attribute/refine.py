@@ -119,7 +119,7 @@ def _inside(search: Search, k: int, margin_s: float) -> NDArray[np.bool_]:
 
 
 def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tuple[Refined, ...]:
-    """Moves the nonlinear parameters of all members to the optimum, one after the other, twice."""
+    """Moves the nonlinear parameters of all members to their optimum, one after the other, in two rounds."""
     fit = _Fit(search, gains, members)
     current = list(members)
     profiles: list[Array | None] = [None] * len(current)

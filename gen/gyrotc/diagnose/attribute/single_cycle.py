@@ -90,7 +90,7 @@ class Cycle:
         states: What they add.
         rivals: Causes that would explain the recordings as well.
         rms_dph: What the map of T alone leaves.
-        p_value: Of the chosen states together.
+        p_value: The p-value of the chosen states together.
         residual: What the map of T alone leaves, deg/h, shape (N,).
         explained: The chosen states' part of it, shape (N,).
     """

@@ -34,9 +34,9 @@ class View:
 
     Attributes:
         colour: The noise.
-        gram: Of the joined columns, shape (P, P).
+        gram: Inner products of the joined columns, shape (P, P).
         b: Of the joined columns with the data, shape (P,).
-        yy: Of the data, (deg/h)².
+        yy: Inner product of the data with themselves, (deg/h)².
         log_det: log det of the covariance of the noise.
         log_likelihood: Residual log-likelihood, the scale profiled.
         scale: Estimated factor of the noise, deg/h where the colour's white part is 1.

@@ -37,7 +37,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
 
     Args:
         search: With every cause found taken out.
-        declared: As the data set declares it.
+        declared: Noise as the data set declares it.
         causes: Whether causes were found; if so, what the declared noise makes visible is theirs.
     """
     colour = declared.colour(search.records.block_s) if declared else COLOURS[0]

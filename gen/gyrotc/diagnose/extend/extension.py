@@ -47,7 +47,7 @@ class Extension:
         crossed: The cross-validation on the training runs that decided so.
         samples: Training samples as the extended map sees them.
         floor: Noise floor of the scored samples, deg/h.
-        baseline_rms, baseline_centers: Of the model without causes.
+        baseline_rms, baseline_centers: RMS (deg/h) and number of centers of the model without causes.
         measured_on: "exam" or "left out".
         before, after: Residuals of the scored runs without and with all causes.
     """

@@ -32,7 +32,7 @@ class Gain:
     """Before and after, deg/h and arcsec, on the same samples; pairs are 95 % intervals.
 
     Attributes:
-        share, low, high: Share of the removable excess that is removed; None where there is next to none.
+        share, low, high: Share of the removable excess that is removed; None where the excess is too small.
         difference_low: Lower 95 % limit of before² − after², (deg/h)².
         rms_removed: Of before − after, deg/h.
         angle_removed: The same of the angle after one hour, arcsec; None where no run lasts an hour.

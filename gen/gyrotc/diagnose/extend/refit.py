@@ -61,7 +61,7 @@ class Played:
         day: Days since the first run, or None.
         channels: Samples of the channels, one for every row.
         block_s: Length of a block, s.
-        environment: As in the data set.
+        environment: Environment as the data set names it.
     """
 
     data: TrainingData

@@ -27,11 +27,11 @@ class Record:
     """One run.
 
     Attributes:
-        name: For messages and tables.
+        name: Name of the run in messages and tables.
         history: The whole record at its native rate.
         rate_dph: Measured rate, deg/h, shape (n,).
         usable: Rows in the run's span, outside its exclusions, with a finite rate, shape (n,).
-        environment: As in the data set.
+        environment: Environment as the data set names it.
         channels: Auxiliary channels by name, shape (n,) each.
     """
 
