@@ -146,7 +146,8 @@ def test_spans_that_touch_are_one_run(tmp_path: Path) -> None:
 def test_a_ramp_that_never_turns_cannot_test_memory(tmp_path: Path) -> None:
     time, temperature = cycle(1)
     found = diagnose(load(recorded(tmp_path, temperature, two_states(time, temperature), 1400.0)))
-    assert found.result["verdict"] == "not_testable" and found.result["causes"] == []
-    assert found.result["single_cycle"]["turns"] == 0 and "never turns" in found.result["text"]
-    untestable = {c["id"] for c in found.result["considered"] if "not_testable" in c}
+    result = found.result.content()
+    assert result["verdict"] == "not_testable" and result["causes"] == []
+    assert result["single_cycle"]["turns"] == 0 and "never turns" in result["text"]
+    untestable = {c["id"] for c in result["considered"] if "not_testable" in c}
     assert {"thermal_gradient", "hysteresis"} <= untestable

@@ -73,8 +73,8 @@ def result(verdict: DiagnosisVerdict) -> Diagnosed:
     return Diagnosed(
         gyrotc_version="0.1.0", serial="G1", axis=None, verdict=verdict, block_s=10.0, average_s=100.0,
         noise_floor_dph=1e-3, discrepancies=(), causes=causes, baseline=None, extended=None, considered=considered,
-        missing=(), estimated_noise=None, measured_on="exam", single_cycle=None, unexplained=None, text="Finding.",
-        meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], shipped=False)),
+        missing=(), estimated_noise=None, measured_on="exam", single_cycle=None, shipping=None, unexplained=None,
+        text="Finding.", meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], shipped=False)),
     )  # fmt: skip
 
 

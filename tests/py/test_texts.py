@@ -346,6 +346,7 @@ _DIAGNOSIS: dict[str, Any] = {
     "average_s": 100.0,
     "noise_floor_dph": 1e-3,
     "single_cycle": None,
+    "shipping": None,
     "pictures": [],
     "extended": None,
     "baseline": {"exam_rms_dph": 1e-3, "centers": 3},

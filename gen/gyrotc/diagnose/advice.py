@@ -1,13 +1,15 @@
-"""What the verdict means, and what to do next: the experiment that would tell more."""
+"""The finding in words, what the verdict means, and what to do next: the experiment that would tell more."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from ..results.diagnosed import DiagnosisVerdict, NamedCause
+from ..results.diagnosed import DiagnosisVerdict, ExtendedModel, NamedCause
 from ..terms import CATALOGUE
 
-__all__ = ["VERDICTS", "next_steps"]
+__all__ = ["VERDICTS", "next_steps", "sentence_of"]
+
+_WHOLE = 0.995  # a share of the removable error that shows as 100 %
 
 VERDICTS: dict[DiagnosisVerdict, str] = {
     "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
@@ -56,3 +58,38 @@ def next_steps(
     if missing and verdict != "not_testable":
         steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
     return steps
+
+
+def sentence_of(
+    verdict: DiagnosisVerdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
+) -> str:
+    """The finding in one or two sentences; `undecided` says why a single cycle cannot tell of memory."""
+    why = f" about memory of the temperature: {undecided}" if undecided else ""
+    causes = [c for c in found if c.family != "noise"]
+    names = "; ".join(
+        f"{name} (twice)" if sum(c.name == name for c in causes) > 1 else name
+        for name in dict.fromkeys(c.name for c in causes)
+    )
+    noise = "; ".join(c.name for c in found if c.family == "noise")
+    text = {
+        "consistent": "Nothing was found beyond the static map and the declared noise.",
+        "explained": f"{names}.",
+        "ambiguous": f"{names}, or equally well: {', '.join(_rivals(causes))}.",
+        "partial": f"{names}, and structure remains that no cause explains.",
+        "noise_differs": f"{noise}.",
+        "unexplained": "There is structure that no cause of the catalogue explains.",
+        "not_testable": f"The recordings cannot decide{why}.",
+    }[verdict]
+    share = extended.gain.share_of_excess_removed if extended is not None else None
+    if share is None:
+        return text
+    amount = "all" if share >= _WHOLE else f"{share:.0%}"
+    return f"{text} On unseen runs the extension removes {amount} of the removable error."
+
+
+def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:
+    """Names of causes that explain the runs as well, with their channels."""
+    for cause in causes:
+        for id in cause.equivalent:
+            channels = ", ".join(cause.equivalent_channels or ())
+            yield CATALOGUE[id].words.name + (f" ({channels})" if CATALOGUE[id].needs.channel else "")

@@ -14,7 +14,6 @@ from ..results.diagnosed import (
     ConsideredCause,
     CycleResult,
     Diagnosed,
-    DiagnosisVerdict,
     Estimate,
     ExtendedModel,
     NamedCause,
@@ -27,7 +26,7 @@ from ..results.diagnosed import (
 from ..results.planned import DetectionLimit
 from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end
-from .advice import VERDICTS, next_steps
+from .advice import VERDICTS, next_steps, sentence_of
 from .attribute.cycle_fits import memories
 from .attribute.intervals import Interval
 from .attribute.refine import Refined
@@ -43,7 +42,6 @@ from .words import NOISE_WORDS
 __all__ = ["not_testable", "result_of"]
 
 _MOST_EQUIVALENT = 2  # rivals that are named; the page lists every cause with its p-value besides
-_WHOLE = 0.995  # a share of the removable error that shows as 100 %
 
 
 def _block_s(dataset: Dataset, options: FitOptions) -> float:
@@ -120,7 +118,7 @@ def result_of(  # long: one line for each field of the result
         single_cycle=None if cycle is None else _single_cycle(cycle, extension),
         shipping=extension.crossed.result(),
         unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
-        text=_sentence(verdict, listed, extended, cycle.not_testable if cycle is not None else ""),
+        text=sentence_of(verdict, listed, extended, cycle.not_testable if cycle is not None else ""),
         meaning=VERDICTS[verdict],
         next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
     )
@@ -283,38 +281,3 @@ def _unexplained(analysis: Analysis) -> Unexplained:
         best_partial_match=tuple(c.candidate.id for c in attribution.causes),
         looks_like=attribution.other.name if attribution.other.lead > 0.0 else None,
     )
-
-
-def _sentence(
-    verdict: DiagnosisVerdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
-) -> str:
-    """The finding in one or two sentences; `undecided` says why a single cycle cannot tell of memory."""
-    why = f" about memory of the temperature: {undecided}" if undecided else ""
-    causes = [c for c in found if c.family != "noise"]
-    names = "; ".join(
-        f"{name} (twice)" if sum(c.name == name for c in causes) > 1 else name
-        for name in dict.fromkeys(c.name for c in causes)
-    )
-    noise = "; ".join(c.name for c in found if c.family == "noise")
-    text = {
-        "consistent": "Nothing was found beyond the static map and the declared noise.",
-        "explained": f"{names}.",
-        "ambiguous": f"{names}, or equally well: {', '.join(_rivals(causes))}.",
-        "partial": f"{names}, and structure remains that no cause explains.",
-        "noise_differs": f"{noise}.",
-        "unexplained": "There is structure that no cause of the catalogue explains.",
-        "not_testable": f"The recordings cannot decide{why}.",
-    }[verdict]
-    share = extended.gain.share_of_excess_removed if extended is not None else None
-    if share is None:
-        return text
-    amount = "all" if share >= _WHOLE else f"{share:.0%}"
-    return f"{text} On unseen runs the extension removes {amount} of the removable error."
-
-
-def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:
-    """Names of causes that explain the runs as well, with their channels."""
-    for cause in causes:
-        for id in cause.equivalent:
-            channels = ", ".join(cause.equivalent_channels or ())
-            yield CATALOGUE[id].words.name + (f" ({channels})" if CATALOGUE[id].needs.channel else "")

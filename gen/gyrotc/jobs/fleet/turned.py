@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 _PLACES_C = np.arange(-60.0, 126.0, 5.0)
 _LEAST = 8  # gyros; fewer do not say what is usual
-_LEAST_PLACES = 6
+_LEAST_PLACES = 6  # 30 C: on a shorter curve a correlation of 0.9 may be chance
 _ALIKE = (
     0.9  # correlation of the usual gyro with the median of the lot, and of a turned one with its negative
 )
