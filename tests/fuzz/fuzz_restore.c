@@ -36,7 +36,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     state_t state;
     int status;
 
-    CLAIM(FN(init)(&state, table, N) == GTC_OK);
+    CLAIM(FN(init)(&state, table, PERIOD) == GTC_OK);
     walked(&in, &state);
     CLAIM(FN(save)(&state, words) == GTC_OK);
     memcpy(spoiled, words, sizeof words);
@@ -46,7 +46,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     memset(&before, 0xA5, sizeof before);
     memcpy(&state, &before, sizeof state);
-    status = FN(restore)(&state, table, N, spoiled, off_blocks);
+    status = FN(restore)(&state, table, PERIOD, spoiled, off_blocks);
     if (status < 0) {
         CLAIM(memcmp(&state, &before, sizeof state) == 0);
         CLAIM((status == GTC_E_IMAGE) || (status == GTC_E_LAYOUT) || (status == GTC_E_ID));

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckFailed, InputError
+from ..frontend import period_us
 from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
@@ -38,9 +39,12 @@ __all__ = [
     "emit",
     "emit_texts",
     "emitted_tables",
+    "example_period_us",
     "quantise_all",
     "write_texts",
 ]
+
+_EXAMPLE_US = 10000  # 100 samples a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,13 +269,17 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
 
 def _example_values(model: Model) -> dict[str, Any]:
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
-    per_second = 100 if abs(model.block_s * 100 - round(model.block_s * 100)) < 1e-9 else 1
     return {
         "first_temperature": middle,
         "first_temperature_q16": round(middle * 65536),
-        "samples_per_second": per_second,
-        "samples_per_block": max(1, round(model.block_s * per_second)),
+        "period_us": example_period_us(model),
     }
+
+
+def example_period_us(model: Model) -> int:
+    """A sample period that fits the model's block: 10 ms where it does, else a tenth of the block."""
+    block_us = max(1, round(model.block_s * 1e6))
+    return _EXAMPLE_US if block_us % _EXAMPLE_US == 0 else period_us(block_us, min(10, block_us))
 
 
 def _image(table: Table) -> bytes:

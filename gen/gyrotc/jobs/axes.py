@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit import emitted_tables
+from ..emit import emitted_tables, example_period_us
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
@@ -79,7 +79,12 @@ def joint_texts(
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
-    main = c_environment().get_template("main_axes.c.j2").render(models=list(models.values()), n=numeric)
+    listed = list(models.values())
+    main = (
+        c_environment()
+        .get_template("main_axes.c.j2")
+        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]))
+    )
     texts["main.c"] = main.encode("ascii")
     texts[RECORD] = joint_record_text(models, texts)
     return texts
