@@ -204,7 +204,7 @@ typedef struct {
 } gtc_q31_angle_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (12 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_MAX_TERMS) + (13 * (GTC_MAX_TERMS + 1)))
+#define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
