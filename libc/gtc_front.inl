@@ -427,12 +427,15 @@ static void FN(close)(STATE *state)
     FN(pass)(state, 1U);
     FN(close_channels)(state);
     if (FN(end_block)(state, &state->input[0], state->table->guards)) {
+        NUM temp;
         NUM slope;
         int_least32_t remarks;
 
         FN(push)(state, 1U);
         remarks = FN(window_slope)(state, &slope);
-        FN(correct)(state, state->input[0].mean, slope, remarks);
+        temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
+        FN(step_terms)(state, temp);
+        FN(correct)(state, temp, slope, remarks);
     } else {
         FN(bridge)(state);
     }

@@ -175,10 +175,10 @@ static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t 
            & FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1]));
 }
 
-/* A number of a term or of the window: none yet, or a temperature. */
+/* A temperature of the window, or of a term, which an envelope may have moved. */
 static int FN(is_temperature)(NUM x)
 {
-    return FN(is_within)(x, NUM_PLAUSIBLE_MIN, NUM_PLAUSIBLE_MAX);
+    return FN(is_within)(x, FN(number_limits)[9].least, FN(number_limits)[9].most);
 }
 
 static int FN(terms_are_sound)(const STATE *state)

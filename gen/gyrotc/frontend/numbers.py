@@ -14,7 +14,6 @@ __all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
 _MISSING_Q31 = -(2**31)
-_LARGEST = 2**31 - 1
 
 
 class Arithmetic(Protocol):
@@ -33,9 +32,6 @@ class Arithmetic(Protocol):
 
     def is_near(self, a: Any, b: Any, limit: Any) -> Any:
         """|a - b| <= limit."""
-
-    def ahead(self, temperature: Numbers, slope: Numbers, blocks: int) -> Numbers:
-        """Where a temperature is after so many blocks."""
 
     def running_sum(self, d: Numbers) -> Numbers:
         """Last of the running sums along axis 1, added from left to right."""
@@ -64,10 +60,6 @@ class _F32:
 
     def is_near(self, a: Any, b: Any, limit: Any) -> Any:
         return np.abs(a - b) <= limit
-
-    def ahead(self, temperature: Numbers, slope: Numbers, blocks: int) -> Numbers:
-        way = slope * np.float32(blocks)
-        return np.asarray(temperature + way)
 
     def running_sum(self, d: Numbers) -> Numbers:
         # accumulate is sequential by definition: r[i] = r[i-1] + d[i]
@@ -125,9 +117,6 @@ class _Q31:
 
     def is_near(self, a: Any, b: Any, limit: Any) -> Any:
         return np.abs(a - b) <= limit
-
-    def ahead(self, temperature: Numbers, slope: Numbers, blocks: int) -> Numbers:
-        return np.asarray(np.clip(temperature + slope * blocks, -_LARGEST, _LARGEST))
 
     def running_sum(self, d: Numbers) -> Numbers:
         return np.asarray(np.add.accumulate(d, axis=1)[:, -1])

@@ -28,6 +28,11 @@ extern "C" {
 #define GTC_TEST_1_T_MAX_C (60.00000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_1_SLOPE_MIN_C_PER_MIN (-3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_1_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_1_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
+#define GTC_TEST_1_PERIOD_MAX_US 10010000UL /* longest sample period */
+#define GTC_TEST_1_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_1_AUTHORITY_MIN_DPH (-1.98713243F) /* no correction lies below it, deg/h: margin 25% of the range */
+#define GTC_TEST_1_AUTHORITY_MAX_DPH (1.60987401F) /* no correction lies above it, deg/h: margin 25% of the range */
 #define GTC_TEST_1_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_TEST_1_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_TEST_1_F32_TABLE_BYTES 508UL /* read-only data, with pointers of 32 bits */
