@@ -48,7 +48,6 @@ def random_model(seed: int, **changes: Any) -> Model:
         "fallback_dph": float(rng.normal(0.0, 0.01)),
         "hold_blocks": int(rng.integers(1, 6)),
         "agree_s": float(rng.choice([0.0, 1.0, 2.5, 15.0])),
-        "lead_blocks": int(rng.integers(0, 2)),
         "guards": random_guards(seed) if rng.random() < 0.7 else {},
         "stuck_s": float(rng.choice([0.0, 0.0, 6.0, 40.0])),
         "max_step_c": float(rng.uniform(0.05, 1.0)),

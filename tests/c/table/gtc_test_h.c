@@ -44,7 +44,7 @@ static const gtc_word_t f32_guards[8] = {
 /* kind, channel, parameters */
 static const gtc_word_t f32_terms[16] = {
     B(0x4UL), B(0x0UL), V(0.125F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* path_length_periodicity */
-    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
+    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.566574216F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
 };
 
 /* known answers: T, slope, bias, status */
@@ -74,8 +74,8 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-62.3153038F), V(61.719799F) },
-    .effect = { V(-60.3750038F), V(60.3750038F) },
+    .authority = { V(-70.3042145F), V(69.7087097F) },
+    .effect = { V(-68.3639145F), V(68.3639145F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -95,7 +95,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xac874acbUL,
+    .crc = 0xf72b950dUL,
     .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
 };
 
@@ -127,7 +127,7 @@ static const gtc_word_t q31_guards[8] = {
 /* kind, channel, parameters */
 static const gtc_word_t q31_terms[16] = {
     B(0x4UL), B(0x0UL), B(0x20000000UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* path_length_periodicity */
-    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */
+    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00910b02UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */
 };
 
 /* known answers: T, slope, bias, status */
@@ -157,8 +157,8 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
     .fallback = 6291456L,
-    .authority = { -1045477246L, 1035485622L },
-    .effect = { -1012924416L, 1012924416L },
+    .authority = { -1179508867L, 1169517243L },
+    .effect = { -1146956038L, 1146956038L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 8L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -178,7 +178,7 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0xbb19ca4bUL,
+    .crc = 0xce3674daUL,
     .term_code = { &gtc_q31_term_harmonic, &gtc_q31_term_memory },
 };
 

@@ -47,7 +47,7 @@ static const gtc_word_t f32_guards[16] = {
 static const gtc_word_t f32_terms[32] = {
     B(0x1UL), B(0x0UL), V(0.221199214F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* cavity_lag */
     B(0x2UL), B(0x0UL), V(2.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* hysteresis */
-    B(0x3UL), B(0x0UL), V(9.23324871F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
+    B(0x3UL), B(0x0UL), V(9.23324871F), V(0.475614727F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
     B(0x5UL), B(0x1UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
 };
 
@@ -82,8 +82,8 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-4.02806282F), V(3.66806006F) },
-    .effect = { V(-2.06250024F), V(2.06250024F) },
+    .authority = { V(-3.99148464F), V(3.63148212F) },
+    .effect = { V(-2.0259223F), V(2.0259223F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -103,7 +103,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x5bdea4f1UL,
+    .crc = 0x7c0a886cUL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
 };
 
@@ -138,7 +138,7 @@ static const gtc_word_t q31_guards[16] = {
 static const gtc_word_t q31_terms[32] = {
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
     B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
-    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x01000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
+    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x00f383c6UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
     B(0x5UL), B(0x1UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
 };
 
@@ -173,8 +173,8 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 25UL,
     .fallback = 12582912L,
-    .authority = { -135158868L, 123079464L },
-    .effect = { -69206016L, 69206016L },
+    .authority = { -133931517L, 121852113L },
+    .effect = { -67978665L, 67978665L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -194,7 +194,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0xa5bc26a8UL,
+    .crc = 0x8a94f69aUL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
 };
 
