@@ -12,10 +12,8 @@ from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..model import Model, load_model
 from ..outputs import scratch_folder, write_atomically
-from ..pages.report import page_environment
+from ..pages.report import axes_page
 from ..reference.runtime import runtime_folders
-from ..results.base import read_result
-from ..results.evaluation import Evaluation
 from ..results.verification import JointVerification, Verification
 from ..texts import c_environment
 from ..verify import file_entries
@@ -44,11 +42,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         (c / name).write_bytes(data)
     _run_together(c, [m.id for m in models.values()])
-    results = [read_result(folder / axis / "evaluate.json", Evaluation) for axis in axes]
-    text = (
-        page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
-    )
-    write_atomically(folder / "report.html", text)
+    write_atomically(folder / "report.html", axes_page(folder, axes))
 
 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
