@@ -238,7 +238,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
         curve = -curve if k == reversed_unit else curve
         inside = (t >= -40.0) & (t <= 60.0)
         held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
-        entries.append({"name": f"u{k}", "axis": None, "findings": [], "curve": held})
+        entries.append({"name": f"u{k}", "axis": None, "findings": [], "facts": {"curve": held}})
     assert turned(entries) == ([] if reversed_unit is None else ["u3"])
 
 
@@ -248,7 +248,7 @@ def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
     g = np.random.default_rng(2)
     for _ in range(200):
         entries = [
-            {"name": f"u{k}", "axis": None, "findings": [], "curve": g.normal(0.0, 1.0, 38).cumsum().tolist()}
+            {"name": f"u{k}", "axis": None, "facts": {"curve": g.normal(0.0, 1.0, 38).cumsum().tolist()}}
             for k in range(12)
         ]
         assert turned(entries) == []

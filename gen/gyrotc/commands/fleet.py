@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..errors import CheckFailed
-from .base import JsonOption, OutOption, app, progress, tell, write_json
+from .base import JsonOption, OutOption, app, progress, tell, time_left, write_json
 
 
 @app.command()
@@ -33,18 +35,23 @@ def fleet(
     Example: gyrotc fleet recordings --out fleet
     """
     from ..jobs.fleet import load_manifest, run_fleet, summary_of
+    from ..pages.words import words
 
     wanted = load_manifest(manifest)
     with progress() as say:
-        say(f"{len(wanted.units)} gyros")
-        entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=_tell_entry)
+        told = _Told(len(wanted.units), say)
+        entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=told)
     summary = summary_of(entries)
     write_json(json_file, summary)
+    for reason in summary["apart"]:
+        tell(f"stands apart: {reason['name']}: {reason['text']}")
+    named = {reason["name"] for reason in summary["apart"]}
     for outlier in summary["outliers"]:
-        tell(
-            f"stands apart: {outlier['name']}: {outlier['figure']} {outlier['value']:.4g}, median of the fleet "
-            f"{outlier['median']:.4g} ({outlier['sigmas']:.1f} robust standard deviations)"
-        )
+        if outlier["name"] not in named:
+            tell(
+                f"stands apart: {outlier['name']}: {words(outlier['figure'])}: {outlier['value']:.3g}, median of its "
+                f"axis {outlier['median']:.3g} ({outlier['sigmas']:.0f} robust standard deviations)"
+            )
     for copy in summary["copies"]:
         tell(
             f"copy of another: {copy['name']} (serial {copy['serial']}) has about {copy['share']:.0%} of its rows in "
@@ -53,6 +60,22 @@ def fleet(
     tell(f"{summary['done']} of {summary['units']} done, {summary['failed']} failed: {out / 'fleet.html'}")
     if summary["failed"]:
         raise CheckFailed(f"{summary['failed']} of {summary['units']} gyros failed")
+
+
+class _Told:
+    """Tells each gyro as it comes, and how many are left."""
+
+    def __init__(self, total: int, say: Callable[[str], None]) -> None:
+        self._total, self._say, self._start = total, say, time.monotonic()
+        self._seen, self._done = 0, 0
+        say(f"{total} gyros")
+
+    def __call__(self, entry: dict[str, Any]) -> None:
+        self._seen += 1
+        self._done += not entry.get("kept")  # what is kept takes no time
+        _tell_entry(entry)
+        left = time_left(self._done, self._total - self._seen + self._done, time.monotonic() - self._start)
+        self._say(f"{self._seen} of {self._total} gyros{left}")
 
 
 def _tell_entry(entry: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from ...outputs import faults, json_text, write_atomically
 __all__ = ["ENTRY", "INTERNAL", "Entry", "kept_entry", "write_entry"]
 
 ENTRY = "entry.json"
-INTERNAL = ("key", "kept", "sketch", "curve")  # of no use in a summary
+INTERNAL = ("key", "kept", "sketch", "facts")  # of no use in a summary
 Entry = dict[str, Any]
 _Hash = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 _Sketch = Annotated[str, Field(pattern="^([0-9a-f]{16})*$")]  # hashes of rows (`dataset.shared`)
@@ -45,8 +45,14 @@ class _Stored(BaseModel):
     error_bound_dph: float | None
     findings: list[str]
     model_hash: str
+    verdict: Literal["PASS", "CONDITIONAL PASS", "FAIL"] | None
+    limits_met: _Count | None
+    limits_held: _Count | None
+    expanded_uncertainty_dph: float | None
+    date: str | None
+    rows_left_out: _Count | None
+    facts: dict[str, Any]
     sketch: _Sketch
-    curve: list[float | None]
     key: _Hash
 
 

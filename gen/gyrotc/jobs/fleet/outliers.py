@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,10 +21,10 @@ FIGURES = {
     "noise_floor_dph": True,
     "bias_dph": False,
     "after_mean_dph": False,
-    "sum_abs_weights_dph": True,
 }
 _LEAST = 8  # fewer serials do not say what a usual one is
 _SIGMAS = 5.0
+_LEAST_OF_RMS = 0.1  # of the others, in shares of what usually remains: means of 1e-9 deg/h say nothing
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
 
@@ -47,8 +48,18 @@ def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] |
 
 
 def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
-    """Serials that stand apart, the farthest first; each serial with each of its figures that does."""
+    """Serials that stand apart from those of their axis, each with each figure that does, the farthest first."""
+    kinds: dict[str | None, list[dict[str, Any]]] = defaultdict(list)
+    for entry in entries:
+        kinds[entry.get("axis")].append(entry)
+    found = [outlier for kind in kinds.values() for outlier in _of_kind(kind)]
+    return sorted(found, key=lambda o: (-o.sigmas, o.name))
+
+
+def _of_kind(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
     found = []
+    usual = spread(entries, "after_rms_dph")
+    usual_rms = usual["median"] if usual else 0.0
     for figure, by_ratio in FIGURES.items():
         known = [e for e in entries if e.get(figure) is not None and (e[figure] > 0.0 or not by_ratio)]
         if len(known) < _LEAST:
@@ -56,7 +67,10 @@ def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
         values = np.array([entry[figure] for entry in known])
         scaled = np.log(values) if by_ratio else values
         apart = np.abs(scaled - np.median(scaled))
-        sigma = max(MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
+        sigma = max(
+            MAD_TO_SIGMA * float(np.median(apart)),
+            _LEAST_RATIO / _SIGMAS if by_ratio else _LEAST_OF_RMS / _SIGMAS * usual_rms,
+        )
         if sigma == 0.0:
             continue
         found += [
@@ -64,4 +78,4 @@ def outliers(entries: Sequence[dict[str, Any]]) -> list[Outlier]:
             for entry, value, distance in zip(known, values, apart, strict=True)
             if distance > _SIGMAS * sigma
         ]
-    return sorted(found, key=lambda o: (-o.sigmas, o.name))
+    return found

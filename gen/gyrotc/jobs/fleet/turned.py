@@ -7,14 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Model
 from .entry import Entry
 
-__all__ = ["curve_of", "turned", "with_turned"]
+__all__ = ["turned"]
 
 Floats = NDArray[np.float64]
 
-_PLACES_C = np.arange(-60.0, 126.0, 5.0)
 _LEAST = 8  # gyros; fewer do not say what is usual
 _LEAST_PLACES = 6
 _ALIKE = (
@@ -24,25 +22,18 @@ _SWING = 3.0  # how much more or less than the median it may swing
 _KNOWN = 0.8  # share of the lot that knows a temperature
 
 
-def curve_of(model: Model) -> list[float | None]:
-    """Bias at a slope of 0, deg/h, every 5 C from -60 to 125 C; None outside the envelope."""
-    low, high = model.envelope.temperature_c
-    bias = model.map_dph(_PLACES_C, np.zeros(len(_PLACES_C)))
-    return [float(b) if low <= t <= high else None for t, b in zip(_PLACES_C, bias, strict=True)]
-
-
 def turned(entries: Sequence[Entry]) -> list[str]:
     """Names of gyros whose curve is the lot's turned over, axis by axis; none where the lot has no common one."""
     names: list[str] = []
     for axis in dict.fromkeys(entry.get("axis") for entry in entries):
-        lot = [e for e in entries if e.get("axis") == axis and e.get("curve")]
+        lot = [e for e in entries if e.get("axis") == axis and e.get("facts")]
         names += _turned_of(lot) if len(lot) >= _LEAST else []
     return names
 
 
 def _turned_of(lot: Sequence[Entry]) -> list[str]:
     curves = np.array(
-        [[np.nan if b is None else b for b in entry["curve"]] for entry in lot], dtype=np.float64
+        [[np.nan if b is None else b for b in entry["facts"]["curve"]] for entry in lot], dtype=np.float64
     )
     known = np.mean(np.isfinite(curves), axis=0) >= _KNOWN
     curves = curves[:, known]
@@ -60,14 +51,3 @@ def _turned_of(lot: Sequence[Entry]) -> list[str]:
         return []
     even = (swing < _SWING * size) & (swing > size / _SWING)
     return [str(lot[whole[k]]["name"]) for k in np.flatnonzero((alike < -_ALIKE) & even)]
-
-
-def with_turned(entries: Sequence[Entry]) -> list[Entry]:
-    """The entries, those of turned gyros with the finding `sign_reversed`."""
-    names = set(turned(entries))
-    return [
-        entry | {"findings": [*entry["findings"], "sign_reversed"]}
-        if entry["name"] in names and "sign_reversed" not in entry["findings"]
-        else entry
-        for entry in entries
-    ]

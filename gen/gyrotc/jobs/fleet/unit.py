@@ -5,18 +5,20 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ...dataset import load
+from ...dataset import Dataset, load
 from ...errors import CheckFailed, GyrotcError, InputError
+from ...judge.conformity import coverage_factor
+from ...metrics import Averages
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ...results.evaluation import Evaluation
 from ...results.verification import Verification
-from ..build import build_into
+from ..build import Built, build_into
 from .aside import set_aside
 from .entry import Entry, kept_entry, write_entry
+from .facts import facts_of
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
-from .turned import curve_of
 
 __all__ = ["Task", "do_unit", "done_before", "failed"]
 
@@ -88,6 +90,7 @@ def _built(task: Task) -> Entry:
     key = task.key()
     dataset = load(task.unit.dataset, axis=task.unit.axis)
     aside = set_aside(task.out)
+    runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
         fleet = task.fleet
@@ -98,6 +101,7 @@ def _built(task: Task) -> Entry:
             numerics=fleet.numerics,
             limits=fleet.limits,
             compiled=task.full,
+            watch=lambda run, averages: runs.append((run.file, averages)),
         )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
@@ -106,7 +110,7 @@ def _built(task: Task) -> Entry:
         figures: Entry = {"serial": dataset.serial} | _figures(
             built.model, built.evaluation, built.verification
         )
-        figures["curve"] = curve_of(built.model)
+        figures |= _judgement(built, dataset) | {"facts": facts_of(runs)}
         figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
         entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
     return entry | {"aside": aside} if aside else entry
@@ -131,4 +135,19 @@ def _figures(model: Model, evaluation: Evaluation, verification: Verification) -
         "error_bound_dph": verification.error_bound_dph,
         "findings": [finding.id for finding in evaluation.findings],
         "model_hash": model.hash,
+    }
+
+
+def _judgement(built: Built, dataset: Dataset) -> Entry:
+    """Verdict, uncertainty and date, as the page of the unit states them."""
+    held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
+    stated = built.model.meta.get("calibrated_on")
+    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
+    return {
+        "verdict": held.verdict if held else None,
+        "limits_met": sum(limit.met for limit in held.limits) if held else None,
+        "limits_held": len(held.limits) if held else None,
+        "expanded_uncertainty_dph": coverage_factor(known.freedom) * known.standard if known else None,
+        "date": str(stated) if stated is not None else max(days, default=None),
+        "rows_left_out": built.evaluation.rows_left_out,
     }
