@@ -130,9 +130,9 @@ def evaluate(
         result = result.model_copy(update={"left_out": training.left_out})
     generalises = training.generalises if training else None
     outliers = training.outliers if training else None
-    rows_left_out = outliers.rows if outliers else None
-    result = result.model_copy(update={"generalises": generalises, "rows_left_out": rows_left_out})
-    result = result.model_copy(update={"uncertainty": _uncertainties(result, parts)})
+    known: dict[str, Any] = {"uncertainty": _uncertainties(result, parts)}
+    known |= {"generalises": generalises, "rows_left_out": outliers.rows if outliers else None}
+    result = result.model_copy(update=known)
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 
