@@ -16,8 +16,15 @@ Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 FAULTS = (
-    "sign_reversed", "axes_exchanged", "copy_of_other", "step", "thermometer_apart", "noise", "scale", "outliers",
-)  # fmt: skip
+    "sign_reversed",
+    "axes_exchanged",
+    "step",
+    "thermometer_apart",
+    "noise",
+    "scale",
+    "outliers",
+    "copy_of_other",
+)  # fmt: skip; the copy last, for it takes a unit without fault
 _ROW_S, _HOURS = 20.0, 2.0
 _NOISE_DPH = 2e-3  # of a row
 _PROGRAMMES = ((-30.0, 60.0), (60.0, -30.0), (20.0, 50.0), (0.0, -25.0), (-10.0, 40.0), (45.0, 5.0))  # C

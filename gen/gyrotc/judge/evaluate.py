@@ -120,9 +120,8 @@ def evaluate(
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
-    if watch:
-        for part in parts:
-            watch(part.run, part.averages)
+            if watch:
+                watch(run, parts[-1].averages)
     sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
@@ -130,9 +129,9 @@ def evaluate(
         result = result.model_copy(update={"left_out": training.left_out})
     generalises = training.generalises if training else None
     outliers = training.outliers if training else None
-    known: dict[str, Any] = {"uncertainty": _uncertainties(result, parts)}
-    known |= {"generalises": generalises, "rows_left_out": outliers.rows if outliers else None}
-    result = result.model_copy(update=known)
+    left_out = outliers.rows if outliers else None
+    result = result.model_copy(update={"generalises": generalises, "rows_left_out": left_out})
+    result = result.model_copy(update={"uncertainty": _uncertainties(result, parts)})
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 

@@ -28,10 +28,11 @@ _FAR = 5.0  # robust standard deviations beyond which one stands apart
 _NEAR = 3.0  # and within which a supposed fault must bring it back
 _LEAST_BINS = 4
 _LEAST_SHIFT_C = 1.0
-_LEAST_SCALE = 1.2
+_LEAST_SCALE = 1.5
 _LEAST_NOISE = 1.5
 _LEAST_NOISY_RUN = 3.0
-_LEAST_STEP = 2.0  # times the usual score
+_LEAST_STEP = 1.6  # times the usual score
+_FAR_LOG = 4.0  # for logarithms of scores and factors, beside a least ratio
 _LEAST_SPIKES = 5  # rows
 _PER_H = 3600.0
 
@@ -74,6 +75,14 @@ class _Kind:
         about = curve - curve[both].mean()
         shape = (about - self.shape)[both] / self.shape_scatter[both]
         return float(max(np.sqrt(np.mean(level**2)), np.sqrt(np.mean(shape**2))))
+
+    def factors(self) -> Array:
+        """Least-squares factor of each curve against the usual one; 0 where it cannot be told."""
+        both = np.isfinite(self.curves) & self.seen
+        usual = np.where(both, self.median, 0.0)
+        power = (usual**2).sum(axis=1)
+        product = (np.where(both, self.curves, 0.0) * usual).sum(axis=1)
+        return np.asarray(np.where(power > 0.0, product / np.where(power > 0.0, power, 1.0), 0.0))
 
 
 def reasons(entries: Sequence[Entry], copied: Sequence[Copy] = ()) -> list[Reason]:
@@ -139,11 +148,11 @@ def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
 def _of_kind(kind: _Kind) -> Iterator[Reason]:
     """In the order of what explains most: a later reason of the same gyro follows from an earlier one."""
     yield from _thermometers(kind)
-    for entry, curve in zip(kind.entries, kind.curves, strict=True):
-        yield from _by_curve(kind, entry, curve)
+    yield from _mirrored_or_scaled(kind)
     yield from _spikes(kind)
     yield from _steps(kind)
     yield from _noise(kind)
+    yield from _bias_apart(kind)
 
 
 def _thermometers(kind: _Kind) -> Iterator[Reason]:
@@ -165,7 +174,7 @@ def _steps(kind: _Kind) -> Iterator[Reason]:
     best = np.log(np.maximum(np.nanmax(scores, axis=1), 1e-9))
     usual, scatter = _usual(best)
     for k, entry in enumerate(kind.entries):
-        if best[k] > usual + max(_FAR * scatter, np.log(_LEAST_STEP)):
+        if best[k] > usual + max(_FAR_LOG * scatter, np.log(_LEAST_STEP)):
             run = entry["facts"]["runs"][int(np.nanargmax(scores[k]))]
             time_s, size = run["step"]["time_s"], run["step"]["size_dph"]
             text = (
@@ -198,24 +207,33 @@ def _noise(kind: _Kind) -> Iterator[Reason]:
             yield Reason(entry["name"], "noise", text, file)
 
 
-def _by_curve(kind: _Kind, entry: Entry, curve: Array) -> Iterator[Reason]:
-    """What brings a curve back to that of its kind: its mirror image, or a factor."""
-    far = kind.distance(curve)
-    if not _FAR < far < np.inf:
-        return
-    name, kin = entry["name"], f"the other {entry['axis']} axes" if entry["axis"] else "the others"
-    enough = min(_NEAR, far / 2.0)
-    both = np.isfinite(curve) & kind.seen
-    usual = kind.median[both]
-    factor = float(curve[both] @ usual / (usual @ usual)) if usual.any() else 0.0
-    if kind.distance(-curve) < enough:
-        text = f"sign reversed: its bias over temperature is the mirror image of that of {kin}"
-        yield Reason(name, "sign_reversed", text)
-    elif factor > 0.0 and max(factor, 1.0 / factor) > _LEAST_SCALE and kind.distance(curve / factor) < enough:
-        yield Reason(name, "scale", f"scale: its rates are {factor:.3g} times those of {kin}")
-    else:
-        text = f"bias over temperature apart from that of {kin} ({far:.0f} robust standard deviations)"
-        yield Reason(name, "bias_apart", text)
+def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
+    """Curves that a turn or a factor brings back to those of their kind."""
+    factors = kind.factors()
+    logs = np.log(np.maximum(factors, 1e-9))
+    usual, scatter = _usual(logs)
+    for entry, curve, factor, log in zip(kind.entries, kind.curves, factors, logs, strict=True):
+        far, kin = kind.distance(curve), _kin(entry)
+        scaled = abs(log - usual) > max(_FAR_LOG * scatter, np.log(_LEAST_SCALE))
+        if _FAR < far < np.inf and kind.distance(-curve) < min(_NEAR, far / 2.0):
+            text = f"sign reversed: its bias over temperature is the mirror image of that of {kin}"
+            yield Reason(entry["name"], "sign_reversed", text)
+        elif factor > 0.0 and scaled and kind.distance(curve / factor) < _NEAR:
+            text = f"scale: its rates are {factor:.3g} times those of {kin}"
+            yield Reason(entry["name"], "scale", text)
+
+
+def _bias_apart(kind: _Kind) -> Iterator[Reason]:
+    """What nothing known brings back."""
+    for entry, curve in zip(kind.entries, kind.curves, strict=True):
+        far = kind.distance(curve)
+        if _FAR < far < np.inf:
+            text = f"bias over temperature apart from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
+            yield Reason(entry["name"], "bias_apart", text)
+
+
+def _kin(entry: Entry) -> str:
+    return f"the other {entry['axis']} axes" if entry["axis"] else "the others"
 
 
 def _run_figures(entries: Sequence[Entry], figure: Any) -> Array:
