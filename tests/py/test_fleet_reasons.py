@@ -56,16 +56,14 @@ def planted(seed: int, faults: tuple[str, ...]) -> tuple[Lot, dict[str, Reason]]
 
 
 def test_each_planted_fault_is_named_and_no_healthy_gyro() -> None:
-    seed = int(np.random.default_rng().integers(2**31))
-    print("seed", seed)
     draws, named, accused = 4, dict.fromkeys(FAULTS, 0), 0
-    for k in range(draws):
-        lot, found = planted(seed + k, FAULTS)
+    for seed in range(draws):  # the same every time: one in twenty small steps and factors is missed by chance
+        lot, found = planted(seed, FAULTS)
         for fault, names in lot.planted.items():
             named[fault] += all(name in found and found[name].id == fault for name in names)
         accused += len(set(found) - set().union(*lot.planted.values()))
     assert all(count >= draws - 1 for count in named.values()), named
-    assert accused <= draws
+    assert accused <= 1
 
 
 def test_words_with_run_and_time() -> None:
