@@ -57,7 +57,7 @@ def planted(seed: int, faults: tuple[str, ...]) -> tuple[Lot, dict[str, Reason]]
 
 def test_each_planted_fault_is_named_and_no_healthy_gyro() -> None:
     draws, named, accused = 4, dict.fromkeys(FAULTS, 0), 0
-    for seed in range(draws):  # the same every time: one in twenty small steps and factors is missed by chance
+    for seed in range(draws):  # fixed: one small step in twenty is missed by chance
         lot, found = planted(seed, FAULTS)
         for fault, names in lot.planted.items():
             named[fault] += all(name in found and found[name].id == fault for name in names)
