@@ -125,6 +125,10 @@ bench-import:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench.importing docs $${SET_MEGABYTES:+"$$SET_MEGABYTES"}
 
+## faults planted in lots of 60 gyros, and which of them gyrotc fleet names: docs/results.md
+lot: setup
+	@$(PYTHON) -m bench.lot docs
+
 ## a thousand gyros through gyrotc fleet: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
@@ -149,4 +153,4 @@ cycles: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet kills blind odd cycles clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot kills blind odd cycles clean

@@ -13,9 +13,9 @@
  *   status = gtc_f32_sample(&state, &temp_c);    // then
  *   status = gtc_f32_bias(&state, &bias_dph);    // compensated = measured - bias
  *
- * A block is `samples_per_block` samples. The correction in force during block n is what the
+ * Samples are collected in blocks of the table's `block_us`. The correction in force during block n is what the
  * blocks up to n-1 gave: T, the mean of the last block, and dT/dt, the least-squares slope over
- * the last `slope_blocks` blocks. From the first valid sample on there is a correction (the map
+ * the last `slope_blocks` blocks. From the first sample that others confirmed on there is a correction (the map
  * at that sample with slope 0, GTC_WARMING); before it the correction is 0 with GTC_HELD.
  *
  * Who may call what from where:
@@ -57,6 +57,7 @@ extern "C" {
 #define gtc_f32_map GTC_LINKED(gtc_f32_map)
 #define gtc_f32_init GTC_LINKED(gtc_f32_init)
 #define gtc_f32_sample GTC_LINKED(gtc_f32_sample)
+#define gtc_f32_sample_at GTC_LINKED(gtc_f32_sample_at)
 #define gtc_f32_missed GTC_LINKED(gtc_f32_missed)
 #define gtc_f32_bias GTC_LINKED(gtc_f32_bias)
 #define gtc_f32_save GTC_LINKED(gtc_f32_save)
@@ -71,6 +72,7 @@ extern "C" {
 #define gtc_q31_map GTC_LINKED(gtc_q31_map)
 #define gtc_q31_init GTC_LINKED(gtc_q31_init)
 #define gtc_q31_sample GTC_LINKED(gtc_q31_sample)
+#define gtc_q31_sample_at GTC_LINKED(gtc_q31_sample_at)
 #define gtc_q31_missed GTC_LINKED(gtc_q31_missed)
 #define gtc_q31_bias GTC_LINKED(gtc_q31_bias)
 #define gtc_q31_save GTC_LINKED(gtc_q31_save)
@@ -85,29 +87,33 @@ extern "C" {
  * A released value keeps its meaning for ever; treat an unknown negative one as a failure. */
 #define GTC_OK 0
 #define GTC_WARMING 1    /* slope and mean are not full yet; slope taken as 0 */
-#define GTC_CLAMPED 2    /* input outside the envelope: the correction at its edge */
+#define GTC_CLAMPED 2    /* a channel outside its range, or a correction outside the authority: the edge */
 #define GTC_UNCOVERED 4  /* inside the envelope, but no training data near: interpolated */
-#define GTC_HELD 8       /* sample or block missing, stuck or impossible: last correction kept */
-#define GTC_FALLBACK 16  /* held too long: the table's constant correction */
+#define GTC_HELD 8       /* sample or block missing, stuck, impossible or not confirmed yet: last correction kept */
+#define GTC_FALLBACK 16  /* temperature held too long: the table's constant correction */
+#define GTC_CHANNEL_LOST 32 /* an auxiliary channel held too long: the guard's value stands for it */
 #define GTC_E_ARG (-1)       /* NULL pointer, not a number, count or size out of range */
 #define GTC_E_LAYOUT (-2)    /* table of another layout, or one that needs what was not compiled in */
 #define GTC_E_SELF_TEST (-3) /* arithmetic or a known answer wrong: do not navigate with this build */
 #define GTC_E_IMAGE (-4)     /* image or saved state corrupted, truncated or torn */
 #define GTC_E_ID (-5)        /* image or saved state of another table */
+#define GTC_E_PERIOD (-6)    /* no whole number of samples of this period makes a block of the table */
 
 /* What the firmware should do. Every correction with a positive status is to be subtracted:
  *   GTC_WARMING    nothing more; the filter may take the bias as less certain
- *   GTC_CLAMPED    log it: the unit works outside its calibration; the filter as above
+ *   GTC_CLAMPED    log it: the unit works outside its calibration, or a sensor lies; the filter as above
  *   GTC_UNCOVERED  log it; the filter as above
  *   GTC_HELD       nothing, while it comes and goes; look for the sensor's cable if it stays
  *   GTC_FALLBACK   report the temperature sensor as failed; the correction is a constant now
+ *   GTC_CHANNEL_LOST  report the sensor of an auxiliary channel as failed; the correction goes on without it
  * With a negative one keep the last correction, or none:
  *   GTC_E_ARG        a fault of the caller; at run time count it and go on
  *   GTC_E_LAYOUT     table and runtime were not built together: do not compensate, report
  *   GTC_E_SELF_TEST  wrong flags, library or memory: do not compensate, report
  *   GTC_E_IMAGE      from check: memory fails, report; from open: use the table compiled in; from
  *                    restore: start with gtc_<n>_init()
- *   GTC_E_ID         of another unit: as GTC_E_IMAGE, and see how it came there */
+ *   GTC_E_ID         of another unit: as GTC_E_IMAGE, and see how it came there
+ *   GTC_E_PERIOD     wrong sample period, or a table for another block: do not compensate, report */
 
 /* The q31 mark of a sample that did not arrive. (In f32 a NaN is one.) */
 #define GTC_TEMP_MISSING (-2147483647L - 1L)
@@ -118,63 +124,74 @@ extern "C" {
 #define GTC_MUST_CHECK
 #endif
 
-/* State of one table, owned by the caller. Contents are private; copying it copies the state. */
+/* State of one channel of a table: temperature or auxiliary. */
 typedef struct {
-    const gtc_f32_table_t *table;
-    uint_least32_t samples_per_block;
-    uint_least32_t period_us;      /* of the samples */
-    uint_least32_t position;       /* samples of the running block so far */
-    uint_least32_t valid;          /* valid ones among them */
-    uint_least32_t gap;            /* samples since the last believed one */
-    uint_least32_t suspects;       /* suspect samples in a row that agree */
-    uint_least32_t received;       /* last finite sample, its bits */
-    uint_least32_t repeats;        /* for how long it has been the same, microseconds */
-    uint_least32_t held_blocks;    /* invalid blocks in a row */
-    uint_least32_t filled;         /* blocks in the window since the last restart */
-    uint_least32_t window_valid;   /* one bit a block, newest lowest */
-    int_least32_t status;          /* of the correction in force */
-    float step_per_sample;         /* C */
-    float last;                    /* last believed sample, C */
-    float candidate;               /* last suspect sample, C */
-    float base;                    /* first valid sample of the block, C */
-    float sum;                     /* of differences from base, C */
-    float mean;                    /* last valid block mean, C */
-    float bias;                    /* in force, deg/h */
-    uint_least32_t elapsed;        /* blocks since init */
-    uint_least32_t off_blocks;     /* blocks without power before it */
-    float window[GTC_MAX_SLOPE_BLOCKS];         /* block means, newest first, C */
-    float term[GTC_MAX_TERMS][2];               /* states of the terms */
-    float channel[GTC_MAX_TERMS];               /* block sums of auxiliary channels ... */
-    uint_least32_t channel_valid[GTC_MAX_TERMS]; /* ... and samples in them */
-} gtc_f32_state_t;
+    uint_least32_t gap_us;      /* since the last believed reading; 0: none was */
+    uint_least32_t agreed_us;   /* for how long readings agree that do not follow it */
+    uint_least32_t same_us;     /* for how long the reading has been the same */
+    uint_least32_t received;    /* last reading, its bits */
+    uint_least32_t valid;       /* believed readings of the running block */
+    uint_least32_t held_blocks; /* blocks in a row with too few of them */
+    uint_least32_t clamped;     /* whether any was taken as the edge of its range */
+    float near;                 /* limit of a change between samples */
+    float last;                 /* last believed reading */
+    float candidate;            /* last one that does not follow it */
+    float base;                 /* first believed reading of the block */
+    float mean;                 /* of the last block with enough of them, or what stands for it */
+    float sum;                  /* of differences from base */
+} gtc_f32_input_t;
 
 typedef struct {
-    const gtc_q31_table_t *table;
-    uint_least32_t samples_per_block;
-    uint_least32_t period_us;
-    uint_least32_t position;
-    uint_least32_t valid;
-    uint_least32_t gap;
-    uint_least32_t suspects;
+    uint_least32_t gap_us;
+    uint_least32_t agreed_us;
+    uint_least32_t same_us;
     uint_least32_t received;
-    uint_least32_t repeats;
+    uint_least32_t valid;
     uint_least32_t held_blocks;
-    uint_least32_t filled;
-    uint_least32_t window_valid;
-    int_least32_t status;
-    int_least32_t step_per_sample; /* 2^-16 C */
+    uint_least32_t clamped;
+    uint_least32_t near; /* 2^-16 of the channel's unit, as the others */
     int_least32_t last;
     int_least32_t candidate;
     int_least32_t base;
     int_least32_t mean;
-    int_least32_t bias;            /* 2^-bias_frac_bits deg/h */
     int_least64_t sum;
+} gtc_q31_input_t;
+
+/* State of one table, owned by the caller. Contents are private; copying it copies the state. */
+typedef struct {
+    const gtc_f32_table_t *table;
+    uint_least32_t period_us;
+    uint_least32_t samples_per_block;
+    uint_least32_t position;       /* samples of the running block so far */
+    uint_least32_t filled;         /* blocks in the window since the last restart */
+    uint_least32_t window_valid;   /* one bit a block, newest lowest */
+    int_least32_t status;          /* of the correction in force */
+    float bias;                    /* in force, deg/h */
+    uint_least32_t elapsed;        /* blocks since init */
+    uint_least32_t off_blocks;     /* blocks without power before it */
+    uint_least32_t is_stamped;     /* 1: a sample with a time came, and ... */
+    uint_least32_t time_us;        /* ... this is the last one's, on the grid of sample periods */
+    float window[GTC_MAX_SLOPE_BLOCKS];        /* block means, newest first, C */
+    float term[GTC_MAX_TERMS][2];              /* states of the terms */
+    gtc_f32_input_t input[GTC_MAX_TERMS + 1];  /* temperature, auxiliary channels */
+} gtc_f32_state_t;
+
+typedef struct {
+    const gtc_q31_table_t *table;
+    uint_least32_t period_us;
+    uint_least32_t samples_per_block;
+    uint_least32_t position;
+    uint_least32_t filled;
+    uint_least32_t window_valid;
+    int_least32_t status;
+    int_least32_t bias; /* 2^-bias_frac_bits deg/h */
     uint_least32_t elapsed;
     uint_least32_t off_blocks;
-    int_least32_t window[GTC_MAX_SLOPE_BLOCKS];
+    uint_least32_t is_stamped;
+    uint_least32_t time_us;
+    int_least32_t window[GTC_MAX_SLOPE_BLOCKS]; /* 2^-16 C */
     int_least32_t term[GTC_MAX_TERMS][2];
-    int_least64_t channel[GTC_MAX_TERMS];
-    uint_least32_t channel_valid[GTC_MAX_TERMS];
+    gtc_q31_input_t input[GTC_MAX_TERMS + 1];
 } gtc_q31_state_t;
 
 /* Sum of angle increments, owned by the caller, apart from any state. Starts as 0: `= {0}`, or static. */
@@ -187,7 +204,7 @@ typedef struct {
 } gtc_q31_angle_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (24 + GTC_MAX_SLOPE_BLOCKS + (5 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
@@ -212,36 +229,47 @@ GTC_MUST_CHECK int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words,
 GTC_MUST_CHECK int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words,
                                 uint_least32_t n_words, uint_least32_t expected_id);
 
-/* The static map without terms: bias at a temperature and a slope (C per block), stateless.
+/* The static map without terms: bias at a temperature and a slope (C per block), stateless, within the authority.
  * Returns 0, GTC_CLAMPED, GTC_UNCOVERED, or GTC_E_ARG (NULL, not a number). */
 GTC_MUST_CHECK int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bias);
 GTC_MUST_CHECK int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp,
                                int_least32_t slope, int_least32_t *bias);
 
-/* Starts a state. samples_per_block = block_s of the emitted header / sample period of this
- * target, 1 ... 2^20. Returns 0, GTC_E_ARG or GTC_E_LAYOUT (as check). Cost: some operations a word. */
-GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table,
-                                uint_least32_t samples_per_block);
-GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table,
-                                uint_least32_t samples_per_block);
+/* Starts a state. period_us: time from sample to sample on this target, microseconds; a whole number of them,
+ * at most 2^20, must make a block of the table, to a thousandth of it.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (as check) or GTC_E_PERIOD. Cost: some operations a word. */
+GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t period_us);
+GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_least32_t period_us);
 
 /* One sample: channels[0] is the temperature, further ones (n_channels of the table) are the
- * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit; f32: what lies
- * beyond 1e9 counts as missing). A missing, stuck or impossible
- * temperature is held, never an error.
- * Returns the status of the correction in force, with GTC_HELD if this sample was not believed;
+ * auxiliary channels, in the order of their names (q31: in 2^-16 of their unit). No reading is an error:
+ *   - One that is missing (f32: not finite), stuck, or too far from those before it is held; so is a temperature
+ *     outside the guard's range. An auxiliary reading outside of its range is taken as the edge (GTC_CLAMPED).
+ *   - At start, after a jump and after a loss readings must agree with one another for the guard's time.
+ *   - Missing for too long: GTC_FALLBACK for the temperature, GTC_CHANNEL_LOST for an auxiliary channel.
+ * Returns the status of the correction in force, with GTC_HELD if this temperature was not believed;
  * GTC_E_ARG for a NULL pointer.
- * Cost: about 30 operations; the call that opens a block also makes the correction (one
+ * Cost: about 40 operations a channel; the call that opens a block also makes the correction (one
  * evaluation of the map, slope_blocks multiplications, the terms). */
 GTC_MUST_CHECK int gtc_f32_sample(gtc_f32_state_t *state, const float *channels);
 GTC_MUST_CHECK int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *channels);
 
-/* `count` samples that did not arrive. Same statuses as a sample that is held. Cost: that of the
- * blocks that end, at most hold_blocks + slope_blocks + 2 of them. */
+/* The same with the time at which it was taken: a counter of microseconds that wraps at 2^32. The sample takes the
+ * slot of the period in which its time lies, counted from the first one; slots that were passed count as
+ * gtc_<n>_missed(). So jitter of less than half a period does no harm, lost samples and a clock that is off leave
+ * the slope right. A sample whose slot is taken, or that comes late (up to 268 s before the last one), is not used:
+ * GTC_HELD. Where no sample comes for longer, call it with readings that are missing, at least once an hour.
+ * Keep to either this or gtc_<n>_sample(), gtc_<n>_missed(). After gtc_<n>_restore() time begins anew. */
+GTC_MUST_CHECK int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time_us, const float *channels);
+GTC_MUST_CHECK int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels);
+
+/* `count` samples that did not arrive, in one call or in many: the results are the same bits. Same statuses as a
+ * sample that is held. Cost: that of the blocks that end, at most missing_blocks + 1 of the guards. */
 GTC_MUST_CHECK int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count);
 GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
 
-/* The correction in force; compensated = measured - bias. Returns its status or GTC_E_ARG. */
+/* The correction in force; compensated = measured - bias. Never outside the table's authority, whatever the state
+ * holds. Returns its status or GTC_E_ARG. */
 GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
@@ -261,20 +289,20 @@ GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int
  * and a CRC. `restore` starts `state` for `table` as gtc_<n>_init() would, then takes over what
  * survives `off_blocks` whole blocks without power:
  *   0: everything. The state goes on bit for bit where it was saved, in the middle of a block, too;
- *      tell it the samples in between by gtc_<n>_missed(). With other samples_per_block than it
+ *      tell it the samples in between by gtc_<n>_missed(). With another period_us than it
  *      was saved with, only what survives longer.
  *   more: memories, which go on relaxing towards the first temperature, and plays.
- * A torn or foreign image leaves `state` unwritten. examples/two_slots keeps it over power cuts.
- * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: saved by another arithmetic or version), GTC_E_IMAGE or
- * GTC_E_ID. Cost: about 40 operations a word. */
+ * A torn or foreign image, or one with numbers that no call leaves, leaves `state` unwritten. examples/two_slots keeps it over power cuts.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: saved by another arithmetic or version), GTC_E_IMAGE,
+ * GTC_E_ID or GTC_E_PERIOD. Cost: about 40 operations a word. */
 GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
 GTC_MUST_CHECK int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);
 GTC_MUST_CHECK int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,
-                                   uint_least32_t samples_per_block,
+                                   uint_least32_t period_us,
                                    const gtc_word_t words[GTC_SAVE_WORDS],
                                    uint_least32_t off_blocks);
 GTC_MUST_CHECK int gtc_q31_restore(gtc_q31_state_t *state, const gtc_q31_table_t *table,
-                                   uint_least32_t samples_per_block,
+                                   uint_least32_t period_us,
                                    const gtc_word_t words[GTC_SAVE_WORDS],
                                    uint_least32_t off_blocks);
 

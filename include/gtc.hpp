@@ -5,7 +5,7 @@
  *
  *   gtc::f32::Correction correction;
  *   if (!gtc::f32::check(gtc_sim_0001_f32).is_ok()) { halt(); }
- *   if (!correction.init(gtc_sim_0001_f32, GTC_SIM_0001_SAMPLES_PER_BLOCK(10000UL)).is_ok()) { halt(); }
+ *   if (!correction.init(gtc_sim_0001_f32, 10000UL).is_ok()) { halt(); }
  *   correction.sample(gtc::f32::Celsius(t));
  *   gtc::f32::DegPerHour bias(0.0F);
  *   gtc::Status status = correction.bias(bias);
@@ -26,7 +26,7 @@ public:
     constexpr int code() const noexcept { return code_; }
     constexpr bool is_ok() const noexcept { return code_ == GTC_OK; }
     constexpr bool failed() const noexcept { return code_ < 0; }
-    /* One of GTC_WARMING ... GTC_FALLBACK; false for a call that failed. */
+    /* One of GTC_WARMING ... GTC_CHANNEL_LOST; false for a call that failed. */
     constexpr bool has(int remark) const noexcept { return (code_ > 0) && ((code_ & remark) != 0); }
 
 private:
@@ -63,15 +63,19 @@ struct F32 {
         return gtc_f32_open(table, words, n, id);
     }
     static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_f32_map(table, t, s, b); }
-    static int init(State *state, const Table *table, uint_least32_t n) noexcept { return gtc_f32_init(state, table, n); }
+    static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_f32_init(state, table, us); }
     static int sample(State *state, const Number *x) noexcept { return gtc_f32_sample(state, x); }
+    static int sample_at(State *state, uint_least32_t us, const Number *x) noexcept
+    {
+        return gtc_f32_sample_at(state, us, x);
+    }
     static int missed(State *state, uint_least32_t n) noexcept { return gtc_f32_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_f32_bias(state, b); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_f32_save(state, words); }
-    static int restore(State *state, const Table *table, uint_least32_t n, const gtc_word_t *words,
+    static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
     {
-        return gtc_f32_restore(state, table, n, words, off);
+        return gtc_f32_restore(state, table, us, words, off);
     }
     static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_f32_angle(sum, bias, dt, a); }
 };
@@ -88,15 +92,19 @@ struct Q31 {
         return gtc_q31_open(table, words, n, id);
     }
     static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_q31_map(table, t, s, b); }
-    static int init(State *state, const Table *table, uint_least32_t n) noexcept { return gtc_q31_init(state, table, n); }
+    static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_q31_init(state, table, us); }
     static int sample(State *state, const Number *x) noexcept { return gtc_q31_sample(state, x); }
+    static int sample_at(State *state, uint_least32_t us, const Number *x) noexcept
+    {
+        return gtc_q31_sample_at(state, us, x);
+    }
     static int missed(State *state, uint_least32_t n) noexcept { return gtc_q31_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_q31_bias(state, b); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_q31_save(state, words); }
-    static int restore(State *state, const Table *table, uint_least32_t n, const gtc_word_t *words,
+    static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
     {
-        return gtc_q31_restore(state, table, n, words, off);
+        return gtc_q31_restore(state, table, us, words, off);
     }
     static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_q31_angle(sum, bias, dt, a); }
 };
@@ -130,9 +138,9 @@ template <class A> struct Runtime {
     class Correction {
     public:
         Correction() noexcept : state_() {}
-        Status init(const Table &table, uint_least32_t samples_per_block) noexcept
+        Status init(const Table &table, uint_least32_t period_us) noexcept
         {
-            return Status(A::init(&state_, &table, samples_per_block));
+            return Status(A::init(&state_, &table, period_us));
         }
         /* Of a table with one channel. */
         Status sample(Celsius temp) noexcept
@@ -143,6 +151,11 @@ template <class A> struct Runtime {
         }
         /* Of any table: n_channels numbers, the temperature first. */
         Status sample(const Number *channels) noexcept { return Status(A::sample(&state_, channels)); }
+        /* The same with the time at which they were taken, microseconds. */
+        Status sample_at(uint_least32_t time_us, const Number *channels) noexcept
+        {
+            return Status(A::sample_at(&state_, time_us, channels));
+        }
         Status missed(uint_least32_t count) noexcept { return Status(A::missed(&state_, count)); }
         Status bias(DegPerHour &bias) const noexcept
         {
@@ -152,10 +165,10 @@ template <class A> struct Runtime {
             return status;
         }
         Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, words)); }
-        Status restore(const Table &table, uint_least32_t samples_per_block, const gtc_word_t (&words)[GTC_SAVE_WORDS],
+        Status restore(const Table &table, uint_least32_t period_us, const gtc_word_t (&words)[GTC_SAVE_WORDS],
                        uint_least32_t off_blocks) noexcept
         {
-            return Status(A::restore(&state_, &table, samples_per_block, words, off_blocks));
+            return Status(A::restore(&state_, &table, period_us, words, off_blocks));
         }
 
     private:

@@ -87,6 +87,23 @@ static float FN(from_words)(const gtc_word_t words[2])
     return words[0].value;
 }
 
+/* The mean of the running block is a number. */
+static int FN(sum_fits)(const INPUT *in, float low, float high)
+{
+    float most;
+
+    most = high - low;
+    most = most * (float)in->valid;
+    most = most + most;
+    return ((in->valid == 0U) || ((in->sum >= -most) && (in->sum <= most))) ? 1 : 0;
+}
+
+/* What a memory keeps for more digits: nothing. */
+static int FN(is_fraction)(float x)
+{
+    return (FN(is_missing)(x) || (FN(bits)(x) == 0U)) ? 1 : 0;
+}
+
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
 /* MISRA 20.1: the texts use what stands above. */
@@ -210,14 +227,19 @@ int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bi
     return FN(run_map)(table, temp, slope, bias);
 }
 
-int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t samples_per_block)
+int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t period_us)
 {
-    return FN(run_init)(state, table, samples_per_block);
+    return FN(run_init)(state, table, period_us);
 }
 
 int gtc_f32_sample(gtc_f32_state_t *state, const float *channels)
 {
     return FN(run_sample)(state, channels);
+}
+
+int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time_us, const float *channels)
+{
+    return FN(run_sample_at)(state, time_us, channels);
 }
 
 int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count)
@@ -236,8 +258,8 @@ int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS])
 }
 
 int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,
-                    uint_least32_t samples_per_block, const gtc_word_t words[GTC_SAVE_WORDS],
+                    uint_least32_t period_us, const gtc_word_t words[GTC_SAVE_WORDS],
                     uint_least32_t off_blocks)
 {
-    return FN(run_restore)(state, table, samples_per_block, words, off_blocks);
+    return FN(run_restore)(state, table, period_us, words, off_blocks);
 }

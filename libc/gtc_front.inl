@@ -5,36 +5,85 @@
  * SPDX-License-Identifier: MIT
  */
 
-/* Samples since the last believed one are counted no further than this. */
-#define MAX_GAP 65535UL
-
-/* Blocks since the start, too: all warm-up is over then. */
+/* Blocks since the start are counted no further than this: all warm-up is over then. */
 #define MAX_ELAPSED 0xFFFFFFUL
-
-/* So many suspects in a row that agree are the new truth. */
-#define NEW_TRUTH 3U
 
 /* A float counts up to here exactly, and sums of words keep to 64 bits. */
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
+/* A block of samples may be off by this part of it. */
+#define PERIOD_PARTS 1000U
+
+/* Stamps that are so much earlier than the last one are of samples that come late, microseconds. */
+#define LATEST 0x10000000UL
+
+/* The longest time that is counted, microseconds. */
+#define MAX_US 0xFFFFFFFFUL
+
 /* Words of a guard. */
+#define GUARD_AGREE 4U
 #define GUARD_STUCK 5U
 #define GUARD_MISSING 6U
+#define GUARD_FALLBACK 7U
 
-/* A time and another, microseconds, as far as can be counted. */
-static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
+/* What becomes of a reading. */
+#define IS_HELD 0
+#define IS_BELIEVED 1
+#define IS_NEW_START 2
+
+/* Of the readings that were taken as the edge of their range: in the running block, in the mean. */
+#define CLAMPED_NOW 1U
+#define CLAMPED_MEAN 2U
+
+/* ---- the correction ------------------------------------------------------------------------------ */
+
+/* Puts a correction in force: the only place that writes one. */
+static void FN(put)(STATE *state, WIDE bias, int_least32_t status)
 {
-    return ((0xFFFFFFFFUL - a) > b) ? (a + b) : 0xFFFFFFFFUL;
+    WIDE governed = bias;
+    const int remark = FN(govern)(state->table, &governed);
+
+    state->bias = (NUM)governed;
+    state->status = status | (int_least32_t)remark;
 }
 
-/* Lets every term take note that a block of mean temperature state->mean ends. */
+/* What the terms add, within what they may add. */
+static WIDE FN(added)(const TABLE *table, EFFECT *effect)
+{
+    const NUM low = MEMBER(table->effect[0]);
+    const NUM high = MEMBER(table->effect[1]);
+    WIDE added = effect->added;
+
+    if (!(added >= low)) {
+        added = low;
+        effect->remarks |= GTC_CLAMPED;
+    } else if (!(added <= high)) {
+        added = high;
+        effect->remarks |= GTC_CLAMPED;
+    } else {
+        /* as it is */
+    }
+    return added;
+}
+
+/* The temperature as the terms see it, which is as the map does: within the envelope. */
+static NUM FN(seen)(const TABLE *table, NUM temp)
+{
+    const NUM low = MEMBER(table->envelope[0]);
+    const NUM high = MEMBER(table->envelope[1]);
+    const NUM most = (temp < high) ? temp : high;
+
+    return (most > low) ? most : low;
+}
+
+/* Lets every term take note that a block ends; it sees this temperature. */
 static void FN(step_terms)(STATE *state, NUM temp)
 {
     const TABLE *const table = state->table;
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
-        table->term_code[i]->step(state, i, temp);
+        table->term_code[i]->step(state, i, FN(seen)(table, temp));
     }
 }
 
@@ -42,41 +91,62 @@ static void FN(step_terms)(STATE *state, NUM temp)
 static void FN(correct)(STATE *state, NUM temp, NUM slope, int_least32_t remarks)
 {
     const TABLE *const table = state->table;
+    const NUM seen = FN(seen)(table, temp);
     EFFECT effect;
     NUM bias = NUM_ZERO;
+    WIDE total;
     uint_least32_t i;
     int status;
 
     effect.temp = temp;
     effect.slope = slope;
     effect.added = NUM_ZERO;
-    effect.remarks = remarks;
+    effect.remarks = (FN(bits)(seen) != FN(bits)(temp)) ? (remarks | GTC_CLAMPED) : remarks;
     for (i = 0U; i < table->n_terms; i++) {
-        table->term_code[i]->apply(state, i, temp, &effect);
+        table->term_code[i]->apply(state, i, seen, &effect);
     }
     status = FN(map)(table, effect.temp, effect.slope, &bias);
-    state->bias = FN(total)(bias, effect.added);
-    state->status = effect.remarks | (int_least32_t)status;
+    total = bias;
+    if (table->n_terms != 0U) {
+        total = FN(add)(total, FN(added)(table, &effect));
+    }
+    FN(put)(state, total, effect.remarks | (int_least32_t)status);
 }
 
-/* Begins again at x: slope 0, nothing in the window, the block's samples so far dropped. */
-static void FN(restart)(STATE *state, NUM x)
+/* A term that was never begun. */
+static void FN(forget)(volatile STATE *state, uint_least32_t i)
+{
+    state->term[i][0] = FN(missing)();
+    state->term[i][1] = FN(missing)();
+}
+
+static void FN(forget_terms)(STATE *state)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        FN(forget)(state, i);
+    }
+}
+
+/* Begins again at x: slope 0, nothing in the window; terms too, but for what the first start finds of a saved state. */
+static void FN(restart)(STATE *state, NUM x, int is_first)
 {
     const TABLE *const table = state->table;
     uint_least32_t i;
 
     state->filled = 0U;
     state->window_valid = 0U;
-    state->held_blocks = 0U;
-    state->valid = 0U;
-    state->mean = x;
-    if (state->gap == 0U) {
-        for (i = 0U; i < table->n_terms; i++) {
-            table->term_code[i]->begin(state, i, x);
-        }
+    if (!is_first) {
+        FN(forget_terms)(state);
+    }
+    for (i = 0U; i < table->n_terms; i++) {
+        table->term_code[i]->begin(state, i, FN(seen)(table, x));
     }
     FN(correct)(state, x, NUM_ZERO, GTC_WARMING);
 }
+
+/* ---- the window ---------------------------------------------------------------------------------- */
 
 /* Moves the window on by one block: its mean, or a hole. */
 static void FN(push)(STATE *state, uint_least32_t is_valid)
@@ -87,7 +157,7 @@ static void FN(push)(STATE *state, uint_least32_t is_valid)
     for (i = state->table->slope_blocks - 1U; i > 0U; i--) {
         window[i] = window[i - 1U];
     }
-    state->window[0] = state->mean;
+    state->window[0] = state->input[0].mean;
     state->window_valid = ((state->window_valid << 1) | is_valid) & 0xFFFFFFFFUL;
     if (state->filled < state->table->slope_blocks) {
         state->filled++;
@@ -130,21 +200,218 @@ static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
     return GTC_OK;
 }
 
+/* ---- what is believed ---------------------------------------------------------------------------- */
+
+/* A time and another, microseconds, as far as can be counted. */
+static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
+{
+    return ((MAX_US - a) > b) ? (a + b) : MAX_US;
+}
+
+static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
+{
+    return &state->table->guards[channel * GTC_GUARD_WORDS];
+}
+
+/* A channel has been missing for so long that its fallback stands for it. */
+static int FN(is_lost)(const INPUT *in, const gtc_word_t *guard)
+{
+    return (in->held_blocks > guard[GUARD_MISSING].bits) ? 1 : 0;
+}
+
+/* `us` microseconds passed in which nothing was believed. */
+static void FN(hold)(INPUT *in, uint_least32_t us)
+{
+    if (in->gap_us != 0U) {
+        in->gap_us = FN(later)(in->gap_us, us);
+    }
+}
+
+/* 1 if x has been the same for too long. */
+static int FN(is_stuck)(INPUT *in, const gtc_word_t *guard, NUM x, uint_least32_t period_us)
+{
+    const uint_least32_t bits = FN(bits)(x);
+    const uint_least32_t most = guard[GUARD_STUCK].bits;
+
+    if (bits != in->received) {
+        in->received = bits;
+        in->same_us = 0U;
+    } else if (in->same_us < most) {
+        in->same_us = FN(later)(in->same_us, period_us);
+    } else {
+        /* counted far enough */
+    }
+    return ((most != 0U) && (in->same_us >= most)) ? 1 : 0;
+}
+
+/* 1 if x follows the last believed reading. */
+static int FN(follows)(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
+{
+    int near = 0;
+
+    if (in->gap_us == state->period_us) {
+        near = FN(is_near)(x, in->last, in->near);
+    } else if (in->gap_us != 0U) {
+        near = FN(is_near)(x, in->last, FN(limit)(guard, in->gap_us));
+    } else {
+        /* there is none */
+    }
+    return near;
+}
+
+/* What becomes of a reading that does not follow the last one: it must agree with those after it. */
+static int FN(suspect)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+{
+    const uint_least32_t before = in->agreed_us;
+
+    in->agreed_us = state->period_us;
+    if ((before != 0U) && FN(is_near)(x, in->candidate, in->near)) {
+        in->agreed_us = FN(later)(before, state->period_us);
+    }
+    in->candidate = x;
+    return ((in->agreed_us - state->period_us) >= guard[GUARD_AGREE].bits) ? IS_NEW_START : IS_HELD;
+}
+
+/* Takes x into the running block. */
+static void FN(believe)(INPUT *in, NUM x, uint_least32_t period_us)
+{
+    if (in->valid == 0U) {
+        in->base = x;
+        in->sum = NUM_ZERO;
+    }
+    in->sum = FN(add)(in->sum, FN(diff)(x, in->base));
+    in->valid++;
+    in->last = x;
+    in->gap_us = period_us;
+    in->agreed_us = 0U;
+}
+
+/* One reading x within its range: held, believed, or believed as a new start, which is the mean until a block ends. */
+static int FN(admit)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+{
+    int verdict = IS_BELIEVED;
+
+    if (!FN(follows)(state, in, guard, x)) {
+        verdict = FN(suspect)(state, in, guard, x);
+    }
+    if (verdict == IS_HELD) {
+        FN(hold)(in, state->period_us);
+        return IS_HELD;
+    }
+    if (verdict == IS_NEW_START) {
+        in->valid = 0U;
+        in->held_blocks = 0U;
+        in->clamped = 0U;
+        in->mean = x;
+    }
+    FN(believe)(in, x, state->period_us);
+    return verdict;
+}
+
+/* A reading that is none. */
+static void FN(refuse)(INPUT *in, uint_least32_t us)
+{
+    in->agreed_us = 0U;
+    FN(hold)(in, us);
+}
+
+/* One temperature. Returns GTC_OK or GTC_HELD. */
+static int FN(take_temperature)(STATE *state, NUM x)
+{
+    INPUT *const in = &state->input[0];
+    const gtc_word_t *const guard = state->table->guards;
+    const int is_first = (in->gap_us == 0U) ? 1 : 0;
+    int verdict = IS_HELD;
+
+    if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
+        || (!((x >= ELEMENT(guard[0])) && (x <= ELEMENT(guard[1]))))) {
+        FN(refuse)(in, state->period_us);
+    } else {
+        verdict = FN(admit)(state, in, guard, x);
+        if (verdict == IS_NEW_START) {
+            FN(restart)(state, x, is_first);
+        }
+    }
+    return (verdict == IS_HELD) ? GTC_HELD : GTC_OK;
+}
+
+/* One reading of an auxiliary channel: beyond its range the edge. */
+static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
+{
+    INPUT *const in = &state->input[channel];
+    const gtc_word_t *const guard = FN(guard)(state, channel);
+    NUM x = reading;
+    int verdict;
+
+    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us)) {
+        FN(refuse)(in, state->period_us);
+        return;
+    }
+    if (x < ELEMENT(guard[0])) {
+        x = ELEMENT(guard[0]);
+    } else if (x > ELEMENT(guard[1])) {
+        x = ELEMENT(guard[1]);
+    } else {
+        /* in its range */
+    }
+    verdict = FN(admit)(state, in, guard, x);
+    if ((verdict != IS_HELD) && (FN(bits)(x) != FN(bits)(reading))) {
+        in->clamped |= (verdict == IS_NEW_START) ? (CLAMPED_NOW | CLAMPED_MEAN) : CLAMPED_NOW;
+    }
+}
+
+/* ---- blocks -------------------------------------------------------------------------------------- */
+
+/* The running block of a channel ends. Returns 1 if it has enough readings; then the mean is theirs. When it is
+ * lost its last reading is forgotten, so that it must agree with itself before it is believed again. */
+static int FN(end_block)(const STATE *state, INPUT *in, const gtc_word_t *guard)
+{
+    const int is_valid = ((2U * in->valid) >= state->samples_per_block) ? 1 : 0;
+
+    if (is_valid) {
+        in->mean = FN(mean)(in->base, in->sum, in->valid);
+        in->held_blocks = 0U;
+        in->clamped = ((in->clamped & CLAMPED_NOW) != 0U) ? CLAMPED_MEAN : 0U;
+    } else {
+        in->clamped &= CLAMPED_MEAN;
+        if (!FN(is_lost)(in, guard)) {
+            in->held_blocks++;
+        }
+        if (FN(is_lost)(in, guard)) {
+            in->gap_us = 0U;
+        }
+    }
+    in->valid = 0U;
+    return is_valid;
+}
+
+static void FN(close_channels)(STATE *state)
+{
+    uint_least32_t c;
+
+    for (c = 1U; c < state->table->n_channels; c++) {
+        INPUT *const in = &state->input[c];
+        const gtc_word_t *const guard = FN(guard)(state, c);
+
+        if ((!FN(end_block)(state, in, guard)) && FN(is_lost)(in, guard)) {
+            in->mean = ELEMENT(guard[GUARD_FALLBACK]);
+            in->clamped = 0U;
+        }
+    }
+}
+
 /* A block with too few valid samples: the last correction stays, but not for ever. */
 static void FN(bridge)(STATE *state)
 {
-    const TABLE *const table = state->table;
-
-    FN(push)(state, 0U);
-    FN(step_terms)(state, state->mean);
-    if (state->held_blocks <= table->guards[GUARD_MISSING].bits) {
-        state->held_blocks++;
-    }
-    if (state->held_blocks > table->guards[GUARD_MISSING].bits) {
-        state->bias = MEMBER(table->fallback);
-        state->status = GTC_HELD | GTC_FALLBACK;
-    } else {
+    if (FN(is_lost)(&state->input[0], state->table->guards)) {
+        FN(forget_terms)(state);
+        FN(put)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
+    } else if (state->input[0].gap_us != 0U) {
+        FN(push)(state, 0U);
+        FN(step_terms)(state, state->input[0].mean);
         state->status |= GTC_HELD;
+    } else {
+        /* nothing was ever believed: no correction yet */
     }
 }
 
@@ -159,188 +426,129 @@ static void FN(pass)(STATE *state, uint_least32_t blocks)
 static void FN(close)(STATE *state)
 {
     FN(pass)(state, 1U);
-    if (state->gap == 0U) {
-        /* nothing was ever believed: no correction yet */
-    } else if ((2U * state->valid) >= state->samples_per_block) {
+    FN(close_channels)(state);
+    if (FN(end_block)(state, &state->input[0], state->table->guards)) {
         NUM temp;
         NUM slope;
         int_least32_t remarks;
 
-        state->mean = FN(mean)(state->base, state->sum, state->valid);
-        state->held_blocks = 0U;
         FN(push)(state, 1U);
         remarks = FN(window_slope)(state, &slope);
-        temp = (state->table->lead_blocks != 0U) ? FN(total)(state->mean, slope) : state->mean;
+        temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
         FN(step_terms)(state, temp);
         FN(correct)(state, temp, slope, remarks);
     } else {
         FN(bridge)(state);
     }
     state->position = 0U;
-    state->valid = 0U;
 }
 
-/* Takes x into the running block. */
-static void FN(believe)(STATE *state, NUM x)
-{
-    if (state->valid == 0U) {
-        state->base = x;
-        state->sum = NUM_ZERO;
-    }
-    state->sum = FN(add)(state->sum, FN(diff)(x, state->base));
-    state->valid++;
-    state->last = x;
-    state->gap = 1U;
-    state->suspects = 0U;
-}
+/* ---- a state ------------------------------------------------------------------------------------- */
 
-/* `count` samples passed of which none was believed. */
-static void FN(hold)(STATE *state, uint_least32_t count)
+/* Samples in a block of the table, if so many of this period make one to a thousandth of it; else 0. */
+static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t period_us)
 {
-    if (state->gap != 0U) {
-        state->gap = ((MAX_GAP - state->gap) > count) ? (state->gap + count) : MAX_GAP;
-    }
-}
+    const uint_least32_t rest = table->block_us % period_us;
+    uint_least32_t n = table->block_us / period_us;
+    uint_least32_t off = rest;
 
-/* 1 if x has been the same for too long. */
-static int FN(is_stuck)(STATE *state, NUM x)
-{
-    const uint_least32_t bits = FN(bits)(x);
-    const uint_least32_t most = state->table->guards[GUARD_STUCK].bits;
-
-    if (bits != state->received) {
-        state->repeats = 0U;
-    } else if (state->repeats < most) {
-        state->repeats = FN(later)(state->repeats, state->period_us);
-    } else {
-        /* counted far enough */
+    if (rest >= (period_us - rest)) {
+        n++;
+        off = period_us - rest;
     }
-    state->received = bits;
-    return ((most != 0U) && (state->repeats >= most)) ? 1 : 0;
-}
-
-/* 1 if x is too far from the last believed sample; counts the suspects that agree. */
-static int FN(is_suspect)(STATE *state, NUM x)
-{
-    if ((state->gap == 0U) || FN(is_near)(state, x, state->last, state->gap)) {
-        return 0;
-    }
-    if ((state->suspects != 0U) && FN(is_near)(state, x, state->candidate, 1U)) {
-        state->suspects++;
-    } else {
-        state->suspects = 1U;
-    }
-    state->candidate = x;
-    return 1;
-}
-
-/* 1 if x may be believed as far as it can be told without the samples around it. */
-static int FN(is_sound)(STATE *state, NUM x)
-{
-    if (FN(is_missing)(x) != 0) {
-        return 0;
-    }
-    if (FN(is_stuck)(state, x) != 0) {
-        return 0;
-    }
-    return ((x >= NUM_PLAUSIBLE_MIN) && (x <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
-}
-
-/* One temperature: believed, or held. Returns GTC_OK or GTC_HELD. */
-static int FN(take)(STATE *state, NUM x)
-{
-    if (!FN(is_sound)(state, x)) {
-        state->suspects = 0U;
-        FN(hold)(state, 1U);
-        return GTC_HELD;
-    }
-    if (FN(is_suspect)(state, x) && (state->suspects < NEW_TRUTH)) {
-        FN(hold)(state, 1U);
-        return GTC_HELD;
-    }
-    if ((state->gap == 0U) || (state->suspects >= NEW_TRUTH)
-        || ((state->status & GTC_FALLBACK) != 0)) {
-        FN(restart)(state, x);
-    }
-    FN(believe)(state, x);
-    return GTC_OK;
+    return ((n <= MAX_SAMPLES_PER_BLOCK) && (off <= (table->block_us / PERIOD_PARTS))) ? n : 0U;
 }
 
 /* GTC_OK, or why a state cannot be started. */
-static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t period_us)
 {
-    if ((state == NULL) || (table == NULL) || (samples_per_block < 1U)
-        || (samples_per_block > MAX_SAMPLES_PER_BLOCK)) {
-        return GTC_E_ARG;
+    int status = GTC_OK;
+
+    if ((state == NULL) || (table == NULL) || (period_us == 0U)) {
+        status = GTC_E_ARG;
+    } else if (!FN(is_usable)(table)) {
+        status = GTC_E_LAYOUT;
+    } else if (FN(samples_in_block)(table, period_us) == 0U) {
+        status = GTC_E_PERIOD;
+    } else {
+        /* it can */
     }
-    return FN(is_usable)(table) ? GTC_OK : GTC_E_LAYOUT;
+    return status;
 }
 
-/* A term that was never begun. */
-static void FN(forget)(volatile STATE *state, uint_least32_t i)
+/* A channel that has not seen a reading yet. */
+static void FN(clear_input)(volatile INPUT *in, NUM mean)
 {
-    state->term[i][0] = FN(missing)();
-    state->term[i][1] = FN(missing)();
-    state->channel[i] = NUM_ZERO;
-    state->channel_valid[i] = 0U;
+    in->gap_us = 0U;
+    in->agreed_us = 0U;
+    in->same_us = 0U;
+    in->received = NUM_MISSING_BITS;
+    in->valid = 0U;
+    in->held_blocks = 0U;
+    in->clamped = 0U;
+    in->last = NUM_ZERO;
+    in->candidate = NUM_ZERO;
+    in->base = NUM_ZERO;
+    in->sum = NUM_ZERO;
+    in->mean = mean;
 }
 
 /* A front end that has not seen a sample yet. */
-static void FN(clear)(volatile STATE *state, uint_least32_t samples_per_block)
+static void FN(clear)(STATE *state)
 {
+    volatile NUM *const window = state->window; /* no memset() */
     uint_least32_t i;
 
-    state->samples_per_block = samples_per_block;
     state->position = 0U;
-    state->valid = 0U;
-    state->gap = 0U;
-    state->suspects = 0U;
-    state->received = NUM_MISSING_BITS;
-    state->repeats = 0U;
-    state->held_blocks = 0U;
     state->filled = 0U;
     state->window_valid = 0U;
     state->status = GTC_HELD;
-    state->last = NUM_ZERO;
-    state->candidate = NUM_ZERO;
-    state->base = NUM_ZERO;
-    state->sum = NUM_ZERO;
-    state->mean = NUM_ZERO;
     state->bias = NUM_ZERO;
     state->elapsed = 0U;
     state->off_blocks = 0U;
+    state->is_stamped = 0U;
+    state->time_us = 0U;
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
-        state->window[i] = NUM_ZERO;
+        window[i] = NUM_ZERO;
+    }
+    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
+        const int is_channel = ((i >= 1U) && (i < state->table->n_channels)) ? 1 : 0;
+
+        FN(clear_input)(&state->input[i], is_channel ? ELEMENT(FN(guard)(state, i)[GUARD_FALLBACK]) : NUM_ZERO);
     }
 }
 
 /* All of a state that can be started. */
-static void FN(start)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+static void FN(start)(STATE *state, const TABLE *table, uint_least32_t period_us)
 {
     uint_least32_t i;
 
     state->table = table;
-    state->period_us = (table->block_us + (samples_per_block / 2U)) / samples_per_block;
-    state->step_per_sample = FN(step_per_sample)(table, state->period_us);
-    FN(clear)(state, samples_per_block);
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        FN(forget)(state, i);
+    state->period_us = period_us;
+    state->samples_per_block = FN(samples_in_block)(table, period_us);
+    FN(clear)(state);
+    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
+        state->input[i].near = LIMIT_ZERO;
+        if (i < table->n_channels) {
+            state->input[i].near = FN(limit)(FN(guard)(state, i), period_us);
+        }
     }
+    FN(forget_terms)(state);
 }
 
-static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t samples_per_block)
+static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t period_us)
 {
-    const int status = FN(can_start)(state, table, samples_per_block);
+    const int status = FN(can_start)(state, table, period_us);
 
     if (status == GTC_OK) {
-        FN(start)(state, table, samples_per_block);
+        FN(start)(state, table, period_us);
     }
     return status;
 }
 
 static int FN(run_sample)(STATE *state, const NUM *channels)
 {
-    uint_least32_t i;
+    uint_least32_t c;
     int remark;
 
     if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
@@ -350,20 +558,47 @@ static int FN(run_sample)(STATE *state, const NUM *channels)
         FN(close)(state);
     }
     state->position++;
-    for (i = 0U; i < state->table->n_terms; i++) {
-        const uint_least32_t channel = state->table->terms[(i * GTC_TERM_WORDS) + 1U].bits;
-
-        state->table->term_code[i]->take(state, i, channels[channel]);
+    for (c = 1U; c < state->table->n_channels; c++) {
+        FN(take_channel)(state, c, channels[c]);
     }
-    remark = FN(take)(state, channels[0]);
+    remark = FN(take_temperature)(state, channels[0]);
     return (int)state->status | remark;
+}
+
+/* 1 if every channel has been missing for so long that only time passes any more. */
+static int FN(all_lost)(const STATE *state)
+{
+    int lost = 1;
+    uint_least32_t c;
+
+    for (c = 0U; c < state->table->n_channels; c++) {
+        lost &= FN(is_lost)(&state->input[c], FN(guard)(state, c));
+    }
+    return lost;
+}
+
+/* `samples` samples passed, of the running block, in which nothing came. */
+static void FN(miss)(STATE *state, uint_least32_t samples)
+{
+    uint_least32_t c;
+
+    for (c = 0U; c < state->table->n_channels; c++) {
+        FN(refuse)(&state->input[c], samples * state->period_us);
+    }
+}
+
+/* Whole blocks in which nothing can change but the time. Returns the samples that are left, at least one. */
+static uint_least32_t FN(skip)(STATE *state, uint_least32_t samples)
+{
+    const uint_least32_t blocks = (samples - 1U) / state->samples_per_block;
+
+    FN(pass)(state, blocks);
+    return samples - (blocks * state->samples_per_block);
 }
 
 static int FN(run_missed)(STATE *state, uint_least32_t count)
 {
     uint_least32_t rest = count;
-    uint_least32_t blocks;
-    uint_least32_t most;
 
     if ((state == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
@@ -371,34 +606,67 @@ static int FN(run_missed)(STATE *state, uint_least32_t count)
     if (count == 0U) {
         return (int)state->status;
     }
-    /* After so many blocks nothing changes any more: whole blocks beyond are left out. */
-    most = state->table->guards[GUARD_MISSING].bits + state->table->slope_blocks + 2U;
-    blocks = count / state->samples_per_block;
-    if (blocks > most) {
-        rest -= (blocks - most) * state->samples_per_block;
-        FN(pass)(state, blocks - most);
-    }
-    state->suspects = 0U;
-    FN(hold)(state, rest);
     while (rest > 0U) {
         uint_least32_t step;
 
         if (state->position >= state->samples_per_block) {
             FN(close)(state);
         }
+        if (FN(all_lost)(state)) {
+            rest = FN(skip)(state, rest);
+        }
         step = state->samples_per_block - state->position;
         step = (step < rest) ? step : rest;
+        FN(miss)(state, step);
         state->position += step;
         rest -= step;
     }
     return (int)state->status | GTC_HELD;
 }
 
+/* Sample periods from the slot of the last stamped sample to a time, rounded. */
+static uint_least32_t FN(slots)(const STATE *state, uint_least32_t later_us)
+{
+    const uint_least32_t rest = later_us % state->period_us;
+    const uint_least32_t n = later_us / state->period_us;
+
+    return (rest >= (state->period_us - rest)) ? (n + 1U) : n;
+}
+
+/* Times are put on a grid of sample periods, from the first one on, so that no error of them adds up. */
+static int FN(run_sample_at)(STATE *state, uint_least32_t time_us, const NUM *channels)
+{
+    uint_least32_t later_us;
+    uint_least32_t n;
+
+    if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
+        return GTC_E_ARG;
+    }
+    if (state->is_stamped == 0U) {
+        state->is_stamped = 1U;
+        state->time_us = time_us & MAX_US;
+        return FN(run_sample)(state, channels);
+    }
+    later_us = (time_us - state->time_us) & MAX_US;
+    n = FN(slots)(state, later_us);
+    if ((n == 0U) || (later_us > (MAX_US - LATEST))) {
+        return (int)state->status | GTC_HELD;
+    }
+    state->time_us = (state->time_us + (n * state->period_us)) & MAX_US;
+    (void)FN(run_missed)(state, n - 1U);
+    return FN(run_sample)(state, channels);
+}
+
 static int FN(run_bias)(const STATE *state, NUM *bias)
 {
+    WIDE governed;
+    int remark;
+
     if ((state == NULL) || (bias == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
     }
-    *bias = state->bias;
-    return (int)state->status;
+    governed = state->bias;
+    remark = FN(govern)(state->table, &governed);
+    *bias = (NUM)governed;
+    return (int)state->status | remark;
 }

@@ -50,6 +50,23 @@ NUM FN(blend)(const TABLE *table, const POINT *in)
 }
 #endif
 
+/* Moves a correction into the authority of the table, what is no number too. Returns GTC_OK or GTC_CLAMPED. */
+static int FN(govern)(const TABLE *table, WIDE *bias)
+{
+    const NUM low = MEMBER(table->authority[0]);
+    const NUM high = MEMBER(table->authority[1]);
+    int status = GTC_CLAMPED;
+
+    if (!(*bias >= low)) {
+        *bias = low;
+    } else if (!(*bias <= high)) {
+        *bias = high;
+    } else {
+        status = GTC_OK;
+    }
+    return status;
+}
+
 /* 1 if there was training data where the inputs lie, or no map says where it was. */
 static int FN(is_covered)(const TABLE *table, const POINT *in)
 {
@@ -70,6 +87,7 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
 GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
 {
     POINT in;
+    WIDE found;
     int status;
 
     if ((table == NULL) || (bias == NULL)) {
@@ -84,10 +102,13 @@ GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     }
 #if GTC_WITH_BANK
     if (table->n_networks > 1U) {
-        *bias = FN(blend)(table, &in);
-        return status;
-    }
+        found = FN(blend)(table, &in);
+    } else
 #endif
-    *bias = FN(network)(table, table->networks, table->centers, &in);
+    {
+        found = FN(network)(table, table->networks, table->centers, &in);
+    }
+    status |= FN(govern)(table, &found);
+    *bias = (NUM)found;
     return status;
 }

@@ -24,12 +24,14 @@
 #define TABLE gtc_f32_table_t
 #define STATE gtc_f32_state_t
 #define EFFECT gtc_f32_effect_t
+#define INPUT gtc_f32_input_t
 #define NUM float
 #define WIDE float
+#define LIMIT float /* of a distance */
 #define NUM_ZERO 0.0F
+#define LIMIT_ZERO 0.0F
 #define NUM_PLAUSIBLE_MIN (-90.0F) /* C */
 #define NUM_PLAUSIBLE_MAX 200.0F
-#define CHANNEL_MAX 1.0e9F /* magnitude of a sample of an auxiliary channel; sums of a block stay finite */
 #define NUM_MISSING_BITS 0x7FC00000UL /* no finite number has these */
 #define ARITHMETIC 1U /* in the second word of an image */
 
@@ -294,29 +296,38 @@ static inline float FN(unmixed)(const BLEND *blend, float otherwise)
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
-static inline float FN(step_per_sample)(const TABLE *table, uint_least32_t period_us)
+/* max_step + max_rate * time */
+static inline float FN(limit)(const gtc_word_t *guard, uint_least32_t us)
 {
-    const float period = (float)period_us;
-    float step;
+    const float time = (float)us;
+    float limit;
 
-    step = table->guards[3].value * period;
-    return step;
+    limit = guard[3].value * time;
+    limit = guard[2].value + limit;
+    return limit;
 }
 
-/* |a - b| <= max_step + samples * step_per_sample */
-static inline int FN(is_near)(const STATE *state, float a, float b, uint_least32_t samples)
+/* |a - b| <= limit */
+static inline int FN(is_near)(float a, float b, float limit)
 {
-    const float n = (float)samples;
-    float limit;
     float distance;
 
-    limit = n * state->step_per_sample;
-    limit = state->table->guards[2].value + limit;
     distance = a - b;
     if (distance < 0.0F) {
         distance = -distance;
     }
     return (distance <= limit) ? 1 : 0;
+}
+
+/* Where a temperature is after so many blocks. */
+static inline float FN(ahead)(float temp, float slope, uint_least32_t blocks)
+{
+    const float n = (float)blocks;
+    float way;
+
+    way = slope * n;
+    way = temp + way;
+    return way;
 }
 
 static inline float FN(add)(float sum, float d)
@@ -363,15 +374,6 @@ static inline float FN(quotient)(float num, uint_least32_t den)
 
     q = num / divisor;
     return q;
-}
-
-/* bias + what the terms add */
-static inline float FN(total)(float bias, float added)
-{
-    float total;
-
-    total = bias + added;
-    return total;
 }
 
 /* ---- the terms -------------------------------------------------------------------------- */

@@ -21,12 +21,14 @@
 #define TABLE gtc_q31_table_t
 #define STATE gtc_q31_state_t
 #define EFFECT gtc_q31_effect_t
+#define INPUT gtc_q31_input_t
 #define NUM int_least32_t
 #define WIDE int_least64_t
+#define LIMIT uint_least32_t /* of a distance */
 #define NUM_ZERO 0
+#define LIMIT_ZERO 0U
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
-#define CHANNEL_MAX 2147483647 /* every sample of an auxiliary channel but the mark of a missing one */
 #define NUM_MISSING_BITS 0x80000000UL
 #define ARITHMETIC 2U /* in the second word of an image */
 
@@ -396,22 +398,21 @@ static inline int_least32_t FN(unmixed)(const BLEND *blend, int_least32_t otherw
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
-static inline int_least32_t FN(step_per_sample)(const TABLE *table, uint_least32_t period_us)
+/* max_step + max_rate * time, or the largest number */
+static inline uint_least32_t FN(limit)(const gtc_word_t *guard, uint_least32_t us)
 {
-    const uint_least64_t step = ((uint_least64_t)table->guards[3].bits * period_us) >> 24;
+    const uint_least64_t limit = guard[2].bits + (((uint_least64_t)guard[3].bits * us) >> 24);
 
-    return (step < 0x7FFFFFFFU) ? (int_least32_t)step : 0x7FFFFFFF;
+    return (limit < 0xFFFFFFFFU) ? (uint_least32_t)limit : 0xFFFFFFFFU;
 }
 
-/* |a - b| <= max_step + samples * step_per_sample */
-static inline int FN(is_near)(const STATE *state, int_least32_t a, int_least32_t b,
-                              uint_least32_t samples)
+/* |a - b| <= limit */
+static inline int FN(is_near)(int_least32_t a, int_least32_t b, uint_least32_t limit)
 {
-    const int_least64_t limit = state->table->guards[2].integer
-                                + ((int_least64_t)samples * state->step_per_sample);
-    const int_least64_t d = (int_least64_t)a - b;
+    const uint_least32_t up = ((uint_least32_t)a - (uint_least32_t)b) & 0xFFFFFFFFU;
+    const uint_least32_t distance = (a < b) ? ((0U - up) & 0xFFFFFFFFU) : up;
 
-    return (((d < 0) ? -d : d) <= limit) ? 1 : 0;
+    return (distance <= limit) ? 1 : 0;
 }
 
 static inline int_least64_t FN(add)(int_least64_t sum, int_least64_t d)
@@ -460,10 +461,10 @@ static inline int_least32_t FN(saturated)(int_least64_t x)
     return (int_least32_t)y;
 }
 
-/* bias + what the terms add */
-static inline int_least32_t FN(total)(int_least32_t bias, int_least64_t added)
+/* Where a temperature is after so many blocks. */
+static inline int_least32_t FN(ahead)(int_least32_t temp, int_least32_t slope, uint_least32_t blocks)
 {
-    return FN(saturated)(bias + added);
+    return FN(saturated)(temp + ((int_least64_t)slope * (int_least64_t)blocks));
 }
 
 /* ---- the terms -------------------------------------------------------------------------- */

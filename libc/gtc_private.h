@@ -56,13 +56,12 @@ typedef struct {
 } gtc_q31_effect_t;
 
 /* Functions of one kind of term; i is the number of the term in its table.
- * begin: first believed temperature x; take: a sample x of the term's channel; step: a block ends,
- * of mean temperature x; apply: changes inputs, adds to the bias, at temperature x. */
+ * begin: first believed temperature x; step: a block ends, of mean temperature x; apply: changes inputs, adds to
+ * the bias, at temperature x. All temperatures lie within the envelope. */
 struct gtc_f32_term_code {
     uint_least32_t kind;
     uint_least32_t survives; /* 1: its state is taken over after a time without power */
     void (*begin)(gtc_f32_state_t *state, uint_least32_t i, float x);
-    void (*take)(gtc_f32_state_t *state, uint_least32_t i, float x);
     void (*step)(gtc_f32_state_t *state, uint_least32_t i, float x);
     void (*apply)(const gtc_f32_state_t *state, uint_least32_t i, float x, gtc_f32_effect_t *effect);
 };
@@ -71,7 +70,6 @@ struct gtc_q31_term_code {
     uint_least32_t kind;
     uint_least32_t survives;
     void (*begin)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
-    void (*take)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
     void (*step)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
     void (*apply)(const gtc_q31_state_t *state, uint_least32_t i, int_least32_t x,
                   gtc_q31_effect_t *effect);

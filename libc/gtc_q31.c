@@ -126,6 +126,21 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
     return sum;
 }
 
+/* The mean of the running block lies in the range. */
+static int FN(sum_fits)(const INPUT *in, int_least32_t low, int_least32_t high)
+{
+    const int_least64_t least = ((int_least64_t)low - in->base) * in->valid;
+    const int_least64_t most = ((int_least64_t)high - in->base) * in->valid;
+
+    return ((in->valid == 0U) || ((in->sum >= least) && (in->sum <= most))) ? 1 : 0;
+}
+
+/* What a memory keeps for more digits, 2^-32 C. */
+static int FN(is_fraction)(int_least32_t x)
+{
+    return (FN(is_missing)(x) || ((x >= 0) && (x <= 65535))) ? 1 : 0;
+}
+
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
 /* MISRA 20.1: the texts use what stands above. */
@@ -181,14 +196,19 @@ int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp, int_least32_t 
     return FN(run_map)(table, temp, slope, bias);
 }
 
-int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_least32_t samples_per_block)
+int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_least32_t period_us)
 {
-    return FN(run_init)(state, table, samples_per_block);
+    return FN(run_init)(state, table, period_us);
 }
 
 int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *channels)
 {
     return FN(run_sample)(state, channels);
+}
+
+int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels)
+{
+    return FN(run_sample_at)(state, time_us, channels);
 }
 
 int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count)
@@ -207,8 +227,8 @@ int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS])
 }
 
 int gtc_q31_restore(gtc_q31_state_t *state, const gtc_q31_table_t *table,
-                    uint_least32_t samples_per_block, const gtc_word_t words[GTC_SAVE_WORDS],
+                    uint_least32_t period_us, const gtc_word_t words[GTC_SAVE_WORDS],
                     uint_least32_t off_blocks)
 {
-    return FN(run_restore)(state, table, samples_per_block, words, off_blocks);
+    return FN(run_restore)(state, table, period_us, words, off_blocks);
 }

@@ -7,7 +7,7 @@
  */
 
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545332UL
+#define SAVE_MAGIC 0x47545333UL
 
 /* What another build may have otherwise. */
 #define SAVE_OPTIONS \
@@ -57,6 +57,23 @@ static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
     }
 }
 
+/* One channel. */
+static void FN(carry_input)(FN(cursor_t) *at, INPUT *in)
+{
+    FN(carry_bits)(at, &in->gap_us);
+    FN(carry_bits)(at, &in->agreed_us);
+    FN(carry_bits)(at, &in->same_us);
+    FN(carry_bits)(at, &in->received);
+    FN(carry_bits)(at, &in->valid);
+    FN(carry_bits)(at, &in->held_blocks);
+    FN(carry_bits)(at, &in->clamped);
+    FN(carry)(at, &in->last);
+    FN(carry)(at, &in->candidate);
+    FN(carry)(at, &in->base);
+    FN(carry)(at, &in->mean);
+    FN(carry_wide)(at, &in->sum);
+}
+
 /* The front end: everything that the running block and the next correction depend on. */
 static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
 {
@@ -68,51 +85,34 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
     if (at->to == NULL) {
         state->status = status.integer;
     }
-    FN(carry_bits)(at, &state->samples_per_block);
+    FN(carry_bits)(at, &state->period_us);
     FN(carry_bits)(at, &state->position);
-    FN(carry_bits)(at, &state->valid);
-    FN(carry_bits)(at, &state->gap);
-    FN(carry_bits)(at, &state->suspects);
-    FN(carry_bits)(at, &state->received);
-    FN(carry_bits)(at, &state->repeats);
-    FN(carry_bits)(at, &state->held_blocks);
     FN(carry_bits)(at, &state->filled);
     FN(carry_bits)(at, &state->window_valid);
-    FN(carry)(at, &state->last);
-    FN(carry)(at, &state->candidate);
-    FN(carry)(at, &state->base);
-    FN(carry)(at, &state->mean);
+    FN(carry_bits)(at, &state->elapsed);
+    FN(carry_bits)(at, &state->off_blocks);
     FN(carry)(at, &state->bias);
-    FN(carry_wide)(at, &state->sum);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         FN(carry)(at, &state->window[i]);
     }
-}
-
-/* The terms, and the time by which they go. */
-static void FN(carry_terms)(FN(cursor_t) *at, STATE *state)
-{
-    uint_least32_t i;
-
-    FN(carry_bits)(at, &state->elapsed);
-    FN(carry_bits)(at, &state->off_blocks);
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        FN(carry)(at, &state->term[i][0]);
-        FN(carry)(at, &state->term[i][1]);
-        FN(carry_wide)(at, &state->channel[i]);
-        FN(carry_bits)(at, &state->channel_valid[i]);
+    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
+        FN(carry_input)(at, &state->input[i]);
     }
 }
 
-/* All of a state but what init() makes of table and samples_per_block; with `to`, nothing of it is written. */
+/* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written. */
 static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
 {
     FN(cursor_t) at;
+    uint_least32_t i;
 
     at.to = to;
     at.from = from;
     FN(carry_front)(&at, state);
-    FN(carry_terms)(&at, state);
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        FN(carry)(&at, &state->term[i][0]);
+        FN(carry)(&at, &state->term[i][1]);
+    }
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
@@ -152,38 +152,110 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
     return status;
 }
 
+static NUM FN(lesser_of)(NUM a, NUM b)
+{
+    return (a < b) ? a : b;
+}
+
+static int FN(is_within)(NUM x, NUM low, NUM high)
+{
+    return ((x >= low) && (x <= high)) ? 1 : 0;
+}
+
+/* Numbers of a channel within its range (0 before the first reading), counts within the block: what no call would
+ * have left is refused. */
+static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
+{
+    const NUM low = FN(lesser_of)(ELEMENT(guard[0]), NUM_ZERO);
+    const NUM high = -FN(lesser_of)(-ELEMENT(guard[1]), NUM_ZERO);
+    const int counts = ((in->valid <= state->position) && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
+                        && (in->held_blocks <= (guard[GUARD_MISSING].bits + 1U))) ? 1 : 0;
+
+    return counts & FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
+           & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high)
+           & FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1]));
+}
+
+/* A temperature of the window, or of a term, which an envelope may have moved. */
+static int FN(is_temperature)(NUM x)
+{
+    return FN(is_within)(x, FN(number_limits)[9].least, FN(number_limits)[9].most);
+}
+
+static int FN(terms_are_sound)(const STATE *state)
+{
+    int sound = 1;
+    uint_least32_t i;
+
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        const NUM z = state->term[i][0];
+
+        sound &= FN(is_missing)(z) | (FN(is_temperature)(z) & FN(is_fraction)(state->term[i][1]));
+    }
+    return sound;
+}
+
+/* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
+static int FN(is_sound)(const STATE *state)
+{
+    int sound = ((state->position <= state->samples_per_block) && (state->filled <= state->table->slope_blocks)
+                 && (state->elapsed <= MAX_ELAPSED)
+                 && ((state->status >= 0) && (state->status < (2 * GTC_CHANNEL_LOST)))) ? 1 : 0;
+    uint_least32_t i;
+
+    for (i = 0U; i < state->table->n_channels; i++) {
+        sound &= FN(input_fits)(state, &state->input[i], FN(guard)(state, i));
+    }
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
+        sound &= FN(is_temperature)(state->window[i]);
+    }
+    return sound & FN(terms_are_sound)(state) & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
+}
+
 /* Of a state that was read, what outlasts a time without power: terms. If it had not begun when it was saved,
  * it had itself been without power before. */
-static void FN(outlast)(STATE *state, uint_least32_t samples_per_block, uint_least32_t off_blocks)
+static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
 {
-    const uint_least32_t before = (state->gap == 0U) ? state->off_blocks : 0U;
+    const uint_least32_t before = (state->input[0].gap_us == 0U) ? state->off_blocks : 0U;
     const uint_least32_t room = 0xFFFFFFFFUL - before;
     uint_least32_t i;
 
-    FN(clear)(state, samples_per_block);
+    FN(clear)(state);
     state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        state->channel[i] = NUM_ZERO;
-        state->channel_valid[i] = 0U;
         if ((i >= state->table->n_terms) || (state->table->term_code[i]->survives == 0U)) {
             FN(forget)(state, i);
         }
     }
 }
 
-static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t samples_per_block,
+/* The state that the words hold, after so many blocks without power. */
+static void FN(take_over)(STATE *state, const TABLE *table, uint_least32_t period_us, const gtc_word_t *words,
+                          uint_least32_t off_blocks)
+{
+    FN(start)(state, table, period_us);
+    FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
+    if ((off_blocks != 0U) || (state->period_us != period_us)) {
+        state->period_us = period_us;
+        FN(outlast)(state, off_blocks);
+    }
+}
+
+static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t period_us,
                            const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
 {
-    int status = (words == NULL) ? GTC_E_ARG : FN(can_start)(state, table, samples_per_block);
+    int status = (words == NULL) ? GTC_E_ARG : FN(can_start)(state, table, period_us);
+    STATE read;
 
     if (status == GTC_OK) {
         status = FN(inspect)(table, words);
     }
     if (status == GTC_OK) {
-        FN(start)(state, table, samples_per_block);
-        FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
-        if ((off_blocks != 0U) || (state->samples_per_block != samples_per_block)) {
-            FN(outlast)(state, samples_per_block, off_blocks);
+        FN(take_over)(&read, table, period_us, words, off_blocks);
+        if (FN(is_sound)(&read)) {
+            FN(take_over)(state, table, period_us, words, off_blocks);
+        } else {
+            status = GTC_E_IMAGE;
         }
     }
     return status;

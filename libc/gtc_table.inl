@@ -205,6 +205,8 @@ static int FN(guard_fits)(const gtc_word_t *guard, uint_least32_t channel)
     }
     if (channel == 0U) {
         fit &= ((low >= NUM_PLAUSIBLE_MIN) && (high <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
+    } else {
+        fit &= ((ELEMENT(guard[7]) >= low) && (ELEMENT(guard[7]) <= high)) ? 1 : 0;
     }
     return fit;
 }

@@ -47,7 +47,7 @@ static void FN(memory_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT
 }
 
 const struct FN(term_code) FN(term_memory) = {
-    GTC_TERM_MEMORY, 1U, FN(memory_begin), FN(nothing), FN(memory_step), FN(memory_apply),
+    GTC_TERM_MEMORY, 1U, FN(memory_begin), FN(memory_step), FN(memory_apply),
 };
 
 /* ---- play operator: hysteresis
@@ -87,7 +87,7 @@ static void FN(play_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *
 }
 
 const struct FN(term_code) FN(term_play) = {
-    GTC_TERM_PLAY, 1U, FN(play_begin), FN(nothing), FN(play_step), FN(play_apply),
+    GTC_TERM_PLAY, 1U, FN(play_begin), FN(play_step), FN(play_apply),
 };
 
 /* ---- exponential in the time since init: warm_up
@@ -104,7 +104,7 @@ static void FN(warm_up_apply)(const STATE *state, uint_least32_t i, NUM x, EFFEC
 }
 
 const struct FN(term_code) FN(term_warm_up) = {
-    GTC_TERM_WARM_UP, 0U, FN(nothing), FN(nothing), FN(nothing), FN(warm_up_apply),
+    GTC_TERM_WARM_UP, 0U, FN(nothing), FN(nothing), FN(warm_up_apply),
 };
 
 /* ---- harmonic in the temperature: path_length_periodicity
@@ -121,68 +121,34 @@ static void FN(harmonic_apply)(const STATE *state, uint_least32_t i, NUM x, EFFE
 }
 
 const struct FN(term_code) FN(term_harmonic) = {
-    GTC_TERM_HARMONIC, 0U, FN(nothing), FN(nothing), FN(nothing), FN(harmonic_apply),
+    GTC_TERM_HARMONIC, 0U, FN(nothing), FN(nothing), FN(harmonic_apply),
 };
 
 /* ---- linear in the block mean of an auxiliary channel
  *
- * Parameters: slope; reference. Adds slope (mean - reference). State: mean of the last block, missing before
- * the first sample; base of the running block, missing where the last one had too few samples. */
-
-/* Samples of the channel count from the first believed temperature on. */
-static void FN(auxiliary_begin)(STATE *state, uint_least32_t i, NUM x)
-{
-    (void)x;
-    state->channel_valid[i] = 0U;
-}
-
-static void FN(auxiliary_take)(STATE *state, uint_least32_t i, NUM x)
-{
-    NUM *const mean = &state->term[i][0];
-    NUM *const base = &state->term[i][1];
-
-    /* False for a NaN, too. Before the first believed temperature no block ends that could empty the sum. */
-    if ((!((x >= -CHANNEL_MAX) && (x <= CHANNEL_MAX))) || (state->channel_valid[i] >= state->samples_per_block)) {
-        return;
-    }
-    if (FN(is_missing)(*mean) != 0) {
-        *mean = x;
-    }
-    if (state->channel_valid[i] == 0U) {
-        *base = x;
-        state->channel[i] = NUM_ZERO;
-    }
-    state->channel[i] = FN(add)(state->channel[i], FN(diff)(x, *base));
-    state->channel_valid[i]++;
-}
-
-static void FN(auxiliary_step)(STATE *state, uint_least32_t i, NUM x)
-{
-    NUM *const base = &state->term[i][1];
-
-    (void)x;
-    if ((2U * state->channel_valid[i]) >= state->samples_per_block) {
-        state->term[i][0] = FN(mean)(*base, state->channel[i], state->channel_valid[i]);
-    } else {
-        *base = FN(missing)();
-    }
-    state->channel_valid[i] = 0U;
-}
+ * Parameters: slope; reference. Adds slope (mean - reference), the mean of the channel's last block with enough
+ * readings, or of what stands for it (gtc_front.inl). */
 
 static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
+    const uint_least32_t channel = state->table->terms[(i * GTC_TERM_WORDS) + 1U].bits;
+    const INPUT *const in = &state->input[channel];
     const NUM slope = FN(parameter)(state, i, 0U);
     const NUM reference = FN(parameter)(state, i, 1U);
 
     (void)x;
-    if (FN(is_missing)(state->term[i][1]) != 0) {
+    if ((in->gap_us == 0U) || (in->held_blocks != 0U)) {
         effect->remarks |= GTC_HELD;
     }
-    if (!FN(is_missing)(state->term[i][0])) {
-        effect->added = FN(add)(effect->added, FN(scaled_difference)(state->term[i][0], reference, slope));
+    if (in->held_blocks > state->table->guards[(channel * GTC_GUARD_WORDS) + 6U].bits) {
+        effect->remarks |= GTC_CHANNEL_LOST;
     }
+    if ((in->clamped & 2U) != 0U) {
+        effect->remarks |= GTC_CLAMPED;
+    }
+    effect->added = FN(add)(effect->added, FN(scaled_difference)(in->mean, reference, slope));
 }
 
 const struct FN(term_code) FN(term_auxiliary) = {
-    GTC_TERM_AUXILIARY, 0U, FN(auxiliary_begin), FN(auxiliary_take), FN(auxiliary_step), FN(auxiliary_apply),
+    GTC_TERM_AUXILIARY, 0U, FN(nothing), FN(nothing), FN(auxiliary_apply),
 };

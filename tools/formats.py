@@ -20,7 +20,6 @@ from gyrotc.results.describe import schema_text, tables
 from gyrotc.results.diagnosed import Diagnosed
 from gyrotc.results.emission import Emitted
 from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.fleet import FleetSummary
 from gyrotc.results.limits import HeldLimits
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.planned import Plan
@@ -41,7 +40,6 @@ RESULTS: dict[str, type[Numbered]] = {
     "emission": EmissionRecord,
     "emit": Emitted,
     "evaluate": Evaluation,
-    "fleet": FleetSummary,
     "limits": HeldLimits,
     "manifest": Manifest,
     "plan": Plan,

@@ -1,7 +1,7 @@
 /* gtc_rlg_0042.c - bias table of gyro RLG-0042. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 f4a8697c2183a704aa5df4f4abb05911b97f6f74d995bd6355095ccff5f139ce
+ * Model:       sha256 dcfdd3e112ccad432a2d62c8b3766cf7ca205f064fedcb87e6932911ea1c901c
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -78,8 +78,8 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.00726183504F),
-    .authority = { V(-15000000.0F), V(15000000.0F) },
-    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .authority = { V(0.0F), V(0.00946229789F) },
+    .effect = { V(0.0F), V(0.0F) },
     .rezero = V(0.0F),
     .scale = { V(17.595499F), V(0.0198339894F), V(2.54609966F) },
     .envelope = { V(-32.8230019F), V(68.0139999F), V(-0.392757595F), V(0.392727345F) },
@@ -99,7 +99,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .coverage = f32_coverage,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x4e51f94bUL,
+    .crc = 0xd2514b2cUL,
     .term_code = { NULL },
 };
 
@@ -165,8 +165,8 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 34UL,
     .fallback = 124757378L,
-    .authority = { -2147483647L, 2147483647L },
-    .effect = { -2147483647L, 2147483647L },
+    .authority = { 0L, 162561971L },
+    .effect = { 0L, 0L },
     .rezero = 0L,
     .scale = { 1331036L, 170870916L, 4L },
     .envelope = { -2151088L, 4457366L, -25740L, 25738L },
@@ -186,7 +186,7 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .coverage = q31_coverage,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0xf4f423ccUL,
+    .crc = 0xec3bfe15UL,
     .term_code = { NULL },
 };
 

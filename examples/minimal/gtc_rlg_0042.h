@@ -7,13 +7,12 @@
  * simulated:   True
  *
  * Valid:       -32.82 ... 68.01 C, -2.357 ... 2.356 C/min; outside, the value at the edge with GTC_CLAMPED
- * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target:
- *              GTC_RLG_0042_SAMPLES_PER_BLOCK(10000UL) with a sample each 10 ms
+ * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         684 bytes of read-only data, 224 of them parameters; |error| <= 1.16e-07 deg/h against the model (terms excluded)
  * q31:         684 bytes of read-only data, 224 of them parameters; |error| <= 1.24e-06 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 f4a8697c2183a704aa5df4f4abb05911b97f6f74d995bd6355095ccff5f139ce
+ * Model:       sha256 dcfdd3e112ccad432a2d62c8b3766cf7ca205f064fedcb87e6932911ea1c901c
  *
  * The numbers belong to the owner of the gyro's recordings.
  */
@@ -32,12 +31,16 @@ extern "C" {
 #define GTC_RLG_0042_T_MAX_C (68.01400F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_RLG_0042_SLOPE_MIN_C_PER_MIN (-2.356546F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_RLG_0042_SLOPE_MAX_C_PER_MIN (2.356364F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_RLG_0042_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
+#define GTC_RLG_0042_PERIOD_MAX_US 10010000UL /* longest sample period */
+#define GTC_RLG_0042_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_RLG_0042_AUTHORITY_MIN_DPH (0.00000000F) /* no correction lies below it, deg/h: margin 25% of the range */
+#define GTC_RLG_0042_AUTHORITY_MAX_DPH (0.00946235209F) /* no correction lies above it, deg/h: margin 25% of the range */
 #define GTC_RLG_0042_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_RLG_0042_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_RLG_0042_F32_TABLE_BYTES 684UL /* read-only data, with pointers of 32 bits */
 #define GTC_RLG_0042_Q31_BIAS_FRAC_BITS 34 /* bias in 2^-this deg/h */
 #define GTC_RLG_0042_Q31_TABLE_BYTES 684UL /* read-only data, with pointers of 32 bits */
-#define GTC_RLG_0042_SAMPLES_PER_BLOCK(period_us) ((GTC_RLG_0042_BLOCK_US + ((period_us) / 2UL)) / (period_us)) /* of gtc_<n>_init(), for a sample period in microseconds */
 
 extern const gtc_f32_table_t gtc_rlg_0042_f32;
 extern const gtc_q31_table_t gtc_rlg_0042_q31;

@@ -9,7 +9,7 @@ int main(void)
     float bias_dph = 0.0F;
     float channels[1] = { 17.6F };  /* C, from the gyro's own sensor */
     if ((gtc_f32_check(&gtc_rlg_0042_f32) != GTC_OK) ||
-        (gtc_f32_init(&state, &gtc_rlg_0042_f32, 1000UL) < 0)) { /* 100 samples/s */
+        (gtc_f32_init(&state, &gtc_rlg_0042_f32, 10000UL) < 0)) { /* a sample each 10000 microseconds */
         return 1; /* do not navigate with this build or table */
     }
     if ((gtc_f32_sample(&state, channels) < 0) || (gtc_f32_bias(&state, &bias_dph) < 0)) {

@@ -3,7 +3,7 @@
 
 #include "gtc_rlg_0042.h"
 
-#define SAMPLES_PER_BLOCK 10U /* a block of 10 s, a reading each second */
+#define PERIOD_US 1000000UL /* a reading each second */
 #define TICK_US 15625L        /* 1/64 s */
 
 static gtc_q31_state_t state;        /* of the task that reads the thermometer */
@@ -13,7 +13,7 @@ static gtc_q31_angle_t increments;   /* of the interrupt that reads the gyro */
 int nav_start(void)
 {
     const int checked = gtc_q31_check(&gtc_rlg_0042_q31);
-    return (checked != GTC_OK) ? checked : gtc_q31_init(&state, &gtc_rlg_0042_q31, SAMPLES_PER_BLOCK);
+    return (checked != GTC_OK) ? checked : gtc_q31_init(&state, &gtc_rlg_0042_q31, PERIOD_US);
 }
 
 int nav_temperature(int_least32_t word)

@@ -9,7 +9,7 @@
 #include "slots.h"
 
 #define TABLE (&gtc_rlg_0042_f32)
-#define SAMPLES_PER_BLOCK 10UL
+#define PERIOD_US 1000000UL
 #define SAVES 5
 #define ALL_WORDS (2L * SLOT_WORDS) /* changed by one save: erased, and written */
 
@@ -53,7 +53,7 @@ uint_least32_t flash_read(int slot, int index)
 /* The state after so many saves' worth of samples. */
 static int state_at(int save, gtc_f32_state_t *state)
 {
-    int status = gtc_f32_init(state, TABLE, SAMPLES_PER_BLOCK);
+    int status = gtc_f32_init(state, TABLE, PERIOD_US);
     int i;
 
     for (i = 0; (i < (37 * save)) && (status >= 0); i++) {
@@ -73,7 +73,7 @@ static int loaded(void)
     gtc_word_t words[GTC_SAVE_WORDS];
     int save;
 
-    if (slots_load(&state, TABLE, SAMPLES_PER_BLOCK, 0U) != GTC_OK) {
+    if (slots_load(&state, TABLE, PERIOD_US, 0U) != GTC_OK) {
         return 0;
     }
     if (gtc_f32_save(&state, found_words) != GTC_OK) {

@@ -6,7 +6,7 @@
 
 /* Restores from one slot. Its number is believed only with its complement. */
 static int load_slot(int slot, gtc_f32_state_t *state, const gtc_f32_table_t *table,
-                     uint_least32_t samples_per_block, uint_least32_t off_blocks)
+                     uint_least32_t period_us, uint_least32_t off_blocks)
 {
     gtc_word_t words[GTC_SAVE_WORDS];
     int i;
@@ -17,7 +17,7 @@ static int load_slot(int slot, gtc_f32_state_t *state, const gtc_f32_table_t *ta
     for (i = 0; i < GTC_SAVE_WORDS; i++) {
         words[i].bits = flash_read(slot, i);
     }
-    return gtc_f32_restore(state, table, samples_per_block, words, off_blocks);
+    return gtc_f32_restore(state, table, period_us, words, off_blocks);
 }
 
 /* The slot with the higher number; numbers may pass 2^32. */
@@ -29,13 +29,13 @@ static int higher(void)
 }
 
 int slots_load(gtc_f32_state_t *state, const gtc_f32_table_t *table,
-               uint_least32_t samples_per_block, uint_least32_t off_blocks)
+               uint_least32_t period_us, uint_least32_t off_blocks)
 {
     const int newest = higher();
-    int status = load_slot(newest, state, table, samples_per_block, off_blocks);
+    int status = load_slot(newest, state, table, period_us, off_blocks);
 
     if (status != GTC_OK) {
-        status = load_slot(1 - newest, state, table, samples_per_block, off_blocks);
+        status = load_slot(1 - newest, state, table, period_us, off_blocks);
     }
     return status;
 }
@@ -53,7 +53,7 @@ int slots_save(const gtc_f32_state_t *state, const gtc_f32_table_t *table)
     if (status != GTC_OK) {
         return status;
     }
-    if (load_slot(keep, &scratch, table, 1U, 1U) != GTC_OK) {
+    if (load_slot(keep, &scratch, table, table->block_us, 1U) != GTC_OK) {
         keep = 1 - keep;
     }
     slot = 1 - keep;

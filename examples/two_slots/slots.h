@@ -23,6 +23,6 @@ int slots_save(const gtc_f32_state_t *state, const gtc_f32_table_t *table);
 /* Restores the newest whole state of this table. Returns GTC_OK, or the last error of
  * gtc_f32_restore() if there is none; then start with gtc_f32_init(). */
 int slots_load(gtc_f32_state_t *state, const gtc_f32_table_t *table,
-               uint_least32_t samples_per_block, uint_least32_t off_blocks);
+               uint_least32_t period_us, uint_least32_t off_blocks);
 
 #endif /* SLOTS_H_INCLUDED */

@@ -58,12 +58,32 @@ def _single_threaded() -> None:
         os.environ.setdefault(name, "1")
 
 
+_COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`
+_ANYWHERE = (
+    "-q",
+    "--quiet",
+    "-v",
+    "--verbose",
+)  # options of the whole program, taken after the command as well
+
+
+def _hoisted(arguments: list[str]) -> list[str]:
+    """The arguments with what concerns the whole program in front; what stands behind `--` is left alone."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    front = [a for a in arguments[:end] if a in _ANYWHERE]
+    return [*front, *(a for a in arguments[:end] if a not in _ANYWHERE), *arguments[end:]]
+
+
 def _status() -> int:
     """Runs the command; errors become one message on stderr and their exit status."""
     try:
         from .commands import app
 
-        app(standalone_mode=True)
+        if _COMPLETE in os.environ:  # a shell asks what could follow
+            from typer._completion_classes import completion_init
+
+            completion_init()
+        app(_hoisted(sys.argv[1:]), standalone_mode=True)
     except GyrotcError as error:
         shown = (
             terminal_line if isinstance(error, InputError) else terminal_text

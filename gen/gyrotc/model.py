@@ -69,6 +69,12 @@ def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
     return pair
 
 
+def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] <= 0.0 <= pair[1]:
+        raise ValueError("0 is not between minimum and maximum")
+    return pair
+
+
 class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
@@ -216,6 +222,7 @@ class Model(_Frozen):
     networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)]
     terms: Annotated[tuple[Term, ...], Field(max_length=4)] = ()
     fallback_dph: Dph
+    effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = None
     rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
     hold_blocks: Annotated[int, Field(ge=1, le=100000)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 __all__ = [
+    "CHANNEL_LOST",
     "CLAMPED",
     "E_ARG",
     "E_ID",
     "E_IMAGE",
     "E_LAYOUT",
+    "E_PERIOD",
     "E_SELF_TEST",
     "FALLBACK",
     "HELD",
@@ -23,8 +25,10 @@ CLAMPED = 2
 UNCOVERED = 4
 HELD = 8
 FALLBACK = 16
+CHANNEL_LOST = 32
 E_ARG = -1
 E_LAYOUT = -2
 E_SELF_TEST = -3
 E_IMAGE = -4
 E_ID = -5
+E_PERIOD = -6

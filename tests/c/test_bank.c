@@ -70,7 +70,7 @@ TEST(a_bank_is_refused_by_a_build_without_it)
 {
     state_t state;
 
-    CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, FN(init)(&state, &BANK, N));
+    CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, FN(init)(&state, &BANK, PERIOD));
 }
 
 TEST(networks_that_do_not_share_out_the_centers_are_refused)
@@ -82,7 +82,7 @@ TEST(networks_that_do_not_share_out_the_centers_are_refused)
     memcpy(networks, BANK.networks, sizeof networks);
     networks[GTC_NETWORK_WORDS].bits = 0xFFFFFFFFUL;
     table.networks = networks;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
 }
 
 int main(void)

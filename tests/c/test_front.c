@@ -16,6 +16,7 @@ static table_t guarded(gtc_word_t guard[GTC_GUARD_WORDS], uint_least32_t at, uin
     return table;
 }
 
+#define AGREE_US 4U
 #define STUCK_US 5U
 #define MISSING_BLOCKS 6U
 
@@ -119,7 +120,7 @@ TEST(a_long_window_needs_half_of_its_blocks)
     int k;
 
     table.slope_blocks = 8U;
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     (void)feed(&state, C(15.0), 5);
     (void)feed(&state, C(15.25), 4);
     /* Five holes: three valid blocks of eight, then two, then one. */
@@ -135,18 +136,18 @@ TEST(a_long_window_needs_half_of_its_blocks)
     CHECK_INT(GTC_OK, status_of(&state));
 }
 
-TEST(the_gap_is_counted_no_further_than_65535)
+TEST(the_gap_is_counted_no_further_than_a_word)
 {
     gtc_word_t guard[GTC_GUARD_WORDS];
     table_t table = guarded(guard, MISSING_BLOCKS, 100000UL);
     state_t state;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, 1U));
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     (void)feed(&state, C(15.0), 1);
-    CHECK((FN(missed)(&state, 70000UL) & GTC_HELD) != 0);
-    CHECK_INT(65535L, state.gap);
+    CHECK((FN(missed)(&state, 3000UL) & GTC_HELD) != 0);
+    CHECK(state.input[0].gap_us == 0xFFFFFFFFUL);
     CHECK((feed(&state, MISSING, 1) & GTC_HELD) != 0);
-    CHECK_INT(65535L, state.gap);
+    CHECK(state.input[0].gap_us == 0xFFFFFFFFUL);
 }
 
 TEST(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart)
@@ -165,9 +166,32 @@ TEST(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart)
     CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
 }
 
-TEST(a_jump_is_held_until_three_samples_agree)
+/* A state of the test table whose readings must agree for so long. */
+static state_t agreeing(uint_least32_t agree_us)
 {
-    state_t state = started();
+    static gtc_word_t guard[GTC_GUARD_WORDS];
+    static table_t table;
+    state_t state;
+
+    table = guarded(guard, AGREE_US, agree_us);
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    return state;
+}
+
+TEST(a_first_conversion_alone_is_not_believed)
+{
+    state_t state = agreeing(1000000UL);
+
+    CHECK_INT(GTC_HELD, feed(&state, C(85.0), 1));
+    CHECK(same(0, bias_of(&state)));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
+}
+
+TEST(a_jump_is_held_until_samples_agree_for_long_enough)
+{
+    state_t state = agreeing(2UL * PERIOD);
 
     (void)feed(&state, C(10.0), 5);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.0), 1));
@@ -177,9 +201,24 @@ TEST(a_jump_is_held_until_three_samples_agree)
     CHECK(same(map_of(C(30.125), 0), bias_of(&state)));
 }
 
+/* The time counts, not the number of samples. */
+TEST(agreement_takes_as_long_with_quick_samples)
+{
+    static gtc_word_t guard[GTC_GUARD_WORDS];
+    const table_t table = guarded(guard, AGREE_US, 1000000UL);
+    state_t state;
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, 10000UL));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 100));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(85.0), 3));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 100));
+    CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
+}
+
 TEST(suspects_that_disagree_or_are_interrupted_start_again)
 {
-    state_t state = started();
+    state_t state = agreeing(2UL * PERIOD);
 
     (void)feed(&state, C(10.0), 5);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.0), 1));
@@ -189,7 +228,7 @@ TEST(suspects_that_disagree_or_are_interrupted_start_again)
     CHECK_INT(GTC_WARMING | GTC_HELD, FN(missed)(&state, 1U));
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
     CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
-    state = started();
+    state = agreeing(2UL * PERIOD);
     (void)feed(&state, C(10.0), 5);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
     CHECK_INT(GTC_WARMING, feed(&state, C(10.0), 1));
@@ -197,19 +236,201 @@ TEST(suspects_that_disagree_or_are_interrupted_start_again)
     CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
 }
 
-TEST(the_longer_the_gap_the_larger_the_believable_step)
+/* After a loss the last believed temperature proves nothing: a sensor that was plugged in again shows 85 C first. */
+TEST(after_a_loss_readings_must_agree_again)
+{
+    state_t state = agreeing(1000000UL);
+
+    (void)feed(&state, C(15.0), 9);
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, FN(missed)(&state, 100UL * N));
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, C(55.0), 1));
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+    CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
+}
+
+TEST(a_sensor_dead_from_power_up_ends_in_the_constant_correction)
 {
     state_t state = started();
+    int k;
+
+    /* Two blocks are bridged. */
+    CHECK_INT(GTC_HELD, feed(&state, MISSING, (int)(3U * N)));
+    CHECK(same(0, bias_of(&state)));
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, MISSING, 1));
+    for (k = 0; k < 9; k++) {
+        CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, MISSING, 3));
+        CHECK(same(WORD_OF(TABLE.fallback), bias_of(&state)));
+    }
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+}
+
+/* A table for other blocks must not scale the slope in silence. */
+TEST(a_period_of_which_no_whole_number_makes_a_block_is_refused)
+{
+    table_t table = TABLE;
+    state_t state;
+
+    CHECK_INT(GTC_E_PERIOD, FN(init)(&state, &TABLE, 3000000UL));
+    CHECK_INT(GTC_E_PERIOD, FN(init)(&state, &TABLE, 20000000UL));
+    CHECK_INT(GTC_E_PERIOD, FN(init)(&state, &TABLE, 9UL));
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 10000000UL));
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 10010000UL));
+    CHECK_INT(GTC_E_PERIOD, FN(init)(&state, &TABLE, 10010001UL));
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 33333UL));
+    CHECK_INT(300, state.samples_per_block);
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 10UL));
+    table.block_us = 20000000UL;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(8, state.samples_per_block);
+}
+
+/* However calls are grouped. */
+TEST(a_long_time_without_samples_is_the_same_in_one_call_and_in_many)
+{
+    static const uint_least32_t parts[5] = {1U, 3U, 4U, 5U, 977U};
+    gtc_word_t whole[GTC_SAVE_WORDS];
+    gtc_word_t split[GTC_SAVE_WORDS];
+    uint_least32_t k;
+    int start;
+
+    for (start = 0; start < 6; start++) {
+        for (k = 0U; k < 5U; k++) {
+            state_t a = started();
+            state_t b = started();
+            uint_least32_t rest = 8640U;
+            int status = 0;
+
+            (void)feed(&a, C(15.0), start);
+            (void)feed(&b, C(15.0), start);
+            while (rest > 0U) {
+                const uint_least32_t now = (parts[k] < rest) ? parts[k] : rest;
+
+                status = FN(missed)(&b, now);
+                rest -= now;
+            }
+            CHECK_INT(status, FN(missed)(&a, 8640U));
+            CHECK_INT(GTC_OK, FN(save)(&a, whole));
+            CHECK_INT(GTC_OK, FN(save)(&b, split));
+            CHECK(memcmp(whole, split, sizeof whole) == 0);
+            CHECK_INT(feed(&a, C(20.0), 9), feed(&b, C(20.0), 9));
+            CHECK(same(bias_of(&a), bias_of(&b)));
+        }
+    }
+}
+
+TEST(stamped_samples_are_the_samples_of_their_slots)
+{
+    /* Jitter of less than half a period, and a counter that wraps. */
+    static const long jitter[8] = {0, 900000, -900000, 1200000, -1200000, 1, -1, 0};
+    state_t a = started();
+    state_t b = started();
+    num_t temp = C(15.0);
+    uint_least32_t time = 0xFFFFFFFFUL - (5UL * PERIOD);
+    int k;
+
+    for (k = 0; k < 60; k++) {
+        const uint_least32_t stamp = (time + (uint_least32_t)((k == 0) ? 0 : jitter[k % 8])) & 0xFFFFFFFFUL;
+
+        CHECK_INT(FN(sample)(&a, &temp), FN(sample_at)(&b, stamp, &temp));
+        CHECK(same(bias_of(&a), bias_of(&b)));
+        temp += STEP;
+        time = (time + PERIOD) & 0xFFFFFFFFUL;
+    }
+}
+
+TEST(stamps_tell_lost_samples_late_ones_and_a_clock_that_is_off)
+{
+    state_t a = started();
+    state_t b = started();
+    num_t temp = C(15.0);
+    int k;
+
+    CHECK_INT(FN(sample)(&a, &temp), FN(sample_at)(&b, 1000UL, &temp));
+    /* Three are lost. */
+    CHECK((FN(missed)(&a, 3U) & GTC_HELD) != 0);
+    CHECK_INT(FN(sample)(&a, &temp), FN(sample_at)(&b, 1000UL + (4UL * PERIOD), &temp));
+    /* One that comes twice, and one that comes late, change nothing. */
+    CHECK_INT(status_of(&b) | GTC_HELD, FN(sample_at)(&b, 1000UL + (4UL * PERIOD) + 5UL, &temp));
+    CHECK_INT(status_of(&b) | GTC_HELD, FN(sample_at)(&b, 1000UL + PERIOD, &temp));
+    CHECK_INT(FN(sample)(&a, &temp), FN(sample_at)(&b, 1000UL + (5UL * PERIOD), &temp));
+    CHECK(a.position == b.position);
+    /* A sensor that is a tenth too slow: each tenth slot stays empty, so the blocks are those of the time. */
+    a = started();
+    for (k = 0; k < 100; k++) {
+        CHECK(FN(sample_at)(&a, (uint_least32_t)k * 2750000UL, &temp) >= 0);
+        temp += STEP;
+    }
+    CHECK(a.time_us + (PERIOD / 2UL) >= 99UL * 2750000UL);
+    CHECK_INT((99L * 11L / 10L) / (long)N, a.elapsed);
+    /* The slope is that of the time, not of the samples: 11 samples' rise in 10 of its blocks. */
+    CHECK_INT(GTC_E_ARG, FN(sample_at)(NULL, 0U, &temp));
+    CHECK_INT(GTC_E_ARG, FN(sample_at)(&a, 0U, NULL));
+    a.table = NULL;
+    CHECK_INT(GTC_E_ARG, FN(sample_at)(&a, 0U, &temp));
+}
+
+/* The map is evaluated where the temperature will be. */
+TEST(a_table_with_a_lead_looks_a_block_ahead)
+{
+    table_t table = TABLE;
+    state_t state;
+    num_t temp = C(15.0);
+
+    table.lead_blocks = 1U;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    (void)ramp(&state, &temp, STEP, ((int)N * WINDOW) + 1);
+    CHECK(same(map_of(C(15.0 + (0.015625 * 13.5) + 0.0625), C(0.0625)), bias_of(&state)));
+}
+
+/* Whatever a state holds, and whatever the map says. */
+TEST(no_correction_leaves_the_authority)
+{
+    table_t table = TABLE;
+    state_t state;
+    num_t bias = 0;
+    num_t low;
+    num_t high;
+
+    WORD_OF(table.authority[0]) = 0;
+    WORD_OF(table.authority[1]) = WORD_OF(TABLE.fallback);
+    low = WORD_OF(table.authority[0]);
+    high = WORD_OF(table.authority[1]);
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    for (bias = C(-20.0); bias <= C(60.0); bias += C(1.0)) {
+        num_t temp = bias;
+        num_t map = 0;
+        int status;
+
+        state = started();
+        state.table = &table;
+        status = FN(sample)(&state, &temp);
+        CHECK((bias_of(&state) >= low) && (bias_of(&state) <= high));
+        CHECK(((status & GTC_CLAMPED) != 0) == (!same(bias_of(&state), map_of(temp, 0))));
+        CHECK(FN(map)(&table, temp, 0, &map) >= 0);
+        CHECK(same(map, bias_of(&state)));
+    }
+    state.bias = high + high;
+    CHECK((FN(bias)(&state, &bias) & GTC_CLAMPED) != 0);
+    CHECK(same(high, bias));
+    state.bias = low - high;
+    CHECK((FN(bias)(&state, &bias) & GTC_CLAMPED) != 0);
+    CHECK(same(low, bias));
+}
+
+TEST(the_longer_the_gap_the_larger_the_believable_step)
+{
+    state_t state = agreeing(2UL * PERIOD);
 
     /* max_step 0.5 C, and 0.25 C for each sample since the last one. */
-    (void)feed(&state, C(10.0), 1);
+    (void)feed(&state, C(10.0), 7);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(10.8125), 1));
-    state = started();
-    (void)feed(&state, C(10.0), 1);
+    state = agreeing(2UL * PERIOD);
+    (void)feed(&state, C(10.0), 7);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 1));
     CHECK_INT(GTC_WARMING, feed(&state, C(10.8125), 1));
-    state = started();
-    (void)feed(&state, C(0.0), 1);
+    state = agreeing(2UL * PERIOD);
+    (void)feed(&state, C(0.0), 3);
     CHECK_INT(GTC_HELD | GTC_FALLBACK, FN(missed)(&state, 100000UL));
     CHECK_INT(GTC_WARMING | GTC_CLAMPED, feed(&state, C(-21.0), 3));
     CHECK(same(map_of(C(-20.0), 0), bias_of(&state)));
@@ -233,7 +454,7 @@ TEST(a_table_that_believes_any_number_of_identical_samples)
     table_t table = guarded(guard, STUCK_US, 0U);
     state_t state;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     CHECK_INT(GTC_OK, feed(&state, C(10.0), 100));
 }
 
@@ -266,7 +487,7 @@ TEST(a_table_that_this_build_cannot_use_is_refused)
     do {                                                            \
         table = TABLE;                                              \
         change;                                                     \
-        CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));       \
+        CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));       \
         status = FN(check)(&table); /* the checksum comes before values */ \
         CHECK((status == GTC_E_LAYOUT) || (status == GTC_E_IMAGE));  \
     } while (0)
@@ -308,11 +529,9 @@ TEST(bad_arguments_are_refused)
     const num_t temp = C(15.0);
     num_t bias = 0;
 
-    CHECK_INT(GTC_E_ARG, FN(init)(NULL, &TABLE, N));
-    CHECK_INT(GTC_E_ARG, FN(init)(&state, NULL, N));
+    CHECK_INT(GTC_E_ARG, FN(init)(NULL, &TABLE, PERIOD));
+    CHECK_INT(GTC_E_ARG, FN(init)(&state, NULL, PERIOD));
     CHECK_INT(GTC_E_ARG, FN(init)(&state, &TABLE, 0U));
-    CHECK_INT(GTC_E_ARG, FN(init)(&state, &TABLE, 0x100001UL));
-    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 0x100000UL));
     CHECK_INT(GTC_E_ARG, FN(sample)(NULL, &temp));
     CHECK_INT(GTC_E_ARG, FN(sample)(&state, NULL));
     CHECK_INT(GTC_E_ARG, FN(missed)(NULL, 1U));
@@ -335,9 +554,19 @@ int main(void)
     RUN(a_window_with_a_hole_still_gives_the_slope);
     RUN(a_window_with_too_many_holes_warms_again);
     RUN(a_long_window_needs_half_of_its_blocks);
-    RUN(the_gap_is_counted_no_further_than_65535);
+    RUN(the_gap_is_counted_no_further_than_a_word);
     RUN(too_many_invalid_blocks_end_in_the_constant_correction_and_a_restart);
-    RUN(a_jump_is_held_until_three_samples_agree);
+    RUN(a_first_conversion_alone_is_not_believed);
+    RUN(a_jump_is_held_until_samples_agree_for_long_enough);
+    RUN(agreement_takes_as_long_with_quick_samples);
+    RUN(after_a_loss_readings_must_agree_again);
+    RUN(a_sensor_dead_from_power_up_ends_in_the_constant_correction);
+    RUN(a_period_of_which_no_whole_number_makes_a_block_is_refused);
+    RUN(a_long_time_without_samples_is_the_same_in_one_call_and_in_many);
+    RUN(stamped_samples_are_the_samples_of_their_slots);
+    RUN(stamps_tell_lost_samples_late_ones_and_a_clock_that_is_off);
+    RUN(a_table_with_a_lead_looks_a_block_ahead);
+    RUN(no_correction_leaves_the_authority);
     RUN(suspects_that_disagree_or_are_interrupted_start_again);
     RUN(the_longer_the_gap_the_larger_the_believable_step);
     RUN(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says);

@@ -35,7 +35,7 @@ static int status_with(const table_t *from, uint_least32_t at, gtc_word_t word)
         state_t state;
 
         CHECK((FN(check)(&table) == GTC_OK) || (FN(check)(&table) == GTC_E_SELF_TEST));
-        CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+        CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     }
     return status;
 }
@@ -243,7 +243,7 @@ TEST(a_linked_table_keeps_to_the_ranges_too)
     table.calibrated = 0x80000000UL;
     table.crc = image[image_of(&table, image) - 1U].bits;
     CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
 }
 
 TEST(an_envelope_of_one_value_is_one)

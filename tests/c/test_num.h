@@ -26,6 +26,7 @@ typedef gtc_q31_state_t state_t;
 #define NARROW gtc_test_h_q31
 #define C(temperature) ((int_least32_t)((temperature) * 65536.0))
 #define MISSING GTC_TEMP_MISSING
+#define WORD_OF(member) (member)
 #define MISSING_BITS 0x80000000UL
 #else
 typedef float num_t;
@@ -38,6 +39,7 @@ typedef gtc_f32_state_t state_t;
 #define NARROW gtc_test_h_f32
 #define C(temperature) ((float)(temperature))
 #define MISSING test_nan()
+#define WORD_OF(member) ((member).value)
 #define MISSING_BITS 0x7FC00000UL
 
 static inline float test_nan(void)
@@ -49,7 +51,8 @@ static inline float test_nan(void)
 }
 #endif
 
-#define N 4UL /* samples in a block */
+#define N 4UL /* samples in a block ... */
+#define PERIOD 2500000UL /* ... of 10 s, microseconds each */
 
 static inline int same(num_t a, num_t b)
 {
@@ -70,7 +73,7 @@ static inline state_t started(void)
     state_t state;
 
     memset(&state, 0xA5, sizeof state);
-    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, N));
+    CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, PERIOD));
     return state;
 }
 

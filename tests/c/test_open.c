@@ -105,7 +105,7 @@ TEST(an_opened_table_gives_the_same_bits_as_the_compiled_one)
     CHECK((table.term_code[0] == NULL) && (table.terms == NULL));
     CHECK((memcmp(table.serial, TABLE.serial, GTC_SERIAL_WORDS * sizeof table.serial[0]) == 0)
           && (table.calibrated == TABLE.calibrated));
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     for (i = 0; i < 400; i++) {
         const num_t temp = (num_t)(C(-30) + ((C(1) / 4) * (num_t)i));
         const num_t slope = (num_t)((C(1) / 64) * (num_t)((i % 80) - 40));

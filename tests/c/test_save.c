@@ -39,7 +39,7 @@ static int restored(state_t *state, const gtc_word_t words[WORDS], uint_least32_
 
     memset(state, 0xA5, sizeof *state);
     memcpy(&before, state, sizeof before);
-    status = FN(restore)(state, &TABLE, N, words, off_blocks);
+    status = FN(restore)(state, &TABLE, PERIOD, words, off_blocks);
     CHECK(status <= 0);
     CHECK((status == GTC_OK) || (memcmp(state, &before, sizeof before) == 0));
     return status;
@@ -108,7 +108,7 @@ TEST(another_sample_rate_starts_the_window_again)
 
     walk(&state, 0, 47);
     saved(&state, words);
-    CHECK_INT(GTC_OK, FN(restore)(&state, &TABLE, N + 1U, words, 0U));
+    CHECK_INT(GTC_OK, FN(restore)(&state, &TABLE, 2UL * PERIOD, words, 0U));
     CHECK_INT(GTC_HELD, status_of(&state));
     CHECK_INT(GTC_WARMING, feed(&state, C(15), 1));
 }
@@ -164,7 +164,7 @@ TEST(a_state_of_another_table_is_refused)
 
     saved(&state, words);
     other.crc ^= 1U;
-    CHECK_INT(GTC_E_ID, FN(restore)(&state, &other, N, words, 0U));
+    CHECK_INT(GTC_E_ID, FN(restore)(&state, &other, PERIOD, words, 0U));
     CHECK(state.table == &TABLE);
 }
 
@@ -186,12 +186,12 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #if TEST_Q31
     gtc_f32_state_t other;
 
-    CHECK_INT(GTC_OK, gtc_f32_init(&other, &gtc_test_1_f32, N));
+    CHECK_INT(GTC_OK, gtc_f32_init(&other, &gtc_test_1_f32, PERIOD));
     CHECK_INT(GTC_OK, gtc_f32_save(&other, words));
 #else
     gtc_q31_state_t other;
 
-    CHECK_INT(GTC_OK, gtc_q31_init(&other, &gtc_test_1_q31, N));
+    CHECK_INT(GTC_OK, gtc_q31_init(&other, &gtc_test_1_q31, PERIOD));
     CHECK_INT(GTC_OK, gtc_q31_save(&other, words));
 #endif
     CHECK_INT(GTC_E_LAYOUT, restored(&state, words, 0U));
@@ -210,11 +210,11 @@ TEST(bad_arguments_are_refused)
     CHECK_INT(GTC_E_ARG, FN(save)(NULL, words));
     CHECK_INT(GTC_E_ARG, FN(save)(&state, NULL));
     CHECK_INT(GTC_E_ARG, FN(save)(&none, words));
-    CHECK_INT(GTC_E_ARG, FN(restore)(NULL, &TABLE, N, words, 0U));
-    CHECK_INT(GTC_E_ARG, FN(restore)(&state, NULL, N, words, 0U));
-    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, N, NULL, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(NULL, &TABLE, PERIOD, words, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(&state, NULL, PERIOD, words, 0U));
+    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, PERIOD, NULL, 0U));
     CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, 0U, words, 0U));
-    CHECK_INT(GTC_E_LAYOUT, FN(restore)(&state, &unusable, N, words, 0U));
+    CHECK_INT(GTC_E_LAYOUT, FN(restore)(&state, &unusable, PERIOD, words, 0U));
 }
 
 int main(void)

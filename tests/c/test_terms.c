@@ -7,7 +7,7 @@ static state_t started_with(const table_t *table)
 {
     state_t state;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, table, N));
+    CHECK_INT(GTC_OK, FN(init)(&state, table, PERIOD));
     return state;
 }
 
@@ -29,6 +29,14 @@ static int samples(state_t *state, num_t temp, num_t supply, int n)
         status = sample(state, temp, supply);
     }
     return status;
+}
+
+static num_t map_with(const table_t *table, num_t temp)
+{
+    num_t bias = 0;
+
+    CHECK(FN(map)(table, temp, 0, &bias) >= 0);
+    return bias;
 }
 
 TEST(tables_with_terms_pass_their_self_test)
@@ -65,20 +73,6 @@ TEST(an_auxiliary_channel_is_added_and_held_when_it_is_missing)
     CHECK_INT(GTC_HELD, status_of(&b));
     (void)samples(&b, C(15.0), C(13.0), 8);
     CHECK_INT(GTC_OK, status_of(&b));
-}
-
-TEST(without_a_first_auxiliary_sample_nothing_is_added)
-{
-    state_t a = started_with(&TERMS);
-    state_t b = started_with(&TERMS);
-
-    CHECK_INT(GTC_WARMING | GTC_HELD, sample(&a, C(15.0), MISSING));
-    CHECK_INT(GTC_WARMING, sample(&b, C(15.0), C(12.0)));
-    CHECK(same(bias_of(&a), bias_of(&b)));
-    /* Channel first, temperature later. */
-    a = started_with(&TERMS);
-    CHECK_INT(GTC_HELD, samples(&a, MISSING, C(12.0), 9));
-    CHECK_INT(GTC_WARMING, sample(&a, C(15.0), MISSING));
 }
 
 TEST(a_play_moves_only_when_the_temperature_has_gone_its_way)
@@ -174,8 +168,8 @@ TEST(memories_and_plays_outlast_a_time_without_power)
         (void)sample(&a, C(15.0) + (STEP * (num_t)(4 * k)), C(12.0));
     }
     CHECK_INT(GTC_OK, FN(save)(&a, words));
-    CHECK_INT(GTC_OK, FN(restore)(&soon, &TERMS, N, words, 3U));
-    CHECK_INT(GTC_OK, FN(restore)(&late, &TERMS, N, words, 100000UL));
+    CHECK_INT(GTC_OK, FN(restore)(&soon, &TERMS, PERIOD, words, 3U));
+    CHECK_INT(GTC_OK, FN(restore)(&late, &TERMS, PERIOD, words, 100000UL));
     CHECK_INT(GTC_HELD, status_of(&soon));
     CHECK((sample(&soon, C(12.0), C(12.0)) & GTC_WARMING) != 0);
     (void)sample(&late, C(12.0), C(12.0));
@@ -194,81 +188,237 @@ TEST(times_without_power_add_up)
     state_t a = started_with(&TERMS);
 
     CHECK_INT(GTC_OK, FN(save)(&a, words));
-    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 5U));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, PERIOD, words, 5U));
     CHECK_INT(GTC_OK, FN(save)(&a, words));
-    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 6U));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, PERIOD, words, 6U));
     CHECK_INT(11, a.off_blocks);
     CHECK_INT(GTC_OK, FN(save)(&a, words));
-    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 0xFFFFFFFAUL));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, PERIOD, words, 0xFFFFFFFAUL));
     CHECK(a.off_blocks == 0xFFFFFFFFUL);
     (void)sample(&a, C(12.0), C(12.0));
     CHECK_INT(GTC_OK, FN(save)(&a, words));
-    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, N, words, 6U));
+    CHECK_INT(GTC_OK, FN(restore)(&a, &TERMS, PERIOD, words, 6U));
     CHECK_INT(6, a.off_blocks);
 }
 
-/* No block ends before the first believed temperature; the sum of the channel must not grow for ever. */
-TEST(a_channel_is_not_summed_without_end_where_the_temperature_is_missing)
-{
-    state_t state = started_with(&TERMS);
+/* ---- what a sensor of a channel can deliver ---- */
 
-    (void)samples(&state, MISSING, C(13.0), 100);
-    CHECK_INT(N, state.channel_valid[3]);
-    CHECK_INT(GTC_WARMING, sample(&state, C(15.0), C(12.0)));
+/* Edges of the guard of the supply: 9 and 15 V; fallback 12.5 V after 4 blocks. */
+TEST(a_reading_beyond_its_range_is_taken_as_the_edge_and_said)
+{
+    static const double readings[4] = {0.0, -300.0, 4095.0, 20000.0};
+    int k;
+
+    for (k = 0; k < 4; k++) {
+        state_t a = started_with(&TERMS);
+        state_t b = started_with(&TERMS);
+        const num_t edge = (readings[k] < 9.0) ? C(9.0) : C(15.0);
+
+        (void)samples(&a, C(15.0), C(12.0), 401);
+        (void)samples(&b, C(15.0), C(12.0), 401);
+        CHECK_INT(GTC_OK, status_of(&a));
+        (void)samples(&a, C(15.0), C(readings[k]), 9);
+        (void)samples(&b, C(15.0), edge, 9);
+        CHECK_INT(GTC_CLAMPED, status_of(&a));
+        CHECK_INT(GTC_OK, status_of(&b));
+        CHECK(same(bias_of(&a), bias_of(&b)));
+        (void)samples(&a, C(15.0), C(12.0), 9);
+        CHECK_INT(GTC_OK, status_of(&a));
+    }
 }
 
 #if !TEST_Q31
-/* A sum of such samples could be infinite, and the correction no number. */
-TEST(a_sample_of_a_channel_that_no_sensor_gives_is_a_missing_one)
+TEST(no_reading_makes_a_correction_that_is_no_number)
 {
-    state_t a = started_with(&TERMS);
-    state_t b = started_with(&TERMS);
+    static const float readings[4] = {1.0e20F, -3.0e38F, 3.0e38F, 1.0e-40F};
     int k;
 
-    (void)samples(&a, C(15.0), C(12.0), (int)N);
-    (void)samples(&b, C(15.0), C(12.0), (int)N);
-    for (k = 0; k < 40; k++) {
-        (void)sample(&a, C(15.0), ((k % 2) != 0) ? 3.0e38F : -3.0e38F);
-        (void)sample(&b, C(15.0), MISSING);
-        CHECK(same(bias_of(&a), bias_of(&b)));
+    for (k = 0; k < 4; k++) {
+        state_t state = started_with(&TERMS);
+        const num_t low = TERMS.authority[0].value;
+        const num_t high = TERMS.authority[1].value;
+        int j;
+
+        for (j = 0; j < 40; j++) {
+            (void)sample(&state, C(15.0), readings[(j + k) % 4]);
+            CHECK((bias_of(&state) >= low) && (bias_of(&state) <= high));
+        }
+        CHECK((status_of(&state) & GTC_CLAMPED) != 0);
     }
 }
 #endif
 
+TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
+{
+    state_t a = started_with(&TERMS);
+    state_t b = started_with(&TERMS);
+
+    (void)samples(&a, C(15.0), C(14.0), 401);
+    (void)samples(&b, C(15.0), C(12.5), 401);
+    (void)samples(&a, C(15.0), MISSING, (int)(4U * N));
+    CHECK_INT(GTC_HELD, status_of(&a));
+    CHECK(!same(bias_of(&a), bias_of(&b)));
+    (void)samples(&a, C(15.0), MISSING, (int)N);
+    (void)samples(&b, C(15.0), C(12.5), (int)(5U * N));
+    CHECK_INT(GTC_HELD | GTC_CHANNEL_LOST, status_of(&a));
+    CHECK(same(bias_of(&a), bias_of(&b)));
+    (void)samples(&a, C(15.0), C(12.5), (int)N);
+    CHECK_INT(GTC_OK, status_of(&a));
+}
+
+TEST(a_channel_that_never_came_is_taken_as_its_fallback)
+{
+    state_t a = started_with(&TERMS);
+    state_t b = started_with(&TERMS);
+
+    (void)samples(&a, C(15.0), MISSING, 41);
+    (void)samples(&b, C(15.0), C(12.5), 41);
+    CHECK(same(bias_of(&a), bias_of(&b)));
+    CHECK_INT(GTC_HELD | GTC_CHANNEL_LOST, status_of(&a));
+}
+
+/* ---- terms see what the map sees ---- */
+
+/* The test table's terms whose readings must agree for 10 s, and hold for two blocks. */
+static table_t agreeing(gtc_word_t guards[2U * GTC_GUARD_WORDS], uint_least32_t agree_us)
+{
+    table_t table = TERMS;
+
+    memcpy(guards, TERMS.guards, 2U * GTC_GUARD_WORDS * sizeof guards[0]);
+    guards[4].bits = agree_us;
+    table.guards = guards;
+    return table;
+}
+
+TEST(a_wrong_first_conversion_leaves_no_trace_in_the_terms)
+{
+    static const double wrong[2] = {85.0, -90.0};
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    const table_t table = agreeing(guards, 1000000UL);
+    int k;
+
+    for (k = 0; k < 2; k++) {
+        state_t a = started_with(&table);
+        state_t b = started_with(&table);
+
+        (void)sample(&a, C(wrong[k]), C(12.0));
+        (void)sample(&b, MISSING, C(12.0));
+        (void)samples(&a, C(15.0), C(12.0), 400);
+        (void)samples(&b, C(15.0), C(12.0), 400);
+        CHECK(same(bias_of(&a), bias_of(&b)));
+        CHECK(same(C(15.0), a.term[1][0]));
+    }
+}
+
+TEST(terms_begin_again_with_the_map)
+{
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    const table_t table = agreeing(guards, 5000000UL);
+    state_t a = started_with(&table);
+
+    (void)samples(&a, C(15.0), C(12.0), 100);
+    (void)samples(&a, C(45.0), C(12.0), 3);
+    CHECK(same(C(45.0), a.term[0][0]));
+    CHECK(same(C(45.0), a.term[1][0]));
+    CHECK((FN(missed)(&a, 100UL * N) & GTC_FALLBACK) != 0);
+    (void)samples(&a, C(20.0), C(12.0), 3);
+    CHECK(same(C(20.0), a.term[0][0]));
+    CHECK(same(C(20.0), a.term[1][0]));
+}
+
+TEST(three_samples_of_150_degrees_are_nothing_and_an_hour_of_them_is_the_edge)
+{
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    const table_t table = agreeing(guards, 10000000UL);
+    state_t a = started_with(&table);
+    state_t b = started_with(&table);
+
+    (void)samples(&a, C(15.0), C(12.0), 100);
+    (void)samples(&b, C(15.0), C(12.0), 100);
+    (void)samples(&a, C(150.0), C(12.0), 3);
+    (void)samples(&b, MISSING, C(12.0), 3);
+    CHECK(same(bias_of(&a), bias_of(&b)));
+    (void)samples(&a, C(150.0), C(12.0), 360);
+    CHECK((status_of(&a) & GTC_CLAMPED) != 0);
+    CHECK(same(C(60.0), a.term[0][0]));
+    CHECK(same(C(60.0), a.term[1][0]));
+}
+
+/* What all terms together add keeps to what they may. */
+TEST(effects_are_bounded_and_that_is_said)
+{
+    table_t table = TERMS;
+    state_t a;
+    state_t b = started_with(&TERMS);
+
+    WORD_OF(table.effect[0]) = 0;
+    WORD_OF(table.effect[1]) = 0;
+    a = started_with(&table);
+    (void)sample(&a, C(15.0), C(14.0));
+    (void)sample(&b, C(15.0), C(14.0));
+    CHECK((status_of(&a) & GTC_CLAMPED) != 0);
+    CHECK_INT(GTC_WARMING, status_of(&b));
+    CHECK(same(map_with(&TERMS, C(15.0)), bias_of(&a)));
+    CHECK(!same(bias_of(&a), bias_of(&b)));
+}
+
 #if TEST_Q31
-/* Differences within a block of up to 2^32. */
+/* A guard that lets every reading of the supply pass. */
+static table_t open_channel(gtc_word_t guards[2U * GTC_GUARD_WORDS])
+{
+    table_t table = TERMS;
+
+    memcpy(guards, TERMS.guards, 2U * GTC_GUARD_WORDS * sizeof guards[0]);
+    guards[8].integer = -0x7FFFFFFF;
+    guards[9].integer = 0x7FFFFFFF;
+    guards[10].integer = 0x7FFFFFFF;
+    guards[11].integer = 0x7FFFFFFF;
+    table.guards = guards;
+    table.authority[0] = -0x7FFFFFFF;
+    table.authority[1] = 0x7FFFFFFF;
+    table.effect[0] = -0x7FFFFFFF;
+    table.effect[1] = 0x7FFFFFFF;
+    return table;
+}
+
+/* Differences within a block of 2^31. */
 TEST(an_auxiliary_channel_has_the_mean_of_its_extremes)
 {
-    state_t state = started_with(&TERMS);
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    const table_t table = open_channel(guards);
+    state_t state = started_with(&table);
 
     (void)samples(&state, C(15.0), 0, (int)N);
-    (void)sample(&state, C(15.0), -0x7FFFFFFF);
-    (void)samples(&state, C(15.0), 0x7FFFFFFF, (int)N - 1);
+    (void)sample(&state, C(15.0), -0x40000000);
+    (void)samples(&state, C(15.0), 0x40000000, (int)N - 1);
     (void)sample(&state, C(15.0), 0);
-    CHECK_INT(0x40000000, state.term[3][0]);
+    CHECK_INT(0x20000000, state.input[1].mean);
 }
 
 TEST(what_terms_add_saturates)
 {
-    table_t table = TERMS;
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    table_t table = open_channel(guards);
     gtc_word_t terms[4 * GTC_TERM_WORDS];
     state_t state;
+    int k;
 
     memcpy(terms, TERMS.terms, sizeof terms);
     terms[(3 * GTC_TERM_WORDS) + 2].integer = 0x3FFFFFFF; /* slope of the auxiliary term */
     table.terms = terms;
     state = started_with(&table);
     (void)sample(&state, C(15.0), C(30000.0));
-    CHECK_INT(0x7FFFFFFF, bias_of(&state));
+    CHECK_INT(0x7FFFFFFF + map_with(&table, C(15.0)), bias_of(&state));
+    CHECK((status_of(&state) & GTC_CLAMPED) != 0);
     state = started_with(&table);
     (void)sample(&state, C(15.0), C(-30000.0));
     CHECK_INT(-0x7FFFFFFF, bias_of(&state));
     /* And so does a slope that a memory makes. */
     terms[2 + 2].integer = 0x7FFFFFFF;
     state = started_with(&table);
-    (void)sample(&state, C(15.0), C(12.0));
-    CHECK((FN(missed)(&state, 1000UL) & GTC_FALLBACK) != 0);
-    (void)samples(&state, C(190.0), C(12.0), 3);
+    for (k = 0; k < 9; k++) {
+        (void)sample(&state, C(15.0) + (k * C(0.5)), C(12.0));
+    }
     CHECK((status_of(&state) & GTC_CLAMPED) != 0);
 }
 #endif
@@ -279,14 +429,14 @@ TEST(terms_without_their_code_or_channel_are_refused)
     state_t state;
 
     table.term_code[1] = NULL;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
     table.term_code[1] = TERMS.term_code[0];
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
     table = TERMS;
     table.n_channels = 1U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
     table.n_channels = GTC_MAX_TERMS + 2U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, N));
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
 }
 
 int main(void)
@@ -294,11 +444,16 @@ int main(void)
     RUN(tables_with_terms_pass_their_self_test);
     RUN(at_rest_memories_and_plays_come_to_rest_and_warm_up_fades);
     RUN(an_auxiliary_channel_is_added_and_held_when_it_is_missing);
-    RUN(a_channel_is_not_summed_without_end_where_the_temperature_is_missing);
+    RUN(a_reading_beyond_its_range_is_taken_as_the_edge_and_said);
 #if !TEST_Q31
-    RUN(a_sample_of_a_channel_that_no_sensor_gives_is_a_missing_one);
+    RUN(no_reading_makes_a_correction_that_is_no_number);
 #endif
-    RUN(without_a_first_auxiliary_sample_nothing_is_added);
+    RUN(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own);
+    RUN(a_channel_that_never_came_is_taken_as_its_fallback);
+    RUN(a_wrong_first_conversion_leaves_no_trace_in_the_terms);
+    RUN(terms_begin_again_with_the_map);
+    RUN(three_samples_of_150_degrees_are_nothing_and_an_hour_of_them_is_the_edge);
+    RUN(effects_are_bounded_and_that_is_said);
     RUN(a_play_moves_only_when_the_temperature_has_gone_its_way);
     RUN(holds_and_fallback_step_the_terms_too);
     RUN(a_harmonic_repeats_itself_after_its_period);

@@ -19,7 +19,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 /* A claim that must hold for every input. */
 #define CLAIM(claim) ((claim) ? (void)0 : (printf("%s:%d: not true: %s\n", __FILE__, __LINE__, #claim), abort()))
 
-#define REMARKS (GTC_WARMING | GTC_CLAMPED | GTC_UNCOVERED | GTC_HELD | GTC_FALLBACK)
+#define REMARKS (GTC_WARMING | GTC_CLAMPED | GTC_UNCOVERED | GTC_HELD | GTC_FALLBACK | GTC_CHANNEL_LOST)
 
 typedef struct {
     const uint8_t *data;
@@ -67,6 +67,12 @@ static inline const table_t *next_table(stream_t *in)
     static const table_t *const tables[4] = {&TABLE, &BANK, &TERMS, &NARROW};
 
     return tables[next_byte(in) % 4U];
+}
+
+/* A correction is one that the table may give. */
+static inline int is_governed(const table_t *table, num_t x)
+{
+    return ((x >= WORD_OF(table->authority[0])) && (x <= WORD_OF(table->authority[1]))) ? 1 : 0;
 }
 
 /* A correction is a number: not NaN, not infinite, not the mark of a missing one. */

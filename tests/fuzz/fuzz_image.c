@@ -86,7 +86,9 @@ static void walk(stream_t *in, const table_t *table)
     FN(angle_t) sum;
     uint_least32_t k;
 
-    CLAIM(FN(init)(&state, table, n) == GTC_OK);
+    if (FN(init)(&state, table, (table->block_us >= n) ? (table->block_us / n) : 1U) != GTC_OK) {
+        return; /* a block of so few microseconds */
+    }
     for (k = 0U; k < 12U; k++) {
         num_t channels[GTC_MAX_TERMS + 1] = {0};
         uint_least32_t i;
@@ -97,7 +99,7 @@ static void walk(stream_t *in, const table_t *table)
         }
         status = ((k % 6U) == 5U) ? FN(missed)(&state, next_byte(in) % 64U) : FN(sample)(&state, channels);
         CLAIM((status >= 0) && ((status & ~REMARKS) == 0));
-        CLAIM((FN(bias)(&state, &result) >= 0) && is_number(result));
+        CLAIM((FN(bias)(&state, &result) >= 0) && is_number(result) && is_governed(table, result));
     }
     memset(&sum, 0, sizeof sum);
     result = some_number(in);
@@ -105,7 +107,7 @@ static void walk(stream_t *in, const table_t *table)
         CLAIM(is_number(result));
     }
     CLAIM(FN(save)(&state, saved) == GTC_OK);
-    CLAIM(FN(restore)(&state, table, n, saved, next_byte(in) % 3U) == GTC_OK);
+    CLAIM(FN(restore)(&state, table, state.period_us, saved, next_byte(in) % 3U) == GTC_OK);
     CLAIM((FN(missed)(&state, 9U) >= 0) && (FN(bias)(&state, &result) >= 0) && is_number(result));
 }
 
@@ -133,7 +135,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             const int status = FN(map)(&table, some_number(&in), some_number(&in), &bias);
 
             CLAIM((status == GTC_E_ARG) || ((status & ~(GTC_CLAMPED | GTC_UNCOVERED)) == 0));
-            CLAIM(is_number(bias));
+            CLAIM(is_number(bias) && ((status < 0) || is_governed(&table, bias)));
         }
         walk(&in, &table);
     }

@@ -6,15 +6,17 @@
 
 #define WORDS GTC_SAVE_WORDS
 
-static void walked(stream_t *in, state_t *state)
+static void walked(uint_least32_t samples, state_t *state)
 {
     uint_least32_t i;
 
-    for (i = next_byte(in); i > 0U; i--) {
+    for (i = samples; i > 0U; i--) {
         num_t channels[3] = {0, 0, 0};
+        num_t bias = 0;
 
         channels[0] = C(10) + ((C(1) / 64) * (num_t)i);
         CLAIM(FN(sample)(state, channels) >= 0);
+        CLAIM((FN(bias)(state, &bias) >= 0) && is_governed(state->table, bias));
     }
 }
 
@@ -36,8 +38,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     state_t state;
     int status;
 
-    CLAIM(FN(init)(&state, table, N) == GTC_OK);
-    walked(&in, &state);
+    CLAIM(FN(init)(&state, table, PERIOD) == GTC_OK);
+    walked(next_byte(&in), &state);
     CLAIM(FN(save)(&state, words) == GTC_OK);
     memcpy(spoiled, words, sizeof words);
     spoil(&in, spoiled, WORDS);
@@ -46,12 +48,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     memset(&before, 0xA5, sizeof before);
     memcpy(&state, &before, sizeof state);
-    status = FN(restore)(&state, table, N, spoiled, off_blocks);
+    status = FN(restore)(&state, table, PERIOD, spoiled, off_blocks);
     if (status < 0) {
         CLAIM(memcmp(&state, &before, sizeof state) == 0);
         CLAIM((status == GTC_E_IMAGE) || (status == GTC_E_LAYOUT) || (status == GTC_E_ID));
     } else {
         CLAIM((status == GTC_OK) && ((kind == 1U) || (memcmp(words, spoiled, sizeof words) == 0)));
+        walked(40U, &state);
         CLAIM(FN(save)(&state, words) == GTC_OK);
     }
     return 0;

@@ -16,7 +16,7 @@ static void save_and_restore(state_t *state)
     gtc_word_t again[GTC_SAVE_WORDS];
 
     CLAIM(FN(save)(state, words) == GTC_OK);
-    CLAIM(FN(restore)(state, state->table, state->samples_per_block, words, 0U) == GTC_OK);
+    CLAIM(FN(restore)(state, state->table, state->period_us, words, 0U) == GTC_OK);
     CLAIM(FN(save)(state, again) == GTC_OK);
     CLAIM(memcmp(words, again, sizeof words) == 0);
 }
@@ -28,7 +28,7 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
     num_t result = C(77);
     int status;
 
-    switch (next_byte(in) % 8U) {
+    switch (next_byte(in) % 9U) {
     case 0:
         check_status(FN(missed)(state, next_word(in)));
         break;
@@ -45,6 +45,11 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
         channels[1] = next_number(in);
         check_status(FN(sample)(state, channels));
         break;
+    case 4: /* at any time */
+        channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
+        channels[1] = next_number(in);
+        check_status(FN(sample_at)(state, next_word(in), channels));
+        break;
     default: /* something plausible */
         channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
         channels[1] = channels[0];
@@ -52,7 +57,7 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
         break;
     }
     check_status(FN(bias)(state, &result));
-    CLAIM(is_number(result));
+    CLAIM(is_number(result) && is_governed(state->table, result));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -68,10 +73,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (n == 0U) {
         const uint_least32_t any = next_word(&in);
 
-        CLAIM(FN(init)(&state, table, any) == (((any >= 1U) && (any <= 0x100000U)) ? GTC_OK : GTC_E_ARG));
+        const int status = FN(init)(&state, table, any);
+
+        CLAIM((any == 0U) ? (status == GTC_E_ARG) : ((status == GTC_OK) || (status == GTC_E_PERIOD)));
         return 0;
     }
-    CLAIM(FN(init)(&state, table, n) == GTC_OK);
+    CLAIM(FN(init)(&state, table, table->block_us / n) == GTC_OK);
     while (in.left > 0U) {
         step(&in, &state, &sum);
     }

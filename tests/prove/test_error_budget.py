@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from emitted import GOLDEN
+from gyrotc.frontend.believe import Guarded
 from gyrotc.frontend.follow import Settings, follow
 from gyrotc.frontend.numbers import F32, Q31
 from gyrotc.model import Model, load_model
@@ -40,7 +41,8 @@ def _followed(numeric: str, words: Floats, n: int, blocks: int) -> tuple[Floats,
     there = np.isfinite(words)
     x[there] = arithmetic.numbers(words[there] / unit)
     limit = arithmetic.numbers(np.array([1000.0 / unit]))[0]
-    steps = follow(arithmetic, x, Settings(n, blocks, BLOCKS, 0, limit, limit))
+    guard = Guarded(-limit, limit, limit, limit, 0, 0, BLOCKS)
+    steps = follow(arithmetic, x, Settings(n, 1, n, blocks, guard, BLOCKS))
     closed = ~steps.is_restart
     n_closed = int(closed.sum())
     slope = steps.slope[closed] * unit

@@ -1,6 +1,6 @@
-"""Rounding: one Gaussian term in both arithmetics (Gappa), the shifts of fixed point (Z3).
+"""Rounding: one Gaussian term in both arithmetics (Gappa), the shifts of fixed point; the authority (Z3).
 
-Both prove the statements that the target does, for every argument.
+All prove the statements that the target does, for every argument.
 """
 
 from __future__ import annotations
@@ -72,3 +72,25 @@ def test_another_rounding_is_not_proved(statement: str, wrong: str, which: int) 
     text = (HERE / "smt" / "rounding_shift.smt2").read_text()
     assert text.count(statement) == 1
     assert _z3(text.replace(statement, wrong))[which] == "sat"
+
+
+@pytest.mark.tool("z3")
+def test_every_correction_lies_within_the_authority(results: Results) -> None:
+    assert _z3((HERE / "smt" / "authority.smt2").read_text()) == ["unsat", "unsat"]
+    claim = "a correction lies within the table's authority, of any state (not a number, too) and any table"
+    results.add("rounding", {"claim": claim, "tool": "Z3", "proved": "for all arguments"})
+
+
+@pytest.mark.tool("z3")
+@pytest.mark.parametrize(
+    ("statement", "wrong", "which"),
+    [
+        ("(not (fp.geq x low))", "(fp.lt x low)", 0),  # what is no number would pass
+        ("(not (bvsge y (wide least)))", "(not (bvuge y (wide least)))", 1),
+    ],
+)
+def test_another_bound_is_not_proved(statement: str, wrong: str, which: int) -> None:
+    text = (HERE / "smt" / "authority.smt2").read_text()
+    assert text.count(statement) == 1
+    found = _z3(text.replace(statement, wrong))
+    assert found[which] == "sat"

@@ -55,7 +55,7 @@ PARTS = {
             "f32": "gtc_f32_mean,gtc_f32_window_slope,gtc_f32_is_missing",
             "q31": "gtc_q31_mean,gtc_q31_window_slope",
         },
-        checks=15,
+        checks=17,
     ),
     "memory": Part("follow", "terms", left=2),
     "memories, play, warm-up": Part("terms", "terms", precision=7, contracts=_TERMS, checks=1),

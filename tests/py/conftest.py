@@ -58,6 +58,7 @@ def model_dict() -> dict[str, Any]:
         ],
         "terms": [],
         "fallback_dph": 0.007,
+        "effects_dph": None,
         "rezero_dph": 0.0,
         "hold_blocks": 30,
         "stuck_s": 0.0,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gyrotc.frontend import period_us
 from gyrotc.reference.table import ARRAYS, LAYOUT, Table, Words
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -72,7 +73,7 @@ class Runtime:
         size = self._shim(table, "state_size", ctypes.c_size_t)()
         state = ctypes.create_string_buffer(size + 16)
         started = self._function(table, "init")(
-            state, ctypes.byref(struct), ctypes.c_uint32(samples_per_block)
+            state, ctypes.byref(struct), ctypes.c_uint32(period_us(table.block_us, samples_per_block))
         )
         assert started == 0, started
         channels = np.ascontiguousarray(channels, dtype=np.uint32)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from conftest import ROOT
+from gyrotc.frontend import period_us
 from gyrotc.model import Model
 from gyrotc.reference.table import Table, Words
 from libc_build import Runtime
@@ -68,7 +69,12 @@ class Device:
 
     def init(self, state: Any, samples_per_block: int) -> None:
         assert (
-            self.function("init")(state, ctypes.byref(self.struct), ctypes.c_uint32(samples_per_block)) == 0
+            self.function("init")(
+                state,
+                ctypes.byref(self.struct),
+                ctypes.c_uint32(period_us(self.table.block_us, samples_per_block)),
+            )
+            == 0
         )
 
     def save(self, state: Any) -> Words:
@@ -83,7 +89,7 @@ class Device:
         status = self.function("restore")(
             state,
             ctypes.byref(self.struct),
-            ctypes.c_uint32(samples_per_block),
+            ctypes.c_uint32(period_us(self.table.block_us, samples_per_block)),
             _pointer(words),
             ctypes.c_uint32(off_blocks),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gyrotc.model import Coverage, Envelope, Model, Network, Scale, Term
+from gyrotc.model import Coverage, Envelope, Guard, Model, Network, Scale, Term
 
 
 def random_model(seed: int, **changes: Any) -> Model:
@@ -47,6 +47,8 @@ def random_model(seed: int, **changes: Any) -> Model:
         ),
         "fallback_dph": float(rng.normal(0.0, 0.01)),
         "hold_blocks": int(rng.integers(1, 6)),
+        "agree_s": float(rng.choice([0.0, 1.0, 2.5, 15.0])),
+        "guards": random_guards(seed) if rng.random() < 0.7 else {},
         "stuck_s": float(rng.choice([0.0, 0.0, 6.0, 40.0])),
         "max_step_c": float(rng.uniform(0.05, 1.0)),
         "max_rate_c_per_min": 6.0 * r,
@@ -56,6 +58,24 @@ def random_model(seed: int, **changes: Any) -> Model:
         "seed": seed,
     }
     return Model(**(values | changes))
+
+
+def random_guards(seed: int) -> dict[str, Guard]:
+    """Guards of the auxiliary channels of `random_terms`, some of them tighter than `random_channels` are."""
+    rng = np.random.default_rng([seed, 3])
+    return {
+        name: Guard(
+            low=12.0 - float(rng.uniform(0.05, 3.0)),
+            high=12.0 + float(rng.uniform(0.05, 40.0)),
+            max_step=float(rng.choice([0.02, 0.5, 1e9])),
+            max_rate_per_min=float(rng.choice([0.0, 0.5, 60.0])),
+            agree_s=float(rng.choice([0.0, 1.0, 20.0])),
+            stuck_s=float(rng.choice([0.0, 30.0])),
+            missing_s=float(rng.choice([10.0, 40.0, 1000.0])),
+            fallback=12.0,
+        )
+        for name in ("supply_v", "magnetic_ut")
+    }
 
 
 def random_terms(seed: int) -> tuple[Term, ...]:
@@ -152,7 +172,7 @@ def random_channels(model: Model, seed: int, rows: int) -> np.ndarray:
     for column in channels.T:
         for _ in range(rows // 60):
             at, length = int(rng.integers(0, rows)), int(rng.integers(1, 60))
-            column[at : at + length] = rng.choice([np.nan, 40.0])
+            column[at : at + length] = rng.choice([np.nan, 40.0, 12.5, 0.0, 1e20])
     return channels
 
 

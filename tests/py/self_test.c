@@ -68,7 +68,7 @@ static void history(const subject_t *subject)
     long t = subject->t_low + subject->t_span / 2;
     int k;
 
-    take_word((uint_least32_t)gtc_f32_init(&state, subject->table, 3U));
+    take_word((uint_least32_t)gtc_f32_init(&state, subject->table, subject->table->block_us / 3U));
     for (k = 0; k < SAMPLES; k++) {
         float channels[8] = {0.0F};
         float bias = 0.0F;

@@ -17,7 +17,6 @@ from gyrotc.judge.advice import advice_of
 from gyrotc.judge.changes import earlier_models
 from gyrotc.judge.check import CheckResult, Doubt, check
 from gyrotc.judge.doubts import __file__ as doubts_file
-from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
 
@@ -239,7 +238,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
         curve = -curve if k == reversed_unit else curve
         inside = (t >= -40.0) & (t <= 60.0)
         held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
-        entries.append(FleetEntry(name=f"u{k}", axis=None, status="done", curve=tuple(held)))
+        entries.append({"name": f"u{k}", "axis": None, "findings": [], "facts": {"curve": held}})
     assert turned(entries) == ([] if reversed_unit is None else ["u3"])
 
 
@@ -249,9 +248,7 @@ def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
     g = np.random.default_rng(2)
     for _ in range(200):
         entries = [
-            FleetEntry(
-                name=f"u{k}", axis=None, status="done", curve=tuple(g.normal(0.0, 1.0, 38).cumsum().tolist())
-            )
+            {"name": f"u{k}", "axis": None, "facts": {"curve": g.normal(0.0, 1.0, 38).cumsum().tolist()}}
             for k in range(12)
         ]
         assert turned(entries) == []

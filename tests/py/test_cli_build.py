@@ -133,7 +133,7 @@ def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyr
     assert evaluation["model"]["method"] == "constant" and evaluation["generalises"] is False
     assert "does_not_generalise" in [f["id"] for f in evaluation["findings"]]
     assert "record the same cycle at least twice more" in done.stdout
-    assert "What was tried" in (tmp_path / "r" / "report.html").read_text("utf-8")
+    assert "Beside simpler corrections" in (tmp_path / "r" / "report.html").read_text("utf-8")
 
 
 def test_an_existing_folder_of_somebody_else_is_not_replaced(

@@ -7,7 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.frontend import F32, Blocks, Settings, expand_missed, missed_before, run_blocks, samples_per_block
+from gyrotc.frontend import (
+    F32,
+    Blocks,
+    Guarded,
+    Settings,
+    expand_missed,
+    missed_before,
+    run_blocks,
+    samples_per_block,
+)
 
 
 def recording(temperature: np.ndarray, time_s: np.ndarray | None = None, *, from_s: float = 0.0) -> Any:
@@ -68,7 +77,8 @@ def test_a_gap_in_time_is_missing_samples() -> None:
 
 
 def test_a_long_gap_is_shortened_by_whole_blocks() -> None:
-    settings = Settings(4, 3, 2, 1, 0, np.float32(1.0), np.float32(1.0))
+    guard = Guarded(-90.0, 200.0, np.float32(1.0), np.float32(1.0), 0, 0, 5)
+    settings = Settings(4, 1, 4, 3, guard, 5)
     assert expand_missed(np.array([0, 3, 31, 32, 35, 10**9 + 3]), settings).tolist() == [0, 3, 31, 28, 31, 31]
 
 

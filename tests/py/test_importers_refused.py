@@ -406,3 +406,43 @@ def test_a_short_file_is_read(rows: int, above: int, tmp_path: Path, run: Run) -
     status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 0, error
     assert load(tmp_path / "R").runs[0].n_rows == rows
+
+
+def test_commas_between_columns_and_in_decimals_are_told(tmp_path: Path, run: Run) -> None:
+    text = "\n".join(["time_s,temp_c,rate_dph", *(f"{k},0,20,{k},4,{k % 7}" for k in range(60))])
+    (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 2
+    assert "line 1: 3 names above rows of 6 cells" in error
+
+
+def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path: Path, run: Run) -> None:
+    """Before: read as hours and minutes, sixty times too slow, in silence."""
+    text = "\n".join(
+        ["Time,temp_c,rate_dph", *(f"{k // 6:02d}:{k % 6}0,20.{k % 10},{k % 7}" for k in range(120))]
+    )
+    (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 2
+    assert '--time-format "%H:%M" or --time-format "%M:%S"' in error
+    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--time-format", "%M:%S")[0] == 0
+    assert load(tmp_path / "R").runs[0].row_period_s == 10.0
+
+
+def test_a_time_that_counts_on_beyond_a_day_is_read(tmp_path: Path, run: Run) -> None:
+    rows = (f"{k // 6}:{k % 6}0:00,20.{k % 10},{k % 7}" for k in range(300))
+    (tmp_path / "a.csv").write_text("\n".join(["Elapsed,temp_c,rate_dph", *rows]) + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 0, error
+    assert load(tmp_path / "R").runs[0].rows().time_s[-1] == 299 * 600.0
+
+
+def test_a_column_of_text_that_should_hold_numbers_is_named(tmp_path: Path, run: Run) -> None:
+    rows = (f"{10 * k};20,{10 + k % 80};1.{400 + k}" for k in range(100))
+    (tmp_path / "a.csv").write_text("\n".join(["time_s;temp_c;rate_dph", *rows]) + "\n", "utf-8")
+    command = ("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    status, _, error = run(*command)
+    assert status == 2
+    assert "temp_c holds '20,29'" in error
+    assert run(*command, "--csv", "decimal=,", "--csv", "thousands=.")[0] == 0
+    assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1400.0

@@ -17,7 +17,7 @@ int main(void)
     gtc_q31_state_t state;
     const int_least32_t channels[3] = {{0, 0, 0}};
 
-    return (gtc_q31_init(&state, &{table}_q31, 4UL) == 0) && (gtc_q31_sample(&state, channels) >= 0) ? 0 : 1;
+    return (gtc_q31_init(&state, &{table}_q31, 2500000UL) == 0) && (gtc_q31_sample(&state, channels) >= 0) ? 0 : 1;
 }}
 """
 ALL = {"memory", "play", "warm_up", "harmonic", "auxiliary"}

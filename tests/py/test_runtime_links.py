@@ -29,7 +29,7 @@ void _start(void)
 {{
     static {number} x[1];
     volatile int done = gtc_{n}_check(&gtc_rlg_0042_{n}) + gtc_{n}_open(&opened, words, 9U, 1U)
-                        + gtc_{n}_map(&opened, x[0], x[0], x) + gtc_{n}_init(&state, &opened, 9U)
+                        + gtc_{n}_map(&opened, x[0], x[0], x) + gtc_{n}_init(&state, &opened, 1000000UL)
                         + gtc_{n}_sample(&state, x) + gtc_{n}_missed(&state, 9U) + gtc_{n}_bias(&state, x)
                         + gtc_{n}_angle(&sum, x[0], x[0], x) + gtc_{n}_save(&state, words)
                         + gtc_{n}_restore(&state, &opened, 9U, words, 0U);
@@ -70,7 +70,7 @@ def test_units_with_different_options_do_not_link_and_the_linker_says_which(
     table = ROOT / "tests" / "c" / "table" / "gtc_test_t.c"
     (tmp_path / "main.c").write_text(
         '#include "gtc_test_t.h"\nint main(void)\n{\n    static gtc_f32_state_t state;\n'
-        "    return gtc_f32_init(&state, &gtc_test_t_f32, 9U) >= 0 ? 0 : 1;\n}\n"
+        "    return gtc_f32_init(&state, &gtc_test_t_f32, 1000000UL) >= 0 ? 0 : 1;\n}\n"
     )
     if unit == "a table with terms" and "TERMS" in option:
         option = "-DGTC_MAX_TERMS=8"

@@ -25,7 +25,6 @@ from gyrotc.dataset.schema import parse_description
 from gyrotc.dataset.text import dataset_toml
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import InputError
-from gyrotc.inputs import checked
 from gyrotc.jobs.diagnosis import extended_scenario
 from gyrotc.jobs.fleet.manifest import load_manifest
 from gyrotc.jobs.fleet.page import write_summary
@@ -37,7 +36,6 @@ from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
 from gyrotc.results.base import checked_result
 from gyrotc.results.diagnosed import Diagnosed, Estimate
-from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.texts import (
@@ -190,14 +188,10 @@ class _Page(HTMLParser):
         self.elements.append(("!--", data))
 
 
-_KEPT = (
-    "schema",
-    "verdict",
-    "family",
-    "status",
-    "measured_on",
-    "judged_on",
-)  # words that decide what a page shows
+# Words that decide what a page shows.
+_KEPT = frozenset(
+    {"schema", "verdict", "family", "status", "role", "numeric", "measured_on", "judged_on", "decision_rule"}
+)
 
 
 def _with(value: Any, text: Callable[[], str], key: str = "") -> Any:
@@ -250,85 +244,82 @@ _RAN = {
     "mismatches": 1,
     "vectors": 2,
     "first_mismatches": ["vector 0"],
-    "replayed": {"rows": 1, "mismatches": 1, "first_mismatches": ["row 0"], "error": "text"},
+    "replayed": {"runs": 1, "rows": 1, "mismatches": 1, "first_mismatches": ["row 0"], "error": "text"},
 }
-_CHANGES = {
+_HEAD = {"gyrotc_version": "1", "serial": "s", "axis": None}
+_RANGE = {"before": [0.0, 1.0], "after": [0.0, 1.0]}
+_CHANGES = _HEAD | {
+    "schema": "gyrotc.changes/1",
     "model_hash": {"before": "1", "after": "2"},
-    "envelope": {
-        n: dict.fromkeys(("before", "after"), (0.0, 1.0)) for n in ("temperature_c", "slope_c_per_min")
-    },
+    "envelope": {"temperature_c": _RANGE, "slope_c_per_min": _RANGE},
     "same_model": False,
     "map": None,
-    "figures": {"?name": {"before": 1.0, "after": "text"}},
+    "figures": {"?name": {"before": 1.0, "after": 2.0}},
     "versions": {"?numpy": {"before": "1", "after": "2"}},
     "recordings": {"new": [], "gone": ["a.csv"], "other_bytes": []},
     "findings": {"new": ["text"], "gone": []},
     "files": {"new": [], "gone": [], "other_bytes": ["text"]},
 }
-_LIMITS = {
+_LIMITS = _HEAD | {
+    "schema": "gyrotc.limits/1",
     "product": "text",
+    "sha256": "00",
     "met": False,
     "limits": [{"limit": "text", "bound": "text", "measured": ["text"], "met": False}],
 }
-_MANIFEST = {"gyrotc_version": "1", "versions": {"?numpy": "1"}, "refused": {"?q31": "text"}}
+_MANIFEST = _HEAD | {
+    "schema": "gyrotc.manifest/1",
+    "model_hash": "00",
+    "versions": {"?numpy": "1"},
+    "refused": {"?q31": "text"},
+    "meta": {},
+    "units": {"declared": {}, "trusted": []},
+    "sources": [],
+    "files": {},
+}
 
 
-class _Loose(dict[str, Any]):
-    """An object of a result whose fields are not checked; one that is absent is None, as in the classes."""
-
-    def __getattr__(self, name: str) -> Any:
-        return self.get(name)
-
-    def judged(self) -> tuple[str, _Loose]:
-        return "train", self["train"]
-
-
-def _unchecked(path: Path, _kind: object, *, optional: bool = False) -> Any:
-    if optional and not path.exists():
-        return {}
-    return json.loads(path.read_text("utf-8"), object_hook=_Loose)
-
-
-def _optional(path: Path, kind: object) -> Any:
-    return _unchecked(path, kind, optional=True)
-
-
-def test_the_report_of_a_build(
-    result: dict[str, Any], model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def _write_unit(
+    folder: Path, result: dict[str, Any], model_dict: dict[str, Any], text: Callable[[], str]
 ) -> None:
-    monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(("bias", "map", "curve", "allan")))
-    monkeypatch.setattr(report, "read_result", _unchecked)  # which would refuse some of the texts
-    monkeypatch.setattr(report, "read_optional", _optional)
+    """Everything that `build --extend --limits --previous` leaves, with these texts in it."""
     finding = {"id": "text", "text": "text", "evidence": {}}
     evaluation = result["evaluation"].content() | {"findings": [finding]}
     evaluation["runs"] = [run | {"environment": "text"} for run in evaluation["runs"]]
-    verification = result["verification"].content() | {
-        "targets": [_RAN],
-        "emitted": [{"file": "f", "status": "fail", "mismatches": 1}],
-    }
-    terms = [{"id": "auxiliary", "parameters": {"slope_dph_per_unit": 1.0, "reference": 0.0}, "channel": "c"}]
-    diagnosis = {"text": "text", "measured_on": "exam", "extended": None}
+    file = {"file": "f", "verdict": "differs", "status": "fail", "mismatches": 1}
+    verification = result["verification"].content() | {"targets": [_RAN], "emitted": [file]}
+    term = {"id": "auxiliary", "parameters": {"slope_dph_per_unit": 1.0, "reference": 0.0}, "channel": text()}
+    meta = {text(): text(), "warnings": [text()], "calibrated_on": text(), "description": text()}
+    data = [model_dict["data"][0] | {"file": text()}]
+    (folder / "diagnosis").mkdir(parents=True, exist_ok=True)
+    Model.from_dict(model_dict | {"meta": meta, "data": data, "terms": [term]}).save(folder / "model.json")
+    for name, content in {
+        "evaluate": evaluation,
+        "verify": verification,
+        "manifest": _MANIFEST,
+        "limits": _LIMITS,
+        "changes": _CHANGES,
+        "diagnosis/diagnose": _DIAGNOSIS,
+    }.items():
+        (folder / f"{name}.json").write_text(json.dumps(_with(content, text)))
 
-    def draw(text: Callable[[], str]) -> str:
-        meta = {text(): text(), "warnings": [text()], "calibrated_on": text(), "description": text()}
-        data = [model_dict["data"][0] | {"file": text()}]
-        terms[0]["channel"] = text()
-        Model.from_dict(model_dict | {"meta": meta, "data": data, "terms": terms}).save(
-            tmp_path / "model.json"
-        )
-        for name, content in {
-            "evaluate": evaluation,
-            "verify": verification,
-            "manifest": _MANIFEST,
-            "limits": _LIMITS,
-            "changes": _CHANGES,
-            "diagnosis/diagnose": diagnosis,
-        }.items():
-            (tmp_path / "diagnosis").mkdir(exist_ok=True)
-            (tmp_path / f"{name}.json").write_text(json.dumps(_with(content, text)))
+
+def test_the_report_of_a_build_and_of_axes(
+    result: dict[str, Any], model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(("bias", "map", "curve", "allan")))
+    monkeypatch.setattr(report, "_bias_picture", lambda *_: None)
+
+    def one(text: Callable[[], str]) -> str:
+        _write_unit(tmp_path, result, model_dict, text)
         return report.write_report(tmp_path).read_text("utf-8")
 
-    _same_page(draw)
+    def axes(text: Callable[[], str]) -> str:
+        _write_unit(tmp_path / "x", result, model_dict, text)
+        return report.axes_page(tmp_path, ("x",))
+
+    _same_page(one)
+    _same_page(axes)
 
 
 _INTERVAL = {"value": 1.0, "low": 0.5, "high": 2.0}
@@ -408,7 +399,7 @@ def test_the_page_of_a_diagnosis(tmp_path: Path) -> None:
     _same_page(draw)
 
 
-def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str, Any]) -> None:
+def test_the_page_and_the_table_of_a_fleet(tmp_path: Path) -> None:
     entries = [
         {"name": "n", "serial": "s", "axis": None, "status": "failed", "reason": "text", "dataset": "d"},
         {
@@ -433,20 +424,10 @@ def test_the_pages_of_a_fleet_and_of_three_axes(tmp_path: Path, result: dict[str
     ]
 
     def fleet(text: Callable[[], str]) -> str:
-        write_summary(tmp_path, [checked(FleetEntry, _with(entry, text), "entry.json") for entry in entries])
+        write_summary(tmp_path, _with(entries, text))
         return (tmp_path / "fleet.html").read_text("utf-8")
 
-    def axes(text: Callable[[], str]) -> str:
-        found = result["evaluation"].content() | {"findings": [{"id": "text"}]}
-        models = [_with({"serial": "s"}, text)]
-        return (
-            report.page_environment()
-            .get_template("axes.html.j2")
-            .render(models=models, results=[_Loose(_with(found, text))])
-        )
-
     _same_page(fleet)
-    _same_page(axes)
     for text in HOSTILE:
         cell = csv_cell(text)
         assert cell[:1] not in tuple("=+-@\t\r\n") and "\x1b" not in cell

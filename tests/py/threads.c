@@ -78,7 +78,7 @@ int main(void)
     pthread_t threads[3];
     int i;
 
-    if (gtc_f32_init(&state, &gtc_rlg_0042_f32, 10U) != GTC_OK) {
+    if (gtc_f32_init(&state, &gtc_rlg_0042_f32, 1000000UL) != GTC_OK) {
         return 1;
     }
     for (i = 0; i < 3; i++) {

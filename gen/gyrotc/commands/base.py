@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from .. import __version__
@@ -25,6 +27,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+_SILENT_S = 2.0  # before a time left is told
+
+
+class _Loudness:
+    """How much is told, for this process."""
+
+    quiet = False
+    verbose = False
 
 
 class _Console(Console):
@@ -104,17 +116,47 @@ DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """A line on stderr that says what is being done; nothing when stderr is no terminal."""
-    if not ERR.is_terminal:
+    """A line on stderr that says what is being done; nothing when stderr is no terminal, or with --quiet.
+
+    With --verbose every stage is a line of its own with the seconds since the start, also where stderr is a file.
+    """
+    if _Loudness.verbose:
+        start = time.monotonic()
+        yield lambda text: print(f"{time.monotonic() - start:8.1f} s  {terminal_text(text)}", file=sys.stderr)
+        return
+    if _Loudness.quiet or not ERR.is_terminal:
         yield lambda _: None
         return
     with ERR.status("") as status:
         yield lambda text: status.update(Text(terminal_text(text)))
 
 
-def tell(text: str) -> None:
-    """A line of the result on stdout, as it is."""
+def tell(text: str, *, wrong: bool = False) -> None:
+    """A line of the result on stdout, as it is; with --quiet only what went wrong."""
+    if _Loudness.quiet and not wrong:
+        return
     OUT.print(terminal_line(text), highlight=False, soft_wrap=True)
+
+
+def show(table: Table) -> None:
+    """A table of the result on stdout; none with --quiet."""
+    if not _Loudness.quiet:
+        OUT.print(table)
+
+
+def time_left(done: int, total: int, elapsed_s: float) -> str:
+    """Percent, and the time that the rest will take if it goes on like this; empty for the first two seconds."""
+    if elapsed_s < _SILENT_S or not done:
+        return ""
+    left = elapsed_s / done * (total - done)
+    unit = (
+        f"{left:.0f} s"
+        if left < 120.0
+        else f"{left / 60.0:.0f} min"
+        if left < 7200.0
+        else f"{left / 3600.0:.1f} h"
+    )
+    return f", {100 * done // total} %, about {unit} left"
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
@@ -152,5 +194,11 @@ def _main(
             + ".",
         ),
     ] = None,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Tell nothing but what went wrong; also after the command.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Tell every stage with its time on stderr; also after it.")
+    ] = False,
 ) -> None:
-    pass
+    _Loudness.quiet, _Loudness.verbose = quiet, verbose

@@ -11,7 +11,6 @@ import typer
 from ..errors import CheckFailed, InputError
 from ..outputs import json_text, result_folder, write_atomically
 from .base import (
-    OUT,
     AppliedOption,
     AverageOption,
     AxisOption,
@@ -28,6 +27,7 @@ from .base import (
     app,
     numerics_of,
     progress,
+    show,
     tell,
     write_json,
 )
@@ -117,8 +117,8 @@ def _failures(result: Built) -> list[str]:
 
 
 def _print_built(result: Built) -> None:
-    OUT.print(evaluation_table(result.evaluation))
-    OUT.print(verify_table(result.verification))
+    show(evaluation_table(result.evaluation))
+    show(verify_table(result.verification))
     for line in (*span_lines(result.training), *ladder_lines(result.training)):
         tell(line)
     for name, reason in result.refused.items():
@@ -173,7 +173,7 @@ def compare(
             write_atomically(stage.folder / "compare.svg", comparison_picture(result))
     write_json(json_file, result.content())
     for table in comparison_tables(result):
-        OUT.print(table)
+        show(table)
 
 
 @app.command()

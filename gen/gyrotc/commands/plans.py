@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..outputs import result_folder
-from .base import OUT, JsonOption, SeedOption, app, progress, tell, write_json
+from .base import JsonOption, SeedOption, app, progress, show, tell, write_json
 from .plan_lines import limits_of, pair_of, plan_parts
 
 
@@ -59,6 +59,6 @@ def plan(
         if isinstance(part, str):
             tell(part)
         else:
-            OUT.print(part)
+            show(part)
     if out is not None:
         tell(f"report: {out / 'report.html'}")

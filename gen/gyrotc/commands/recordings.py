@@ -104,6 +104,6 @@ def check(
         write_check_page(plots, dataset, result)
     write_json(json_file, result.result().content())
     for line in result.lines():
-        tell(line)
+        tell(line, wrong=bool(result.problems))
     if result.problems:
         raise typer.Exit(2)

@@ -12,7 +12,6 @@ from ..errors import CheckFailed, InputError
 from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     ERR,
-    OUT,
     AppliedOption,
     AverageOption,
     AxisOption,
@@ -31,6 +30,7 @@ from .base import (
     app,
     numerics_of,
     progress,
+    show,
     tell,
     write_json,
 )
@@ -198,7 +198,7 @@ def verify(  # long: the parts of a command in the order in which they are print
             write_atomically(stage.folder / "verify.json", json_text(result.content()))
     write_json(json_file, result.content())
     for one in results.values():
-        OUT.print(verify_table(one))
+        show(verify_table(one))
         for line in verify_notes(one):
             tell(line)
     for line in file_notes(result) if axes else ():
@@ -247,7 +247,7 @@ def evaluate(
         )
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())
-    OUT.print(evaluation_table(result))
+    show(evaluation_table(result))
     if result.mismatches:
         raise CheckFailed(f"{result.mismatches} steps differ from the reference")
 

@@ -7,6 +7,7 @@ from .files import (
     emit,
     emit_texts,
     emitted_tables,
+    example_period_us,
     quantise_all,
     write_texts,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "emit",
     "emit_texts",
     "emitted_tables",
+    "example_period_us",
     "quantise_all",
     "write_texts",
 ]

@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckFailed, InputError
+from ..frontend import period_us
 from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
+from ..quantise.authority import MARGIN
 from ..quantise.terms import channel_names
 from ..reference import answers
 from ..reference.runtime import runtime_folders
@@ -38,9 +40,12 @@ __all__ = [
     "emit",
     "emit_texts",
     "emitted_tables",
+    "example_period_us",
     "quantise_all",
     "write_texts",
 ]
+
+_EXAMPLE_US = 10000  # 100 samples a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +256,8 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
     for name, value in edges:
         text = CText(f"({c_code(f'{value:#.7g}F')})")
         yield {"name": name, "text": text, "comment": "envelope: beyond it GTC_CLAMPED"}
+    yield from _time_macros(model)
+    yield from _authority_macros(emission)
     names = channel_names(model)
     yield number("N_CHANNELS", f"{1 + len(names)}", "numbers of a sample")
     channels = [("temperature_c", "C, of the gyro's own sensor"), *((n, "unit as recorded") for n in names)]
@@ -265,13 +272,43 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
 
 def _example_values(model: Model) -> dict[str, Any]:
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
-    per_second = 100 if abs(model.block_s * 100 - round(model.block_s * 100)) < 1e-9 else 1
     return {
         "first_temperature": middle,
         "first_temperature_q16": round(middle * 65536),
-        "samples_per_second": per_second,
-        "samples_per_block": max(1, round(model.block_s * per_second)),
+        "period_us": example_period_us(model),
     }
+
+
+def _macro(name: str, text: CText, comment: str) -> dict[str, str]:
+    return {"name": name, "text": text, "comment": comment}
+
+
+def _time_macros(model: Model) -> Iterator[dict[str, str]]:
+    block_us = max(1, round(model.block_s * 1e6))
+    longest, shortest = block_us + block_us // 1000, max(1, -(-block_us // 2**20))
+    yield _macro("PERIOD_MIN_US", c_code(f"{shortest}UL"), "shortest sample period, microseconds")
+    yield _macro("PERIOD_MAX_US", c_code(f"{longest}UL"), "longest sample period")
+    stuck = f"{round(model.stuck_s * 1e6)}UL"
+    told = (
+        "a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck"
+    )
+    yield _macro("STUCK_US", c_code(stuck), told)
+
+
+def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
+    """The widest of the arithmetics."""
+    ends = [table.decode_bias(table.authority) for table in emission.tables.values()]
+    values = {"MIN": min(low for low, _ in ends), "MAX": max(high for _, high in ends)}
+    for name, value in values.items():
+        text = CText(f"({c_code(f'{value:#.9g}F')})")
+        told = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of the range"
+        yield _macro(f"AUTHORITY_{name}_DPH", text, told)
+
+
+def example_period_us(model: Model) -> int:
+    """A sample period that fits the model's block: 10 ms where it does, else a tenth of the block."""
+    block_us = max(1, round(model.block_s * 1e6))
+    return _EXAMPLE_US if block_us % _EXAMPLE_US == 0 else period_us(block_us, min(10, block_us))
 
 
 def _image(table: Table) -> bytes:

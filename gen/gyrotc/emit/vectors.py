@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..frontend import period_us
 from ..model import Model
 
 __all__ = ["MISSING", "Calls", "Segment", "Vectors", "make_vectors"]
@@ -70,6 +71,7 @@ class Vectors:
     s_low: int
     s_span: int
     samples_per_block: int
+    period_us: int
     direct: dict[str, tuple[tuple[int, int], ...]]
     segments: tuple[Segment, ...]
     n_channels: int
@@ -178,6 +180,7 @@ def make_vectors(model: Model, numerics: tuple[str, ...]) -> Vectors:
         s_low=s_low,
         s_span=s_high - s_low,
         samples_per_block=SAMPLES_PER_BLOCK,
+        period_us=period_us(max(1, round(model.block_s * 1e6)), SAMPLES_PER_BLOCK),
         direct={n: tuple(_direct(model, n)) for n in numerics},
         segments=tuple(_history(model, numerics)),
         n_channels=1 + len({t.channel for t in model.terms if t.channel}),

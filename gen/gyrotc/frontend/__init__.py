@@ -9,12 +9,14 @@ target does, `training` turns a recording into training samples.
 
 from __future__ import annotations
 
-from .believe import BELIEVED, HELD, RESTART, believe
+from .believe import BELIEVED, HELD, RESTART, Guarded, believe
+from .channels import channel_at
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow, positions, with_missing
 from .numbers import F32, Q31, Arithmetic
 from .screen import departing_rows
 from .stream import Stream
 from .training import (
+    PLAUSIBLE_C,
     Blocks,
     blocks_since_power_on,
     missed_before,
@@ -30,15 +32,18 @@ __all__ = [
     "HELD",
     "KEEP",
     "MAP",
+    "PLAUSIBLE_C",
     "Q31",
     "RESTART",
     "Arithmetic",
     "Blocks",
+    "Guarded",
     "Settings",
     "Steps",
     "Stream",
     "believe",
     "blocks_since_power_on",
+    "channel_at",
     "departing_rows",
     "expand_missed",
     "follow",

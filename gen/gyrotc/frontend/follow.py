@@ -7,14 +7,13 @@ float32 operation is the one that the target does, in its order.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs import need_memory
 from ..status import WARMING
-from .believe import HELD, RESTART, believe
+from .believe import HELD, RESTART, Guarded, believe
 from .numbers import Arithmetic, Numbers
 
 __all__ = [
@@ -40,12 +39,11 @@ class Settings:
     """Members of the table that the front end uses, as numbers of the arithmetic."""
 
     samples_per_block: int
-    slope_blocks: int
-    hold_blocks: int
     period_us: int  # of the samples
-    stuck_us: int
-    max_step: Any
-    max_rate: Any  # per microsecond; in fixed point 2^-40 C
+    block_us: int
+    slope_blocks: int
+    guard: Guarded  # of the temperature
+    longest_blocks: int  # the longest missing_blocks of all guards
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +54,7 @@ class Steps:
     same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
     before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
     GTC_WARMING or 0. Where `kind` is not MAP, temperature,
-    slope and remarks are those of the last map. Before the first one the correction is
+    slope and remarks are those of the last map, 0 where there was none. Before the first one the correction is
     0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete; its missing end counts
     as not valid).
     """
@@ -94,9 +92,9 @@ class Steps:
 
 
 def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-    """Counts of missing samples as `gtc_<n>_missed` shortens them: by whole blocks."""
+    """Counts of missing samples, shortened by whole blocks where nothing changes any more but the time."""
     n = settings.samples_per_block
-    most = settings.hold_blocks + settings.slope_blocks + 2
+    most = settings.longest_blocks + 2
     many = np.flatnonzero(missed >= (most + 1) * n)
     shortened = missed.copy() if many.size else missed
     shortened[many] -= (missed[many] // n - most) * n
@@ -128,11 +126,10 @@ def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.int64]
 
 def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     """Follows samples x, shape (n,), from the start of a state on."""
-    step = arithmetic.step_per_sample(settings.max_rate, settings.period_us)
-    stuck_samples = -(-settings.stuck_us // settings.period_us)
-    verdict = believe(arithmetic, x, max_step=settings.max_step, step=step, stuck_samples=stuck_samples)
+    verdict, fallback = _believed(arithmetic, x, settings)
+    x = settings.guard.limited(x)
     valid, mean = _block_means(arithmetic, x, verdict, settings.samples_per_block)
-    restarts, fallback = _restarts(verdict, valid, settings)
+    restarts = np.flatnonzero(verdict == RESTART)
     # A block closes when the next sample arrives.
     n_closed = max(0, x.size - 1) // settings.samples_per_block
     closings = _closings(arithmetic, valid[:n_closed], mean, fallback, restarts, settings)
@@ -173,9 +170,7 @@ def _block_means(
     arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
 ) -> tuple[NDArray[np.bool_], Numbers]:
     """Which blocks are valid, and their means (0 where no sample was believed)."""
-    used = verdict != HELD
-    for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
-        used[i - i % n : i] = False
+    used = _used(verdict, n)
     step = n * max(1, _PART // n)
     parts = [
         _means(arithmetic, x[start : start + step], used[start : start + step], n)
@@ -204,36 +199,50 @@ def _means(
     return 2 * count >= whole, mean
 
 
-def _restarts(
-    verdict: NDArray[np.int8], valid: NDArray[np.bool_], settings: Settings
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Samples at which the front end restarts; blocks after which the fallback is in force."""
+def _believed(
+    arithmetic: Arithmetic, x: Numbers, settings: Settings
+) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    """Verdict on every sample, and blocks after which the fallback is in force.
+
+    What is believed after a loss depends on when the blocks made it one: judged again from each loss on.
+    """
     n = settings.samples_per_block
-    fallback = np.zeros(valid.size, dtype=np.bool_)
-    restarts = np.flatnonzero(verdict == RESTART)
-    if restarts.size == 0:
-        return restarts, fallback
-    restarted = set((restarts // n).tolist())
-    invalid = np.flatnonzero(~valid)
-    after_fallback: list[int] = []
-    held, previous, fell = 0, -2, False
-    for block in invalid[invalid >= restarts[0] // n].tolist():
-        if block != previous + 1:
-            held, fell = 0, False
-        first = int(np.argmax(verdict[block * n : (block + 1) * n] != HELD)) + block * n
-        believes = verdict[first] != HELD
-        if fell and believes:
-            after_fallback.append(first)
-        if believes and (fell or block in restarted):
+    lost: list[int] = []
+    while True:
+        verdict = believe(arithmetic, x, settings.guard, period_us=settings.period_us, lost=lost)
+        fallback = _fallen(verdict, settings)
+        starts = (1 + np.flatnonzero(fallback & ~np.concatenate([[False], fallback[:-1]]))) * n
+        new = [int(start) for start in starts if start < x.size and start not in lost]
+        if not new:
+            return verdict, fallback
+        lost.append(new[0])
+
+
+def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
+    """Blocks after which the fallback is in force."""
+    n = settings.samples_per_block
+    used = _used(verdict, n)
+    blocks = max(1, -(-verdict.size // n))
+    valid = 2 * np.bincount(np.flatnonzero(used) // n, minlength=blocks) >= n
+    restarted = np.zeros(blocks, dtype=np.bool_)
+    restarted[np.flatnonzero(verdict == RESTART) // n] = True
+    fallback = np.zeros(blocks, dtype=np.bool_)
+    held, previous = 0, -2
+    for block in np.flatnonzero(~valid).tolist():
+        if block != previous + 1 or restarted[block]:
             held = 0
         held += 1
-        fell = held > settings.hold_blocks
-        fallback[block] = fell
+        fallback[block] = held > settings.guard.missing_blocks
         previous = block
-        if fell and block + 1 < valid.size and valid[block + 1]:
-            opens = (block + 1) * n
-            after_fallback.append(opens + int(np.argmax(verdict[opens : opens + n] != HELD)))
-    return np.union1d(restarts, np.array(after_fallback, dtype=np.int64)), fallback
+    return fallback
+
+
+def _used(verdict: NDArray[np.int8], n: int) -> NDArray[np.bool_]:
+    """Samples that count for their block: believed, and none before a restart in it."""
+    used: NDArray[np.bool_] = verdict != HELD
+    for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
+        used[i - i % n : i] = False
+    return used
 
 
 def _closings(
@@ -244,9 +253,10 @@ def _closings(
     restarts: NDArray[np.int64],
     settings: Settings,
 ) -> _Corrections:
-    """The corrections made by blocks that close, from the block of the first restart on."""
+    """The corrections made by blocks that close: before the first restart only those that fall back."""
     n, window = settings.samples_per_block, settings.slope_blocks
-    first = int(restarts[0]) // n if restarts.size else valid.size
+    first = min(int(restarts[0]) // n, valid.size) if restarts.size else valid.size
+    before = np.flatnonzero(fallback[:first])
     blocks = np.arange(first, valid.size)
     latest = (restarts // n)[np.searchsorted(restarts, (blocks + 1) * n) - 1]
     good = valid[blocks]
@@ -263,10 +273,11 @@ def _closings(
     warming = ~full
     warming[full] = ~sure
     kind = np.where(good, MAP, np.where(fallback[blocks], FALLBACK, KEEP)).astype(np.int8)
+    none = np.zeros(before.size)
     return _Corrections(
-        at=(blocks + 1) * n,
-        kind=kind,
-        temperature=mean[blocks],
-        slope=slope,
-        remarks=np.where(good & warming, WARMING, 0).astype(np.int32),
+        at=(np.concatenate([before, blocks]) + 1) * n,
+        kind=np.concatenate([none + FALLBACK, kind]).astype(np.int8),
+        temperature=np.concatenate([none.astype(mean.dtype), mean[blocks]]),
+        slope=np.concatenate([none.astype(slope.dtype), slope]),
+        remarks=np.concatenate([none, np.where(good & warming, WARMING, 0)]).astype(np.int32),
     )

@@ -14,13 +14,10 @@ __all__ = ["F32", "Q31", "Arithmetic"]
 
 Numbers = NDArray[Any]
 _MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
-_LARGEST = 2**31 - 1  # a signed 32-bit word
 
 
 class Arithmetic(Protocol):
     """Operations on temperatures; arrays broadcast, and every result is rounded as on the target."""
-
-    plausible: tuple[Any, Any]
 
     def numbers(self, x: ArrayLike) -> Numbers:
         """Values of the arithmetic's type."""
@@ -30,10 +27,11 @@ class Arithmetic(Protocol):
 
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]: ...
 
-    def step_per_sample(self, max_rate: Any, period_us: int) -> Any: ...
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        """max_step + max_rate * time, in microseconds."""
 
-    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
-        """|a - b| <= max_step + samples * step."""
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
+        """|a - b| <= limit."""
 
     def running_sum(self, d: Numbers) -> Numbers:
         """Last of the running sums along axis 1, added from left to right."""
@@ -47,8 +45,6 @@ class Arithmetic(Protocol):
 
 
 class _F32:
-    plausible = (np.float32(-90.0), np.float32(200.0))
-
     def numbers(self, x: ArrayLike) -> Numbers:
         return np.asarray(x, dtype=np.float32)
 
@@ -58,12 +54,11 @@ class _F32:
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
         return ~np.isfinite(x)
 
-    def step_per_sample(self, max_rate: Any, period_us: int) -> Any:
-        return np.float32(max_rate) * np.float32(period_us)
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        change = np.float32(max_rate) * np.float32(us)
+        return np.float32(max_step) + change
 
-    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
-        limit = np.float32(samples) * step
-        limit = max_step + limit
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
         return np.abs(a - b) <= limit
 
     def running_sum(self, d: Numbers) -> Numbers:
@@ -108,8 +103,6 @@ def moments(
 class _Q31:
     """Temperatures in 2^-16 C, held in int64; every result fits 32 bits, sums and products 64."""
 
-    plausible = (-90 * 65536, 200 * 65536)
-
     def numbers(self, x: ArrayLike) -> Numbers:
         return np.asarray(x, dtype=np.int64)
 
@@ -119,11 +112,11 @@ class _Q31:
     def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
         return np.asarray(x == _MISSING_Q31)
 
-    def step_per_sample(self, max_rate: Any, period_us: int) -> Any:
-        return min((int(max_rate) * period_us) >> 24, _LARGEST)
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        return min(int(max_step) + ((int(max_rate) * us) >> 24), 2**32 - 1)
 
-    def is_near(self, a: Any, b: Any, max_step: Any, step: Any, samples: Any) -> Any:
-        return np.abs(a - b) <= max_step + samples * step
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
+        return np.abs(a - b) <= limit
 
     def running_sum(self, d: Numbers) -> Numbers:
         return np.asarray(np.add.accumulate(d, axis=1)[:, -1])

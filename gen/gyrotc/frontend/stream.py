@@ -50,14 +50,10 @@ class Stream:
 
     def course(self, steps: Steps, samples_per_block: int, blocks_before: int = 0) -> Course:
         """The corrections as terms see them, `blocks_before` blocks after power-on at the first sample."""
-        # A block closes before the sample that opens the next one is taken.
-        until = steps.at + steps.is_restart
         return Course(
             temperature=steps.temperature,
             closes=~steps.is_restart,
             elapsed=np.minimum(self._elapsed(steps.at, samples_per_block) + blocks_before, _MAX_ELAPSED),
-            taken=np.searchsorted(self.position, until, side="left"),
-            samples_per_block=samples_per_block,
         )
 
     def _elapsed(self, at: NDArray[np.int64], samples_per_block: int) -> NDArray[np.int64]:

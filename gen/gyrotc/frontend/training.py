@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import status as status_bits
+from .believe import Guarded
 from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
 from .numbers import F32
 from .screen import departing_rows
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Blocks", "blocks_since_power_on", "missed_before", "period_us", "run_blocks", "samples_per_block"]
 
+PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
 
@@ -43,7 +45,7 @@ class Blocks:
     steps: Steps  # every correction of the run
     in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
     stream: Stream  # its samples
-    samples_per_block: int
+    settings: Settings
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -87,6 +89,7 @@ def run_blocks(  # long: one line for each field of the result
     max_step_c: float,
     max_rate_c_per_min: float,
     stuck_s: float = 0.0,
+    agree_s: float = 0.0,
     hold_blocks: int = 30,
     lead_blocks: int = 0,
 ) -> Blocks:
@@ -99,19 +102,29 @@ def run_blocks(  # long: one line for each field of the result
         slope_blocks: Window of dT/dt, blocks.
         max_step_c: Believable change between two samples, C, besides ...
         max_rate_c_per_min: ... this rate times the time since the last believed one.
+        agree_s: How long readings must agree that do not follow the last one, s.
         stuck_s: Time after which a reading that stays the same is none, s; 0: never.
         hold_blocks: Invalid blocks in a row that are bridged before the fallback.
         lead_blocks: 1: map and terms see where the slope brings a block's mean by the time that it is in force.
     """
     n = samples_per_block(block_s, run.row_period_s)
-    settings = Settings(
-        samples_per_block=n,
-        slope_blocks=slope_blocks,
-        hold_blocks=hold_blocks,
-        period_us=period_us(round(block_s * 1e6), n),
-        stuck_us=round(stuck_s * 1e6),
+    block_us = max(1, round(block_s * 1e6))
+    guard = Guarded(
+        low=np.float32(PLAUSIBLE_C[0]),
+        high=np.float32(PLAUSIBLE_C[1]),
         max_step=np.float32(max_step_c),
         max_rate=np.float32(max_rate_c_per_min / 60e6),
+        agree_us=round(agree_s * 1e6),
+        stuck_us=round(stuck_s * 1e6),
+        missing_blocks=hold_blocks,
+    )
+    settings = Settings(
+        samples_per_block=n,
+        period_us=period_us(block_us, n),
+        block_us=block_us,
+        slope_blocks=slope_blocks,
+        guard=guard,
+        longest_blocks=hold_blocks,
     )
     missed = missed_before(rows.time_s, run.row_period_s)
     stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
@@ -134,7 +147,7 @@ def run_blocks(  # long: one line for each field of the result
         steps=steps,
         in_force=_last_map(steps, k),
         stream=stream,
-        samples_per_block=n,
+        settings=settings,
     )
 
 
@@ -142,7 +155,7 @@ def _last_map(steps: Steps, k: NDArray[np.int64]) -> NDArray[np.int64]:
     """The last correction up to each of k that the map made: one that is kept goes on."""
     if steps.kind.size == 0:
         return k
-    made = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
+    made = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), -1))
     return np.where(k >= 0, made[k], -1)
 
 
@@ -155,8 +168,8 @@ def _in_force(
     temperature = np.full(k.size, np.nan, dtype=np.float32)
     slope = np.zeros(k.size, dtype=np.float32)
     status = np.full(k.size, status_bits.HELD, dtype=np.int32)
-    temperature[started] = steps.temperature[made]
-    slope[started] = steps.slope[made]
+    temperature[started] = np.where(made < 0, np.float32(np.nan), steps.temperature[made])
+    slope[started] = np.where(made < 0, np.float32(0.0), steps.slope[made])
     kind = steps.kind[source]
     kept = steps.remarks[source] | np.where(kind == KEEP, status_bits.HELD, 0)
     status[started] = np.where(kind == FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)

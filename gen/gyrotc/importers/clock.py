@@ -191,6 +191,9 @@ def _form(file: str, columns: Sequence[Column]) -> str:
         raise InputError(
             where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected
         )
+    if forms == ["%H:%M"]:
+        found = f"{texts[0]!r}: hours and minutes, or minutes and seconds"
+        raise InputError(where, found, '--time-format "%H:%M" or --time-format "%M:%S"')
     if len(forms) > 1:
         choices = " or ".join(f'--time-format "{form}"' for form in forms[:3])
         raise InputError(where, f"{texts[0]!r}: day and month cannot be told apart", choices)

@@ -92,11 +92,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     text = _text(name, head, encoding)
     lines = re.split(r"\r\n|\n|\r", text)[: None if whole else -1]
     comment = _comments(lines, given)
-    kept = [
-        (k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)
-    ]
-    if not kept:
-        raise InputError(name, "no lines of rows", "a header and rows of numbers")
+    kept = _kept(name, lines, comment)
     delimiter, decimal = _separators(name, [line for _, line in kept], given)
     split = [(k, cells_of(line, delimiter)) for k, line in kept]
     count = _usual_count(split)
@@ -104,6 +100,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     above = [(k, cells) for k, cells in split if k < split[first][0]]
     above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
     header, units_line, names, units = header_of(above, count, given, decimal)
+    _check_commas(name, header, above, count)
     return Dialect(
         encoding=encoding,
         delimiter=delimiter,
@@ -118,6 +115,33 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         **_digits([cell for _, row in split[first:] for cell in row], decimal, given),
         facts=facts_above(lines[: split[first][0] - 1], header),
     )
+
+
+def _kept(name: str, lines: Sequence[str], comment: tuple[str, ...]) -> list[tuple[int, str]]:
+    """Lines that hold something, with their numbers.
+
+    Raises:
+        InputError: There is none.
+    """
+    kept = [
+        (k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)
+    ]
+    if not kept:
+        raise InputError(name, "no lines of rows", "a header and rows of numbers")
+    return kept
+
+
+def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]], count: int) -> None:
+    """One mark does not part both columns and decimals.
+
+    Raises:
+        InputError: It does: the rows have two cells for each name.
+    """
+    if not header and above and 2 * len(above[-1][1]) == count > 2:
+        found = f"{count // 2} names above rows of {count} cells: one mark parts columns and decimals"
+        raise InputError(
+            f"{name}, line {above[-1][0]}", found, "the file exported again with semicolons or tabs"
+        )
 
 
 def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
     }
     time = TimeMap(format=rows.clock.form or None, zone=chosen.time.zone, rate_hz=plan.rate_hz)
     csv = {
-        k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal")
+        k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal", "thousands")
     } | chosen.csv.given()
     update = {
         "columns": columns,

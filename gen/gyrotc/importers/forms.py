@@ -27,6 +27,7 @@ _CODES = {
     "p": r"(?P<p>[AaPp])\.?[Mm]\.?",
     "z": r"(?P<z>[Zz]|[+-]\d{2}:?\d{2})",
 }
+_LONGEST_H = 9999  # of a time that counts on: 75:30:00
 MONTHS = pa.array(["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"])
 _DATES = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y",
@@ -100,7 +101,8 @@ def _compiled(form: str) -> re.Pattern[str]:
 
 
 def _possible(parts: dict[str, str | None]) -> bool:
-    limits = {"m": (1, 12), "d": (1, 31), "H": (0, 23), "I": (1, 12), "M": (0, 59), "S": (0, 60)}
+    longest = 23 if "d" in parts or "j" in parts or "S" not in parts else _LONGEST_H
+    limits = {"m": (1, 12), "d": (1, 31), "H": (0, longest), "I": (1, 12), "M": (0, 59), "S": (0, 60)}
     if any(not low <= int(parts[k] or low) <= high for k, (low, high) in limits.items() if k in parts):
         return False
     return parts.get("b") is None or str(parts["b"]).lower() in MONTHS.to_pylist()
@@ -114,12 +116,15 @@ def _fraction(form: str, text: str) -> bool:
 def pattern_of(form: str) -> str:
     """The form as a regular expression that both `re` and RE2 read."""
     parts = re.split(r"([.,:]?%[A-Za-z])", form)
+    counts_on = "%S" in form and not any(code in form for code in ("%d", "%j"))
     pattern = ""
     for part in parts:
         if re.fullmatch(r"[.,:]?%[A-Za-z]", part):
             code = _CODES.get(part[-1])
             if code is None:
                 raise InputError("[time] format", f"the code %{part[-1]}", f"one of %{' %'.join(_CODES)}")
+            if part[-1] == "H" and counts_on:
+                code = r"(?P<H>\d{1,4})"
             mark = re.escape(part[:-2])
             pattern += f"(?:{mark}{code})?" if part[-1] == "f" and mark else mark + code
         else:

@@ -111,7 +111,9 @@ def _values(
     top = [one for one in likely if one[2] == best]
     if not top:
         unseen = f"no column that a rate is told from among {_listed(file)}"
-        raise InputError(file.path.name, unseen, _increments(file) or _name_it("rate"))
+        raise InputError(
+            file.path.name, unseen, _increments(file) or _name_it("rate") + _in_text(file, "rate")
+        )
     if len(top) > 1:
         names = ", ".join(repr(table.name) for table, _, _ in top)
         raise InputError(
@@ -185,7 +187,7 @@ def _temperature(
         raise InputError(
             file.path.name,
             f"no column that a temperature is told from among {_listed(file)}",
-            _name_it("temperature"),
+            _name_it("temperature") + _in_text(file, "temperature"),
         )
     if len(top) > 1:
         names = [f"{t.name}/{c.name}" if t.name else c.name for t, c in top]
@@ -299,6 +301,19 @@ def _increments(file: LoggerFile) -> str:
 def _listed(file: LoggerFile) -> str:
     names = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def _in_text(file: LoggerFile, kind: str) -> str:
+    """A column that by its name is of that kind, and holds no numbers: what stands there."""
+    for table in file.tables:
+        for column in table.columns:
+            if column.kind == "text" and meaning(column.name, column.unit, table.name).kind == kind:
+                shown = next((cell for cell in reversed(column.sample) if cell), "")
+                return (
+                    f"; or, as {column.name} holds {shown[:40]!r}, --csv decimal=, (or .) and --csv thousands=. "
+                    "(or another mark), or --csv missing=WORD"
+                )
+    return ""
 
 
 def _name_it(kind: str) -> str:

@@ -77,7 +77,7 @@ class Stamps:
         day, fits = _days(get)
         seconds = get.hours() * 3600 + get.whole("M") * 60 + get.whole("S")
         ns = day * _DAY_NS + seconds * 1_000_000_000 + get.fraction()
-        good &= fits & (seconds <= 86_400)
+        good &= fits & ((seconds <= 86_400) | (not self.dated))
         ns -= get.offset() * 1_000_000_000
         if not self.dated:
             ns = self._over_midnight(ns, good)

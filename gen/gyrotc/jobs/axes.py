@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit import emitted_tables
+from ..emit import emitted_tables, example_period_us
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..model import Model, load_model
 from ..outputs import scratch_folder, write_atomically
-from ..pages.report import page_environment
+from ..pages.report import axes_page
 from ..reference.runtime import runtime_folders
-from ..results.base import read_result
-from ..results.evaluation import Evaluation
 from ..results.verification import JointVerification, Verification
 from ..texts import c_environment
 from ..verify import file_entries
@@ -44,11 +42,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         (c / name).write_bytes(data)
     _run_together(c, [m.id for m in models.values()])
-    results = [read_result(folder / axis / "evaluate.json", Evaluation) for axis in axes]
-    text = (
-        page_environment().get_template("axes.html.j2").render(models=list(models.values()), results=results)
-    )
-    write_atomically(folder / "report.html", text)
+    write_atomically(folder / "report.html", axes_page(folder, axes))
 
 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
@@ -79,7 +73,12 @@ def joint_texts(
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
-    main = c_environment().get_template("main_axes.c.j2").render(models=list(models.values()), n=numeric)
+    listed = list(models.values())
+    main = (
+        c_environment()
+        .get_template("main_axes.c.j2")
+        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]))
+    )
     texts["main.c"] = main.encode("ascii")
     texts[RECORD] = joint_record_text(models, texts)
     return texts

@@ -14,7 +14,7 @@ from ..dataset import Dataset, axes_of, load
 from ..emit import emit
 from ..errors import InputError
 from ..judge.changes import changes_since, load_earlier
-from ..judge.evaluate import evaluate
+from ..judge.evaluate import Watch, evaluate
 from ..judge.limits import Limits, held_against, load_limits
 from ..model import Model
 from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
@@ -66,6 +66,7 @@ class _Order:
     limits: Limits | None
     previous: Path | None
     compiled: bool = True
+    watch: Watch | None = None
 
 
 def build(
@@ -132,18 +133,20 @@ def build_into(
     numerics: Sequence[str] | None = None,
     limits: Limits | None = None,
     compiled: bool = True,
+    watch: Watch | None = None,
 ) -> Built:
     """The main job for one axis, into a folder that is there; the caller sees to it that it appears whole.
 
     Args:
         compiled: False: no compiler and no drawing. What the C code answers is taken from the reference, which is the
             same bit for bit; traces and `report.html` are left out.
+        watch: Called with each run and its means.
 
     Raises:
         CheckFailed: Every arithmetic is refused.
     """
     return _build_axis(
-        dataset, work, options, _Order(numerics, False, limits, None, compiled), lambda _: None
+        dataset, work, options, _Order(numerics, False, limits, None, compiled, watch), lambda _: None
     )
 
 
@@ -167,6 +170,7 @@ def _build_axis(
         training=fitted.training,
         compiled=order.compiled,
         progress=lambda file: say(f"replaying {file}"),
+        watch=order.watch,
     )
     _write(work / "evaluate.json", evaluation.content())
     held = held_against(order.limits, fitted.model, evaluation, verification) if order.limits else None

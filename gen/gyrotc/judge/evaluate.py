@@ -42,9 +42,10 @@ from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
 from .uncertainty import figure_uncertainties
 
-__all__ = ["ReplayedRun", "evaluate", "trace_name"]
+__all__ = ["ReplayedRun", "Watch", "evaluate", "trace_name"]
 
 Progress = Callable[[str], None]
+Watch = Callable[[Run, Averages], None]
 _HOST = "host-gcc-O2"
 _TRACE_ROWS = 2**16  # written at once
 _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
@@ -85,6 +86,7 @@ def evaluate(
     compiled: bool = True,
     trust_code: bool = False,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Evaluation:
     """Evaluates `folder` (model and C) on a data set; what `evaluate.json` holds.
 
@@ -96,6 +98,7 @@ def evaluate(
             recordings. Without an exam run its figures of spans left out count.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
+        watch: Called with each run and its means.
 
     Raises:
         InputError: No emitted code of the model, or the data lack a channel it needs.
@@ -117,6 +120,8 @@ def evaluate(
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )
+            if watch:
+                watch(run, parts[-1].averages)
     sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
@@ -124,8 +129,8 @@ def evaluate(
         result = result.model_copy(update={"left_out": training.left_out})
     generalises = training.generalises if training else None
     outliers = training.outliers if training else None
-    rows_left_out = outliers.rows if outliers else None
-    result = result.model_copy(update={"generalises": generalises, "rows_left_out": rows_left_out})
+    left_out = outliers.rows if outliers else None
+    result = result.model_copy(update={"generalises": generalises, "rows_left_out": left_out})
     result = result.model_copy(update={"uncertainty": _uncertainties(result, parts)})
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})

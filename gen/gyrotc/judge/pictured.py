@@ -79,9 +79,15 @@ Picture = Seen | Columned | Compared | Covered
 
 def pictured(folder: Path, result: CheckResult) -> tuple[list[list[Picture]], list[list[Picture]]]:
     """Pictures of every problem, and of every doubt, of a check of `folder`."""
-    wanted = [*(result.marks.get(str(p), ()) for p in result.problems)]
-    seen = [list(_of_problem(folder, result, marks)) for marks in wanted]
+    seen = [list(_of_problem(folder, result, _marks(result, problem))) for problem in result.problems]
     return seen, [list(_of_doubt(result, doubt)) for doubt in result.doubts]
+
+
+def _marks(result: CheckResult, problem: InputError) -> Sequence[Mark]:
+    """Rows that a problem is about, or all of the run whose file it names."""
+    told = result.marks.get(str(problem), ())
+    files = [run.file for _, dataset in result.datasets[:1] for run in dataset.runs]
+    return told or [Mark(file) for file in dict.fromkeys(files) if problem.where.startswith(f"{file},")]
 
 
 def _of_problem(folder: Path, result: CheckResult, marks: Sequence[Mark]) -> Iterator[Picture]:
@@ -90,7 +96,7 @@ def _of_problem(folder: Path, result: CheckResult, marks: Sequence[Mark]) -> Ite
             columned = _column(folder, mark)
             if columned is not None:
                 yield columned
-        elif mark.span_s is not None and result.datasets:
+        elif result.datasets:
             yield from _rows(result.datasets[0][1], [mark])
 
 

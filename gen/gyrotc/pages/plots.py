@@ -116,12 +116,11 @@ def map_with_centers(model: Model) -> str:
         image = left.pcolormesh(t, r, bias, cmap="cividis", shading="nearest", rasterized=True)
         figure.colorbar(image, ax=left, label="bias, deg/h")
         _hatch_uncovered(left, model)
-        for network in model.networks:
-            if network.centers:
-                c = np.array(network.centers)
-                left.plot(c[:, 0], c[:, 1], "o", mfc="white", mec=ACCENT, markersize=5, clip_on=False)
+        _draw_centers(left, model, (t0, t1), (r0, r1))
         left.set(xlabel="temperature T, C", ylabel="dT/dt, C/min", xlim=(t0, t1), ylim=(r0, r1))
-        left.set_title("map; circles: centers; hatched: no training data", fontsize=8.5, loc="left")
+        left.set_title(
+            "map; circles: centers, triangles: beyond; hatched: no training data", fontsize=8.5, loc="left"
+        )
         left.grid(visible=False)
         for rate, style in zip(np.linspace(r0, r1, 3), ("--", "-", ":"), strict=True):
             right.plot(
@@ -136,6 +135,20 @@ def map_with_centers(model: Model) -> str:
         right.set_title("cuts through the map", fontsize=8.5, loc="left")
         right.legend(fontsize=8)
         return svg(figure)
+
+
+def _draw_centers(ax: Axes, model: Model, t_span: tuple[float, float], r_span: tuple[float, float]) -> None:
+    """Centers where they are; one outside the map as a triangle at its edge that points there."""
+    style: Any = {"mfc": "white", "mec": ACCENT, "linestyle": "none", "clip_on": False, "zorder": 5}
+    for t, r in (center for network in model.networks for center in network.centers):
+        x, y = min(max(t, t_span[0]), t_span[1]), min(max(r, r_span[0]), r_span[1])
+        if (x, y) == (t, r):
+            marker = "o"
+        elif x != t:
+            marker = "<" if t < x else ">"
+        else:
+            marker = "v" if r < y else "^"
+        ax.plot([x], [y], marker, markersize=5 if marker == "o" else 7, **style)
 
 
 def _shown(limits: tuple[float, float]) -> tuple[float, float]:

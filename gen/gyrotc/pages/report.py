@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -16,28 +15,28 @@ import pyarrow.csv as pacsv
 from ..errors import InputError
 from ..inputs import need_memory, open_input, refuse_above
 from ..metrics import Averages, average
-from ..model import Model, load_model
 from ..outputs import result_folder, write_atomically
-from ..results.base import read_optional, read_result
-from ..results.changes import Changes
-from ..results.diagnosed import Diagnosed
-from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
-from ..results.limits import HeldLimits
-from ..results.manifest import Manifest
+from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
-from ..results.verification import Verification
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
 from ..train.outliers import exclude_text
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
+from .unit import UnitResults, unit_in
+from .words import (
+    bound_words,
+    limit_words,
+    measured_words,
+    plain,
+    sci,
+    with_uncertainty,
+    words,
+    words_of_rung,
+)
 
-__all__ = ["page_environment", "page_from", "write_page", "write_report"]
+__all__ = ["axes_page", "page_environment", "page_from", "write_page", "write_report"]
 
-_JUDGED_ON = {
-    "exam": "exam runs, never seen in training",
-    "left_out": "spans left out of training in turn",
-    "train": "the training runs themselves",
-}
+_ORDER = ("FAIL", "CONDITIONAL PASS", "", "PASS")  # of axes on their common page
 _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
@@ -48,32 +47,27 @@ def write_report(folder: Path) -> Path:
     Raises:
         InputError: `model.json` or `evaluate.json` is missing or broken.
     """
-    model = load_model(folder / "model.json")
-    evaluation = read_result(folder / "evaluate.json", Evaluation)
-    training = read_optional(folder / "training.json", Training)
-    beside = {
-        "verification": read_optional(folder / "verify.json", Verification),
-        "manifest": read_optional(folder / "manifest.json", Manifest),
-        "diagnosis": read_optional(folder / "diagnosis" / "diagnose.json", Diagnosed),
-        "limits": read_optional(folder / "limits.json", HeldLimits),
-        "changes": read_optional(folder / "changes.json", Changes),
-    }
+    unit = unit_in(folder)
     with page_from(folder):
-        pictures = _pictures(folder, model, evaluation, training)
-        text = (
-            page_environment()
-            .get_template("report.html.j2")
-            .render(
-                model=model,
-                evaluation=evaluation,
-                training=training,
-                judged=_judged(evaluation),
-                pictures=pictures,
-                left_out=_left_out(training),
-                **beside,
-            )
-        )
+        pictures = _pictures(folder, unit)
+        template = page_environment().get_template("report.html.j2")
+        text = template.render(unit=unit, pictures=pictures, left_out=_left_out(unit.training), **vars(unit))
     return write_page(folder, text)
+
+
+def axes_page(folder: Path, axes: Sequence[str]) -> str:
+    """The page of a unit with several axes, each in a folder of its name: those that failed first.
+
+    Raises:
+        InputError: A result of an axis is missing or broken.
+    """
+    units = [unit_in(folder / axis) for axis in axes]
+    with page_from(folder):
+        told = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
+        pictures = {u.model.axis: _bias_picture(folder / str(u.model.axis), u) for u in units}
+        worst = told[0].verdict
+        template = page_environment().get_template("axes.html.j2")
+        return template.render(units=told, pictures=pictures, verdict=worst)
 
 
 def write_page(folder: Path, text: str) -> Path:
@@ -91,9 +85,12 @@ def write_page(folder: Path, text: str) -> Path:
 def page_environment() -> jinja2.Environment:
     """Where pages come from, compiled once in a process.
 
-    Filters `sci` and `number` print figures; the test `moved_input` tells causes that change what the map sees.
+    Filters print figures and words (`words`); the test `moved_input` tells causes that change what the map sees.
     """
-    environment = html_environment(sci=_sci, number=_number, plain=_plain)
+    environment = html_environment(
+        sci=sci, number=_number, times=_times, chance=_chance, known=with_uncertainty, plain=plain, words=words,
+        rung=words_of_rung, limit_words=limit_words, bound_words=bound_words, measured_words=measured_words,
+    )  # fmt: skip
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
     return environment
 
@@ -131,31 +128,28 @@ def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], s
     return [(name, mine, exclude_text(mine)) for name, mine in of_file.items()]
 
 
-def _judged(evaluation: Evaluation) -> tuple[str, Pooled | None]:
-    """What the model is judged by, in words, and its figures."""
-    name, figures = evaluation.judged() or ("", None)
-    return _JUDGED_ON.get(name, "nothing"), figures
+def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:
+    return {
+        "bias": _bias_picture(folder, unit),
+        "map": map_with_centers(unit.model),
+        "curve": curve_by_size(unit.training) if unit.training else None,
+        "allan": allan_deviation(unit.training.noise) if unit.training else None,
+    }
 
 
-def _pictures(
-    folder: Path, model: Model, evaluation: Evaluation, training: Training | None
-) -> dict[str, str | None]:
+def _bias_picture(folder: Path, unit: UnitResults) -> str | None:
+    """Bias over time from the traces of a result; None where there are none."""
     runs, left_out = [], []
-    outliers = training.outliers if training else None
+    outliers = unit.training.outliers if unit.training else None
     stretches = outliers.stretches if outliers else ()
-    for run in evaluation.runs:
-        averages = _trace(folder / "trace", run, evaluation.average_s)
+    for run in unit.evaluation.runs:
+        averages = _trace(folder / "trace", run, unit.evaluation.average_s)
         if averages is not None and averages.time_s.size:
             runs.append((run.environment or run.file, run.role, averages))
             mine = [s.from_s for s in stretches if s.file == run.file and run.role == "train"]
             first, last = averages.time_s[0], averages.time_s[-1]
             left_out.append([t for t in mine if first <= t <= last])
-    return {
-        "bias": bias_over_time(runs, left_out) if runs else None,
-        "map": map_with_centers(model),
-        "curve": curve_by_size(training) if training else None,
-        "allan": allan_deviation(training.noise) if training else None,
-    }
+    return bias_over_time(runs, left_out) if runs else None
 
 
 def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:
@@ -183,24 +177,15 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     return average(*(columns.pop(0).to_numpy() for _ in names), scored=scored, average_s=average_s)
 
 
-def _sci(value: float | None, digits: int = 2) -> str:
-    """A number with its power of ten, as the trade writes it: 7.00e-04 → 7.00·10⁻⁴."""
-    if value is None:
-        return "–"
-    if value == 0.0:
-        return "0"
-    if 0.01 <= abs(value) < 1e5:
-        return f"{value:.{digits + 1}g}" if abs(value) < 1e3 else f"{value:,.0f}"
-    mantissa, exponent = f"{value:.{digits}e}".split("e")
-    return f"{mantissa}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
 def _number(value: float | None, digits: int = 2) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-def _plain(value: Any) -> str:
-    """A figure of any kind."""
-    if isinstance(value, (list, tuple)):
-        return " … ".join(_plain(v) for v in value) or "none"
-    return _sci(value) if isinstance(value, float) else "–" if value is None else str(value)
+def _times(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.2f}×" if value < 9.995 else f"{value:.1f}×" if value < 99.95 else f"{value:.0f}×"
+
+
+def _chance(value: float) -> str:
+    return "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.2g} %"

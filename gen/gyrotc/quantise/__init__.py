@@ -17,6 +17,7 @@ from ..errors import CheckFailed, InputError
 from ..model import Model
 from ..reference.table import Numeric, Table
 from . import f32, q31
+from .authority import with_authority
 from .probes import with_probes
 from .words import outside
 
@@ -55,7 +56,7 @@ def _quantised(known: _Known, numeric: str) -> Table:
     model = known.model
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
-            rounded = _MAKERS[numeric](model)
+            rounded = with_authority(model, _MAKERS[numeric](model))
     except (FloatingPointError, ZeroDivisionError, OverflowError) as error:
         raise CheckFailed(
             f"{numeric}: a number of the model leaves the range of this arithmetic ({error})"

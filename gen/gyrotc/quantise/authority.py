@@ -1,15 +1,34 @@
-"""The smallest and largest correction that a table may give, and that its terms may add."""
+"""The smallest and largest correction that a table may give, and that its terms may add.
+
+The range of the map over the envelope, seen by the reference on a grid and at every center, and of the terms, as
+training saw it or as their parameters allow; each with a margin. 0 belongs to it: before anything is believed there
+is no correction.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TypedDict
 
-from ..reference.table import Numeric, f32_words
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Bounds", "unbounded"]
+from ..model import Model, Term
+from ..reference import evaluate_map
+from ..reference.table import Numeric, Table, f32_words
+from ..terms.recursion import TableKind
+from .guards import guard_of
 
+__all__ = ["MARGIN", "Bounds", "unbounded", "with_authority"]
+
+#: Share of the range of the map, and of the terms, that is granted beyond it at either end.
+MARGIN = 0.25
 _LARGEST_DPH = 1.5e7  # twice the largest rate that anything here takes for one
 _LARGEST = 2**31 - 1  # a signed 32-bit word
+_CELLS = (96, 48)  # of the grid, T and slope
+
+Range = tuple[float, float]
 
 
 class Bounds(TypedDict):
@@ -21,7 +40,81 @@ class Bounds(TypedDict):
 
 def unbounded(numeric: Numeric) -> Bounds:
     """The widest that a table holds."""
-    if numeric == "q31":
-        return Bounds(authority=(-_LARGEST & 0xFFFFFFFF, _LARGEST), effect=(-_LARGEST & 0xFFFFFFFF, _LARGEST))
-    words = tuple(f32_words([-_LARGEST_DPH, _LARGEST_DPH]).tolist())
+    most = _LARGEST_DPH if numeric == "f32" else float(_LARGEST)
+    words = _words((-most, most), numeric, 0)
     return Bounds(authority=words, effect=words)
+
+
+def with_authority(model: Model, table: Table) -> Table:
+    """The table with the bounds of its corrections."""
+    low, high = _map_range(model, table)
+    floor = model.noise_floor_dph or 0.0
+    low, high = _wider((low, high), floor)
+    effect = _effects(model)
+    least = min(low + effect[0], model.fallback_dph, 0.0) - model.rezero_dph
+    most = max(high + effect[1], model.fallback_dph, 0.0) + model.rezero_dph
+    return replace(
+        table,
+        authority=_words((least, most), table.numeric, table.bias_frac_bits),
+        effect=_words(effect, table.numeric, table.bias_frac_bits),
+    )
+
+
+def _wider(bounds: Range, least: float = 0.0) -> Range:
+    """The range with the margin at either end, at least `least`."""
+    margin = max(MARGIN * (bounds[1] - bounds[0]), least)
+    return bounds[0] - margin, bounds[1] + margin
+
+
+def _map_range(model: Model, table: Table) -> Range:
+    """Smallest and largest of the map, deg/h."""
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    grid = np.stack(
+        np.meshgrid(np.linspace(t0, t1, _CELLS[0] + 1), np.linspace(r0, r1, _CELLS[1] + 1)), axis=-1
+    ).reshape(-1, 2)
+    centers = [center for network in model.networks for center in network.centers]
+    points: NDArray[np.float64] = np.concatenate([grid, np.array(centers).reshape(-1, 2)])
+    inputs = table.encode_inputs(points * np.array([1.0, model.block_s / 60.0]))
+    _, bits = evaluate_map(table, inputs)
+    biases = table.decode_bias(bits)
+    return float(biases.min()), float(biases.max())
+
+
+def _effects(model: Model) -> Range:
+    """Smallest and largest that the terms together add, 0 among them, deg/h."""
+    if not model.terms:
+        return 0.0, 0.0
+    if model.effects_dph is not None:
+        return _wider(model.effects_dph)
+    parts = [_effect(model, term) for term in model.terms]
+    return _wider((math.fsum(p[0] for p in parts), math.fsum(p[1] for p in parts)))
+
+
+def _effect(model: Model, term: Term) -> Range:
+    """What the parameters of a term allow within the envelope and the guard of its channel, deg/h."""
+    kind, values = term.table.kind, term.table.parameters(term.parameters, model.block_s)
+    if kind == TableKind.AUXILIARY:
+        guard = guard_of(model, term.channel)
+        ends = [values[0] * (x - values[1]) for x in (guard.low, guard.high)]
+        return min(0.0, *ends), max(0.0, *ends)
+    low, high = model.envelope.temperature_c
+    size = {
+        TableKind.MEMORY: abs(values[1]) * (high - low),
+        TableKind.PLAY: abs(values[1]) * values[0],
+        TableKind.WARM_UP: abs(values[1]),
+        TableKind.HARMONIC: abs(values[-1]),
+    }[kind]
+    return -size, size
+
+
+def _words(bounds: Range, numeric: Numeric, frac_bits: int) -> tuple[int, ...]:
+    """Two numbers as words, rounded outwards, and no wider than words can be."""
+    if numeric == "f32":
+        ends = np.clip(np.array(bounds), -_LARGEST_DPH, _LARGEST_DPH).astype(np.float32)
+        outer = [np.nextafter(ends[0], np.float32(-np.inf)), np.nextafter(ends[1], np.float32(np.inf))]
+        within = np.clip(np.where(ends == 0.0, ends, outer), -_LARGEST_DPH, _LARGEST_DPH)
+        return tuple(f32_words(within).tolist())
+    unit = 2.0**frac_bits
+    low = max(math.floor(bounds[0] * unit), -_LARGEST)
+    high = min(math.ceil(bounds[1] * unit), _LARGEST)
+    return low & 0xFFFFFFFF, high & 0xFFFFFFFF

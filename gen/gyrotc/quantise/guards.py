@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
+from ..frontend import PLAUSIBLE_C
 from ..model import Guard, Model
 from ..reference.table import Numeric, Words, f32_words
 from .terms import channel_names
 
 __all__ = ["guard_of", "guard_words"]
 
-PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
 _US_PER_MIN = 60e6  # microseconds in a minute
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 _MOST_BLOCKS = 100000  # libc/gtc_limits.inl

@@ -87,6 +87,8 @@ def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
         low, high = (_PLAUSIBLE[table.numeric]) if channel == 0 else (numbers[0], numbers[1])
         if not low <= numbers[0] <= numbers[1] <= high:
             yield "range of a guard is reversed, or wider than that of a temperature"
+        if channel and not numbers[0] <= numbers[7] <= numbers[1]:
+            yield "fallback of a guard is beyond its range"
 
 
 def _terms(table: Table, limits: Limits) -> Iterator[str]:

@@ -6,16 +6,31 @@ was settled by `frontend.follow` and by the recursions of the terms.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import status as status_bits
-from ..frontend import F32, FALLBACK, KEEP, MAP, Q31, Arithmetic, Settings, Steps, Stream, period_us
+from ..frontend import (
+    F32,
+    FALLBACK,
+    KEEP,
+    MAP,
+    Q31,
+    Arithmetic,
+    Guarded,
+    Settings,
+    Steps,
+    Stream,
+    channel_at,
+    period_us,
+    with_missing,
+)
 from ..frontend.numbers import Numbers
-from ..terms.recursion import TermOutcome
-from .maps import evaluate_map
+from ..terms.recursion import CourseChannel, TermOutcome
+from .maps import evaluate_map, governed
 from .operations import recursions
 from .table import ARRAYS, Table, Words
 
@@ -24,17 +39,23 @@ __all__ = ["arithmetic_of", "corrections", "settings_of"]
 
 def settings_of(table: Table, samples_per_block: int) -> Settings:
     """Members of a table that the front end uses."""
-    guard = table.guards[: ARRAYS["guards"]]
-    number = table.numbers(guard)
+    missing = table.guards.reshape(-1, ARRAYS["guards"])[:, 6]
     return Settings(
         samples_per_block=samples_per_block,
-        slope_blocks=table.slope_blocks,
-        hold_blocks=int(guard[6]),
         period_us=period_us(table.block_us, samples_per_block),
-        stuck_us=int(guard[5]),
-        max_step=number[2],
-        max_rate=number[3],
+        block_us=table.block_us,
+        slope_blocks=table.slope_blocks,
+        guard=_guarded(table, 0),
+        longest_blocks=int(missing.max()),
     )
+
+
+def _guarded(table: Table, channel: int) -> Guarded:
+    """The guard of a channel."""
+    record = table.guards.reshape(-1, ARRAYS["guards"])[channel]
+    low, high, max_step, max_rate = table.numbers(record)[:4]
+    agree_us, stuck_us, missing_blocks = (int(word) for word in record[4:7])
+    return Guarded(low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, takes_edge=channel > 0)
 
 
 def arithmetic_of(table: Table) -> Arithmetic:
@@ -61,8 +82,9 @@ def corrections(
     status = np.zeros(steps.kind.size, dtype=np.int32)
     bits = np.zeros(steps.kind.size, dtype=np.uint32)
     status[made], plain = evaluate_map(table, inputs[made])
-    bits[made] = _total(table, plain, outcome.added[made])
-    status[made] |= outcome.remarks[made]
+    total, governed = _total(table, plain, outcome.added[made], outcome.remarks[made])
+    bits[made] = total
+    status[made] |= governed
     source = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
     status, bits = status[source], bits[source]
     status[steps.kind == KEEP] |= status_bits.HELD
@@ -78,22 +100,47 @@ def _outcome(
     table: Table, steps: Steps, stream: Stream, channels: NDArray[Any], samples_per_block: int
 ) -> TermOutcome:
     """What the terms make of every correction; of use where the map makes it."""
-    found = TermOutcome(steps.temperature, steps.slope, np.zeros_like(steps.temperature), steps.remarks)
+    low, high = table.numbers(table.envelope)[:2]
+    seen = np.clip(steps.temperature, low, high)
+    beyond = np.where(seen != steps.temperature, status_bits.CLAMPED, 0).astype(np.int32)
+    found = TermOutcome(
+        steps.temperature, steps.slope, np.zeros_like(steps.temperature), steps.remarks | beyond
+    )
     terms = recursions(table)
     if not terms or steps.at.size == 0:
         return found
-    course = stream.course(steps, samples_per_block)
+    course = replace(stream.course(steps, samples_per_block), temperature=seen)
+    settings = settings_of(table, samples_per_block)
     for recursion, channel in terms:
-        recursion.apply(course, channels[:, channel], found)
+        shown = _shown(table, settings, steps, stream, channels, channel) if channel else None
+        recursion.apply(course, shown, found)
     return found
 
 
-def _total(table: Table, bits: Words, added: Numbers) -> Words:
-    """Bits of the map's results with what the terms add."""
+def _shown(
+    table: Table, settings: Settings, steps: Steps, stream: Stream, channels: NDArray[Any], channel: int
+) -> CourseChannel:
+    """An auxiliary channel at every correction."""
+    arithmetic = arithmetic_of(table)
+    readings = with_missing(arithmetic, channels[:, channel], stream.position)
+    fallback = table.numbers(table.guards.reshape(-1, ARRAYS["guards"])[channel])[7]
+    return channel_at(arithmetic, readings, _guarded(table, channel), fallback, settings, steps)
+
+
+def _total(
+    table: Table, bits: Words, added: Numbers, remarks: NDArray[np.int32]
+) -> tuple[Words, NDArray[np.int32]]:
+    """Bits of the map's results with what the terms add, each within its bounds, and the remarks of the terms."""
+    if not table.terms.size:
+        return bits, remarks
+    within, clamped = governed(table.numbers(table.effect), added)
     if table.numeric == "f32":
-        return np.asarray(bits.view(np.float32) + added.astype(np.float32)).view(np.uint32)
-    total = np.clip(table.numbers(bits) + added, -(2**31) + 1, 2**31 - 1)
-    return np.asarray(total.astype(np.int32).view(np.uint32))
+        total = bits.view(np.float32) + within.astype(np.float32)
+    else:
+        total = table.numbers(bits) + within
+    total, beyond = governed(table.numbers(table.authority), total)
+    remarks = remarks | np.where(clamped | beyond, status_bits.CLAMPED, 0).astype(np.int32)
+    return _bits(table, total), remarks
 
 
 def _bits(table: Table, numbers: NDArray[Any]) -> Words:

@@ -11,7 +11,7 @@ from ..status import CLAMPED, E_ARG, UNCOVERED
 from . import f32, q31
 from .table import MISSING_Q31, Table, Words
 
-__all__ = ["evaluate_map"]
+__all__ = ["evaluate_map", "governed"]
 
 
 def evaluate_map(
@@ -39,9 +39,23 @@ def evaluate_map(
     else:
         positions = q31.normalise(table, x)
         cells, bias = q31.cells(table, positions), q31.biases(table, positions)
+    within, clamped = governed(table.numbers(table.authority), table.numbers(bias))
+    bias = np.where(clamped, _words(table, within), bias)
+    status = status | np.where(clamped, CLAMPED, 0)
     status = status | np.where(_is_covered(table, cells), 0, UNCOVERED)
     status = np.where(usable, status, E_ARG).astype(np.int32)
     return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
+
+
+def governed(bounds: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Numbers within bounds, and which of them were not."""
+    low, high = bounds
+    return np.clip(x, low, high), (x < low) | (x > high)
+
+
+def _words(table: Table, x: NDArray[Any]) -> Words:
+    bits = np.asarray(x, dtype=np.float32) if table.numeric == "f32" else np.asarray(x).astype(np.int32)
+    return np.ascontiguousarray(bits).view(np.uint32)
 
 
 def _is_missing(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..terms.arithmetic import Floating, Operations
 from ..terms.recursion import Recursion, TableKind, recursion_of
 from . import f32, q31
-from .table import ARRAYS, MISSING_Q31, Table
+from .table import ARRAYS, Table
 
 __all__ = ["recursions"]
 
@@ -32,8 +32,6 @@ _LARGEST = 2**31 - 1  # a signed 32-bit word
 
 class _F32(Floating):
     """float32: the operations of `Floating`, one by one, on numpy's float32."""
-
-    missing: Any = np.float32(np.nan)
 
     def scalars(self, x: Numbers) -> Sequence[Any]:
         return list(x)
@@ -65,16 +63,11 @@ class _F32(Floating):
 class _Q31:
     """Fixed point: Python integers one by one, int64 in arrays; no product leaves 63 bits."""
 
-    missing: Any = MISSING_Q31
-
     def scalars(self, x: Numbers) -> Sequence[Any]:
         return list(x.tolist())
 
     def array(self, x: Sequence[Any]) -> Numbers:
         return np.array(x, dtype=np.int64)
-
-    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
-        return np.asarray(x == MISSING_Q31)
 
     def settle(self, x: Any) -> Any:
         return x << 16
@@ -106,12 +99,6 @@ class _Q31:
             h = ((h * s) >> 30) + coefficient
         h = (h * t) >> 30
         return np.asarray((amplitude * h) >> 30)
-
-    def mean(self, block: Numbers) -> Any:
-        base, n = int(block[0]), int(block.size)
-        total = int((block - base).sum())
-        magnitude = (abs(total) + n // 2) // n
-        return base + (magnitude if total >= 0 else -magnitude)
 
 
 _OPERATIONS: dict[str, Operations] = {"f32": _F32(), "q31": _Q31()}

@@ -15,21 +15,14 @@ __all__ = ["FLOAT64", "Floating", "Operations"]
 
 Numbers = NDArray[Any]
 
-_CHANNEL_MAX = np.float32(1e9)  # magnitude of a sample of a channel (include/gtc.h, gtc_f32_sample)
-
 
 class Operations(Protocol):
     """Operations of one arithmetic, each rounded as on the target."""
-
-    missing: Any
 
     def scalars(self, x: Numbers) -> Sequence[Any]:
         """Numbers one by one, of the type that `follow` takes."""
 
     def array(self, x: Sequence[Any]) -> Numbers: ...
-
-    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
-        """Which samples of a channel are missing."""
 
     def settle(self, x: Any) -> Any:
         """A memory at rest at x."""
@@ -51,23 +44,15 @@ class Operations(Protocol):
     def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
         """amplitude cos(2 pi (x frequency + phase))."""
 
-    def mean(self, block: Numbers) -> Any:
-        """Mean of the samples of a block."""
-
 
 class Floating:
     """Operations of float64; float32 has its own exponential and cosine."""
-
-    missing: Any = np.nan
 
     def scalars(self, x: Numbers) -> Sequence[Any]:
         return list(x.tolist())
 
     def array(self, x: Sequence[Any]) -> Numbers:
         return np.array(x, dtype=np.float64)
-
-    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
-        return np.asarray(~(np.abs(x) <= _CHANNEL_MAX))
 
     def settle(self, x: Any) -> Any:
         return x
@@ -89,10 +74,6 @@ class Floating:
 
     def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
         return np.asarray(amplitude * np.cos(2.0 * np.pi * (x * frequency + phase)))
-
-    def mean(self, block: Numbers) -> Any:
-        total = np.add.accumulate(block - block[0])[-1]
-        return block[0] + total / block.dtype.type(block.size)
 
 
 FLOAT64: Operations = Floating()

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..status import HELD
 from .arithmetic import Operations
 from .operators import play
 
-__all__ = ["Course", "Recursion", "TableKind", "TermOutcome", "recursion_of"]
+__all__ = ["Course", "CourseChannel", "Recursion", "TableKind", "TermOutcome", "recursion_of"]
 
 Numbers = NDArray[Any]
 
@@ -45,15 +44,24 @@ class Course:
             sample that started the front end, shape (n,).
         closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
         elapsed: Blocks since power-on, shape (n,).
-        taken: How many samples of the channels had come, shape (n,).
-        samples_per_block: Temperature samples in a block of the front end.
     """
 
     temperature: Numbers
     closes: NDArray[np.bool_]
     elapsed: NDArray[np.int64]
-    taken: NDArray[np.int64]
-    samples_per_block: int
+
+
+@dataclass(frozen=True, slots=True)
+class CourseChannel:
+    """An auxiliary channel at the corrections of a history, one entry each.
+
+    Attributes:
+        mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
+        remarks: Status bits: held, lost, clamped, shape (n,).
+    """
+
+    mean: Numbers
+    remarks: NDArray[np.int32]
 
 
 @dataclass(slots=True)
@@ -73,18 +81,18 @@ class Recursion:
         self.do = do
         self.p = parameters
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
-        """Changes the outcome of every correction; `channel`: samples of the term's channel, in their order."""
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        """Changes the outcome of every correction; `channel`: that of the term."""
         raise NotImplementedError
 
 
 class _Memory(Recursion):
-    """z <- z + gain (T - z) once a block, at rest on the first T; adds amplitude (z - T).
+    """z <- z + gain (T - z) once a block, at rest on T where the front end starts; adds amplitude (z - T).
 
     Where rate is not 0 the map sees z and (T - z) rate instead of T and its slope.
     """
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         _, amplitude, rate = self.p[:3]
         x, z = course.temperature, self.do.reading(self._states(course))
         if rate != 0:
@@ -95,74 +103,45 @@ class _Memory(Recursion):
         follow, gain, z = self.do.follow, self.p[0], None
         states = []
         for x, closes in zip(self.do.scalars(course.temperature), course.closes.tolist(), strict=True):
-            if z is None:
-                z = self.do.settle(x)
-            elif closes:
-                z = follow(z, x, gain)
+            z = follow(z, x, gain) if closes and z is not None else self.do.settle(x)
             states.append(z)
         return self.do.array(states)
 
 
 class _Play(Recursion):
-    """z <- max(T - width, min(T + width, z)) once a block, from the first T on; adds amplitude (z - T)."""
+    """z <- max(T - width, min(T + width, z)) once a block, from T at a start; adds amplitude (z - T)."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
-        steps = course.closes.copy()
-        steps[:1] = True
-        z = play(self.p[0], course.temperature[steps])[np.cumsum(steps) - 1]
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        starts = np.union1d(np.flatnonzero(~course.closes), [0])[: course.closes.size]
+        parts = np.split(course.temperature, starts[1:])
+        z = np.concatenate([play(self.p[0], part) for part in parts])
         outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, self.p[1])
 
 
 class _WarmUp(Recursion):
     """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         outcome.added = outcome.added + self.do.fading(course.elapsed, self.p[0], self.p[1])
 
 
 class _Harmonic(Recursion):
     """Adds amplitude cos(2 pi (T frequency + phase)), phase in turns."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         outcome.added = outcome.added + self.do.wave(course.temperature, *self.p[:3])
 
 
 class _Auxiliary(Recursion):
-    """Adds slope (mean - reference), the mean of the channel's last block of which at least half was there."""
+    """Adds slope (mean - reference)."""
 
-    def apply(self, course: Course, channel: Numbers | None, outcome: TermOutcome) -> None:
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         if channel is None:
             raise ValueError("a term of a channel without its channel")
         slope, reference = self.p[:2]
-        mean, here = self._means(course, channel)
-        added = self.do.scaled_difference(mean, reference, slope)
-        zero = added.dtype.type(0)
-        outcome.added = outcome.added + np.where(self.do.is_missing(mean), zero, added)
-        outcome.remarks = outcome.remarks | np.where(here, 0, HELD).astype(np.int32)
-
-    def _means(self, course: Course, channel: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
-        """Mean in force for every correction, and whether its block had enough samples.
-
-        Before the first whole block the first sample stands for the mean. A block counts from the first
-        correction on.
-        """
-        there = ~self.do.is_missing(channel)
-        samples = channel[there]
-        count = np.concatenate([[0], np.cumsum(there)])[course.taken].tolist()
-        mean, here, opened, before = self.do.missing, False, 0, 0
-        means, enough = [], []
-        for k, (until, closes) in enumerate(zip(count, course.closes.tolist(), strict=True)):
-            if before == 0 and until > 0:
-                mean = samples[0]
-            here, before = here or until > opened, until
-            if k > 0 and closes:
-                here = 2 * (until - opened) >= course.samples_per_block
-                mean = self.do.mean(samples[opened:until]) if here else mean
-            if k == 0 or closes:
-                opened = until
-            means.append(mean)
-            enough.append(here)
-        return self.do.array(means), np.array(enough, dtype=np.bool_)
+        added = self.do.scaled_difference(channel.mean, reference, slope)
+        outcome.added = outcome.added + np.where(np.isnan(added), added.dtype.type(0), added)
+        outcome.remarks = outcome.remarks | channel.remarks
 
 
 _RECURSIONS: dict[TableKind, type[Recursion]] = {

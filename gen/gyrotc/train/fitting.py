@@ -55,6 +55,7 @@ __all__ = [
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0  # as long as the paper's means
 _HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
+_AGREE_S = 1.0  # longer than any burst of wrong conversions; an alignment does not feel it
 _MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse thermometer
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
@@ -95,6 +96,7 @@ class FrontEnd:
     hold_blocks: int
     stuck_s: float = 0.0
     lead_blocks: int = 1
+    agree_s: float = _AGREE_S
 
     def blocks(self, run: Run) -> Blocks:
         return run_blocks(
@@ -105,6 +107,7 @@ class FrontEnd:
             max_step_c=self.max_step_c,
             max_rate_c_per_min=self.max_rate_c_per_min,
             stuck_s=self.stuck_s,
+            agree_s=self.agree_s,
             hold_blocks=self.hold_blocks,
             lead_blocks=self.lead_blocks,
         )
@@ -273,6 +276,7 @@ def model_of(  # long: one line for each field of model.json
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
             "stuck_s": front.stuck_s,
+            "agree_s": front.agree_s,
             "max_step_c": front.max_step_c,
             "max_rate_c_per_min": front.max_rate_c_per_min,
             "noise_floor_dph": fitted.noise_floor_dph,

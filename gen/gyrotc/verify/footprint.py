@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..emit import example_period_us
 from ..model import Model
 from ..outputs import scratch_folder
 from ..reference.table import Table
@@ -42,7 +43,13 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
     text = (
         c_environment()
         .get_template("footprint.c.j2")
-        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
+        .render(
+            id=model.id,
+            symbol=model.symbol,
+            n=table.numeric,
+            n_channels=table.n_channels,
+            period_us=example_period_us(model),
+        )
     )
     with scratch_folder() as work:
         source = work / "footprint.c"

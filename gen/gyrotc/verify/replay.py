@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..dataset import Rows, Run
 from ..errors import CheckFailed, InputError
-from ..frontend import blocks_since_power_on, missed_before, samples_per_block
+from ..frontend import blocks_since_power_on, missed_before, period_us, samples_per_block
 from ..model import Model
 from ..outputs import scratch_folder
 from ..quantise.applied import channels_of
@@ -42,6 +42,7 @@ class ReplayCase:
     channels: Words
     missed: NDArray[np.int64]
     samples_per_block: int
+    period_us: int
     reference: Replay
 
 
@@ -77,7 +78,7 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
         missed[0] = before
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)
-    return ReplayCase(channels, missed, per_block, answers)
+    return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
 
 
 @contextmanager
@@ -131,7 +132,7 @@ def _stream(history: ReplayCase, word: np.dtype[np.uint32]) -> bytes:
     """Standard input of the replay program."""
     n, n_channels = history.channels.shape
     stream = np.empty(2 + n * (1 + n_channels), dtype=word)
-    stream[:2] = history.samples_per_block, n
+    stream[:2] = history.period_us, n
     rows = stream[2:].reshape(n, 1 + n_channels)
     rows[:, 0] = history.missed
     rows[:, 1:] = history.channels

@@ -53,8 +53,6 @@ _TABLE_H = (
     r"\}}",
     "#define GTC_{SYMBOL}_ID <hex><note>",
     r'#define GTC_{SYMBOL}_[A-Z0-9_]{{1,32}} (?:<cells>|\((?:<cells>)\)|"<name>")<note>',
-    r"#define GTC_{SYMBOL}_SAMPLES_PER_BLOCK\(period_us\) "
-    r"\(\(GTC_{SYMBOL}_BLOCK_US \+ \(\(period_us\) / 2UL\)\) / \(period_us\)\)<note>",
     r"extern const gtc_<n>_table_t gtc_{symbol}_\1;",
 )
 _VECTORS_H = (

@@ -1,7 +1,7 @@
 /* gtc_test_1.c - bias table of gyro TEST-1. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 acd674e94c93162ac8418fd848837f3745499f37cf7fd6328865cb3ba36e897e
+ * Model:       sha256 15eaf6f108f06d94edfba845fa696b4361687de8ebd5aa570c72ec2a6b8b1817
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -39,7 +39,7 @@ static const gtc_word_t f32_centers[15] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t f32_guards[8] = {
-    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -75,8 +75,8 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-15000000.0F), V(15000000.0F) },
-    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .authority = { V(-1.98713243F), V(1.60987401F) },
+    .effect = { V(0.0F), V(0.0F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -96,7 +96,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0xed4e1a23UL,
+    .crc = 0x94bd7609UL,
     .term_code = { NULL },
 };
 
@@ -123,7 +123,7 @@ static const gtc_word_t q31_centers[15] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t q31_guards[8] = {
-    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -159,8 +159,8 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 28UL,
     .fallback = 100663296L,
-    .authority = { -2147483647L, 2147483647L },
-    .effect = { -2147483647L, 2147483647L },
+    .authority = { -533412762L, 432145498L },
+    .effect = { 0L, 0L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -180,7 +180,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x49036185UL,
+    .crc = 0x12648636UL,
     .term_code = { NULL },
 };
 

@@ -1,7 +1,7 @@
 /* gtc_test_b.c - bias table of gyro TEST-B. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 dcc215d641de70a2721834cf0e1844298e506f248bdf29cf9cbd8b0933b8abbe
+ * Model:       sha256 f2633da1ee3e458a610adbc3fd4b6d6543118f2f752c1ed5c14c3130b24c2fa3
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -44,7 +44,7 @@ static const gtc_word_t f32_centers[30] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t f32_guards[8] = {
-    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -80,8 +80,8 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-15000000.0F), V(15000000.0F) },
-    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .authority = { V(-4.28671885F), V(6.15734434F) },
+    .effect = { V(0.0F), V(0.0F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -101,7 +101,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0xbe39d9a6UL,
+    .crc = 0x4f008d1dUL,
     .term_code = { NULL },
 };
 
@@ -133,7 +133,7 @@ static const gtc_word_t q31_centers[30] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t q31_guards[8] = {
-    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* one bit for each cell of T (fastest) and slope, low bit first */
@@ -169,8 +169,8 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 27UL,
     .fallback = 50331648L,
-    .authority = { -2147483647L, 2147483647L },
-    .effect = { -2147483647L, 2147483647L },
+    .authority = { -575356275L, 826424246L },
+    .effect = { 0L, 0L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -190,7 +190,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0xbf87b81bUL,
+    .crc = 0x27da5e50UL,
     .term_code = { NULL },
 };
 

@@ -4,13 +4,12 @@
  * Axis:        the only one
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
- * Block:       10 s; samples_per_block of gtc_<n>_init() = 10 s / sample period of the target:
- *              GTC_TEST_B_SAMPLES_PER_BLOCK(10000UL) with a sample each 10 ms
+ * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         632 bytes of read-only data, 168 of them parameters; |error| <= 1.72e-05 deg/h against the model (terms excluded)
  * q31:         632 bytes of read-only data, 168 of them parameters; |error| <= 1.33e-03 deg/h against the model (terms excluded)
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 dcc215d641de70a2721834cf0e1844298e506f248bdf29cf9cbd8b0933b8abbe
+ * Model:       sha256 f2633da1ee3e458a610adbc3fd4b6d6543118f2f752c1ed5c14c3130b24c2fa3
  *
  * The numbers belong to the owner of the gyro's recordings.
  */
@@ -29,12 +28,16 @@ extern "C" {
 #define GTC_TEST_B_T_MAX_C (60.00000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_B_SLOPE_MIN_C_PER_MIN (-3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_B_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
+#define GTC_TEST_B_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
+#define GTC_TEST_B_PERIOD_MAX_US 10010000UL /* longest sample period */
+#define GTC_TEST_B_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_B_AUTHORITY_MIN_DPH (-4.28673830F) /* no correction lies below it, deg/h: margin 25% of the range */
+#define GTC_TEST_B_AUTHORITY_MAX_DPH (6.15734434F) /* no correction lies above it, deg/h: margin 25% of the range */
 #define GTC_TEST_B_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_TEST_B_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_TEST_B_F32_TABLE_BYTES 632UL /* read-only data, with pointers of 32 bits */
 #define GTC_TEST_B_Q31_BIAS_FRAC_BITS 27 /* bias in 2^-this deg/h */
 #define GTC_TEST_B_Q31_TABLE_BYTES 632UL /* read-only data, with pointers of 32 bits */
-#define GTC_TEST_B_SAMPLES_PER_BLOCK(period_us) ((GTC_TEST_B_BLOCK_US + ((period_us) / 2UL)) / (period_us)) /* of gtc_<n>_init(), for a sample period in microseconds */
 
 extern const gtc_f32_table_t gtc_test_b_f32;
 extern const gtc_q31_table_t gtc_test_b_q31;

@@ -1,7 +1,7 @@
 /* gtc_test_h.c - bias table of gyro TEST-H. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 204bc523ab74cab53a3cfe2ee34cc6d8504fcb4b034a1958ddce7b7c09c60df3
+ * Model:       sha256 a6ca9f40548225b74f2d1e43b12ab312cbd0dace3692ad95ebd7989de54d7c23
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -38,13 +38,13 @@ static const gtc_word_t f32_centers[10] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t f32_guards[8] = {
-    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
 /* kind, channel, parameters */
 static const gtc_word_t f32_terms[16] = {
     B(0x4UL), B(0x0UL), V(0.125F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* path_length_periodicity */
-    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
+    B(0x1UL), B(0x0UL), V(0.221199214F), V(0.566574216F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
 };
 
 /* known answers: T, slope, bias, status */
@@ -74,8 +74,8 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-15000000.0F), V(15000000.0F) },
-    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .authority = { V(-70.3042145F), V(69.7087097F) },
+    .effect = { V(-68.3639145F), V(68.3639145F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -95,7 +95,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xdd0fd933UL,
+    .crc = 0xf72b950dUL,
     .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
 };
 
@@ -121,13 +121,13 @@ static const gtc_word_t q31_centers[10] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t q31_guards[8] = {
-    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
 /* kind, channel, parameters */
 static const gtc_word_t q31_terms[16] = {
     B(0x4UL), B(0x0UL), B(0x20000000UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* path_length_periodicity */
-    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */
+    B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00910b02UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */
 };
 
 /* known answers: T, slope, bias, status */
@@ -157,8 +157,8 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
     .fallback = 6291456L,
-    .authority = { -2147483647L, 2147483647L },
-    .effect = { -2147483647L, 2147483647L },
+    .authority = { -1179508867L, 1169517243L },
+    .effect = { -1146956038L, 1146956038L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 8L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -178,7 +178,7 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x6e084c8fUL,
+    .crc = 0xce3674daUL,
     .term_code = { &gtc_q31_term_harmonic, &gtc_q31_term_memory },
 };
 

@@ -1,7 +1,7 @@
 /* gtc_test_t.c - bias table of gyro TEST-T. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 76d1e06a4b32d7ba6ba843112261145bce3252e75a5ab682d337a4491a69fec7
+ * Model:       sha256 eb49137ef2f09e1eddd0f024b7b0c2b70053294f1c5206030f90846f1210574b
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -39,15 +39,15 @@ static const gtc_word_t f32_centers[15] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t f32_guards[16] = {
-    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0xf4240UL), B(0x0UL), B(0x2UL), V(0.0F), /* temperature_c */
-    V(-1e+09F), V(1e+09F), V(1e+09F), V(0.0F), B(0x0UL), B(0x0UL), B(0x2UL), V(12.0F), /* supply_v */
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x0UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(9.0F), V(15.0F), V(2.0F), V(0.0F), B(0x0UL), B(0x0UL), B(0x4UL), V(12.5F), /* supply_v */
 };
 
 /* kind, channel, parameters */
 static const gtc_word_t f32_terms[32] = {
     B(0x1UL), B(0x0UL), V(0.221199214F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* cavity_lag */
     B(0x2UL), B(0x0UL), V(2.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* hysteresis */
-    B(0x3UL), B(0x0UL), V(9.23324871F), V(0.5F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
+    B(0x3UL), B(0x0UL), V(9.23324871F), V(0.475614727F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
     B(0x5UL), B(0x1UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
 };
 
@@ -82,8 +82,8 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-15000000.0F), V(15000000.0F) },
-    .effect = { V(-15000000.0F), V(15000000.0F) },
+    .authority = { V(-3.99148464F), V(3.63148212F) },
+    .effect = { V(-2.0259223F), V(2.0259223F) },
     .rezero = V(0.0F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
@@ -103,7 +103,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0x9c0e61caUL,
+    .crc = 0x7c0a886cUL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
 };
 
@@ -130,15 +130,15 @@ static const gtc_word_t q31_centers[15] = {
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 static const gtc_word_t q31_guards[16] = {
-    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0xf4240UL), B(0x0UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
-    B(0x80000001UL), B(0x7fffffffUL), B(0x7fffffffUL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x2UL), B(0x000c0000UL), /* supply_v */
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x0UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0x00090000UL), B(0x000f0000UL), B(0x00020000UL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x4UL), B(0x000c8000UL), /* supply_v */
 };
 
 /* kind, channel, parameters */
 static const gtc_word_t q31_terms[32] = {
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
     B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
-    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x01000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
+    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x00f383c6UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
     B(0x5UL), B(0x1UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
 };
 
@@ -173,8 +173,8 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 25UL,
     .fallback = 12582912L,
-    .authority = { -2147483647L, 2147483647L },
-    .effect = { -2147483647L, 2147483647L },
+    .authority = { -133931517L, 121852113L },
+    .effect = { -67978665L, 67978665L },
     .rezero = 0L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
@@ -194,7 +194,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x7126275cUL,
+    .crc = 0x8a94f69aUL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
 };
 

@@ -23,6 +23,7 @@ static gtc_word_t any_networks[SHAPE_NETWORKS * GTC_NETWORK_WORDS];
 static gtc_word_t any_centers[SHAPE_NETWORKS * 2U * GTC_CENTER_WORDS];
 static gtc_word_t any_terms[GTC_MAX_TERMS * GTC_TERM_WORDS];
 static gtc_word_t any_coverage[1];
+static gtc_word_t any_guards[2U * GTC_GUARD_WORDS];
 
 static void any_words(gtc_word_t *words, const NAME(range_t) *limits, unsigned n)
 {
@@ -74,6 +75,11 @@ static void any_arrays(void)
     any.networks = any_networks;
     any.centers = any_centers;
     any.coverage = any_coverage;
+    any_words(any_guards, NAME(guard_limits), 4U);
+    any_words(&any_guards[GTC_GUARD_WORDS], NAME(guard_limits), 4U);
+    any_guards[6].bits = Frama_C_unsigned_long_interval(1, 100000);
+    any_guards[GTC_GUARD_WORDS + 6U].bits = Frama_C_unsigned_long_interval(1, 100000);
+    any.guards = any_guards;
     any.coverage_cells[0] = 3U;
     any.coverage_cells[1] = 2U;
     any.n_networks = SHAPE_NETWORKS;

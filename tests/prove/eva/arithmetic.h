@@ -15,6 +15,7 @@ typedef float wide_t;
 #define STEEPEST 100000.0F /* C per block: far more than any slope of plausible means */
 #define FINITE(x) \is_finite(x)
 #define NUMBER(word) ((word).value)
+#define MEMBER_NUMBER(member) ((member).value)
 #define ANY_PLAUSIBLE() Frama_C_float_interval(LOWEST, HIGHEST)
 #else
 #define NAME(x) gtc_q31_##x
@@ -26,6 +27,7 @@ typedef int_least64_t wide_t;
 #define STEEPEST 2147483647L
 #define FINITE(x) \true
 #define NUMBER(word) ((word).integer)
+#define MEMBER_NUMBER(member) (member)
 #define ANY_PLAUSIBLE() (int_least32_t)Frama_C_long_interval(LOWEST, HIGHEST)
 #endif
 

@@ -4,7 +4,7 @@
  *
  * The invariant: the intervals below. It holds after `init`; that a call keeps it is checked at the end, but for three
  * facts that relate two numbers, which no interval can say (docs/proof.md gives the argument): valid <= position <=
- * samples_per_block, gap + count <= 65535, and means lie between the samples they are of. The mean and the slope
+ * samples_per_block, position * period_us < 2^32, and means lie between the samples they are of. The mean and the slope
  * are taken by their contracts here; mean.c and slope.c show that they keep them, tests/prove/primitives_f32.c
  * that gtc_f32_is_missing() keeps its own.
  */
@@ -33,34 +33,46 @@ static inline int gtc_f32_is_missing(float x);
 
 static NAME(state_t) state;
 
+static void any_input(uint_least32_t least_valid, uint_least32_t most_valid)
+{
+    NAME(input_t) *const in = &state.input[0];
+    in->gap_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->agreed_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->same_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->received = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->valid = Frama_C_unsigned_long_interval(least_valid, most_valid);
+    in->held_blocks = Frama_C_unsigned_long_interval(0, THE_TABLE.guards[6].bits + 1U);
+    in->clamped = Frama_C_unsigned_long_interval(0, 3);
+    in->last = ANY_PLAUSIBLE();
+    in->candidate = ANY_PLAUSIBLE();
+    in->base = ANY_PLAUSIBLE();
+    in->mean = ANY_PLAUSIBLE();
+#if defined(F32)
+    in->near = any_number(0);
+    in->sum = Frama_C_float_interval(-291.0F * MAX_BLOCK, 291.0F * MAX_BLOCK);
+#else
+    in->near = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->sum = Frama_C_long_long_interval(-(290LL * 65536LL * (long long)MAX_BLOCK), 290LL * 65536LL * (long long)MAX_BLOCK);
+#endif
+}
+
+/* A bias is anything: what a call gives does not depend on it. */
 static void any_state(uint_least32_t least_valid, uint_least32_t most_valid)
 {
     unsigned k;
     state.table = &THE_TABLE;
+    state.period_us = Frama_C_unsigned_long_interval(1, 3603600000UL);
     state.samples_per_block = Frama_C_unsigned_long_interval(1, MAX_BLOCK);
     state.position = Frama_C_unsigned_long_interval(0, MAX_BLOCK);
-    state.valid = Frama_C_unsigned_long_interval(least_valid, most_valid);
-    state.gap = Frama_C_unsigned_long_interval(0, 65535);
-    state.suspects = Frama_C_unsigned_long_interval(0, 2);
-    state.received = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    state.period_us = Frama_C_unsigned_long_interval(1, 0xFFFFFFFFUL);
-    state.repeats = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    state.held_blocks = Frama_C_unsigned_long_interval(0, THE_TABLE.guards[6].bits + 1U);
     state.filled = Frama_C_unsigned_long_interval(0, THE_TABLE.slope_blocks);
     state.window_valid = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    state.status = Frama_C_interval(0, 31);
-    state.last = ANY_PLAUSIBLE();
-    state.candidate = ANY_PLAUSIBLE();
-    state.base = ANY_PLAUSIBLE();
-    state.mean = ANY_PLAUSIBLE();
-    state.bias = any_number(0);
-#if defined(F32)
-    state.step_per_sample = Frama_C_float_interval(0.0F, 1.0e9F);
-    state.sum = Frama_C_float_interval(-291.0F * MAX_BLOCK, 291.0F * MAX_BLOCK);
-#else
-    state.step_per_sample = (int_least32_t)Frama_C_long_interval(0, 2147483647L);
-    state.sum = Frama_C_long_long_interval(-(290LL * 65536LL * (long long)MAX_BLOCK), 290LL * 65536LL * (long long)MAX_BLOCK);
-#endif
+    state.status = Frama_C_interval(0, 63);
+    state.bias = any_number((unsigned)Frama_C_interval(0, KINDS - 1));
+    state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
+    state.off_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    state.is_stamped = Frama_C_unsigned_long_interval(0, 1);
+    state.time_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    any_input(least_valid, most_valid);
     for (k = 0; k < GTC_MAX_SLOPE_BLOCKS; k++) {
         state.window[k] = ANY_PLAUSIBLE();
     }
@@ -71,14 +83,14 @@ static void invariant_holds(void)
     unsigned k;
     //@ check state.table == &THE_TABLE;
     //@ check 1 <= state.samples_per_block <= MAX_BLOCK;
-    //@ check state.suspects <= 2;
-    //@ check state.held_blocks <= THE_TABLE.guards[6].bits + 1;
+    //@ check state.input[0].held_blocks <= THE_TABLE.guards[6].bits + 1;
+    //@ check state.input[0].clamped <= 3;
     //@ check state.filled <= THE_TABLE.slope_blocks;
-    //@ check 0 <= state.status <= 31;
-    //@ check LOWEST <= state.last <= HIGHEST;
-    //@ check LOWEST <= state.candidate <= HIGHEST;
-    //@ check LOWEST <= state.base <= HIGHEST;
-    //@ check LOWEST <= state.mean <= HIGHEST;
+    //@ check 0 <= state.status <= 63;
+    //@ check LOWEST <= state.input[0].last <= HIGHEST;
+    //@ check LOWEST <= state.input[0].candidate <= HIGHEST;
+    //@ check LOWEST <= state.input[0].base <= HIGHEST;
+    //@ check LOWEST <= state.input[0].mean <= HIGHEST;
     /*@ loop unroll GTC_MAX_SLOPE_BLOCKS; */
     for (k = 0; k < GTC_MAX_SLOPE_BLOCKS; k++) {
         //@ check LOWEST <= state.window[k] <= HIGHEST;
@@ -92,18 +104,22 @@ static void one_call(unsigned kind, uint_least32_t least_valid, uint_least32_t m
     int status = 0;
     any_state(least_valid, most_valid);
     channels[0] = any_number(kind);
-    switch (Frama_C_interval(0, 2)) {
+    switch (Frama_C_interval(0, 3)) {
     case 0:
         status = NAME(sample)(&state, channels);
         break;
     case 1:
         status = NAME(missed)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
         break;
+    case 2:
+        status = NAME(sample_at)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL), channels);
+        break;
     default:
         status = NAME(bias)(&state, &bias);
+        //@ check MEMBER_NUMBER(THE_TABLE.authority[0]) <= bias <= MEMBER_NUMBER(THE_TABLE.authority[1]);
         break;
     }
-    //@ check 0 <= status <= 31;
+    //@ check 0 <= status <= 63;
     invariant_holds();
 }
 
@@ -113,7 +129,7 @@ int main(void)
     if (NAME(init)(&state, &THE_TABLE, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL)) == 0) {
         //@ check state.table == &THE_TABLE;
         //@ check 1 <= state.samples_per_block <= MAX_BLOCK;
-        //@ check state.position == 0 && state.valid == 0 && state.gap == 0 && state.status == 8;
+        //@ check state.position == 0 && state.input[0].valid == 0 && state.input[0].gap_us == 0 && state.status == 8;
     }
     /*@ loop unroll KINDS; */
     for (kind = 0; kind < KINDS; kind++) {

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dataset import Dataset, Run
-from ...frontend import blocks_since_power_on
+from ...frontend import F32, Blocks, Guarded, blocks_since_power_on, channel_at, with_missing
 from ...metrics import Averages, average
 from ...terms import CATALOGUE, Cause, Scene
-from ...terms.recursion import Course, TermOutcome
+from ...terms.recursion import Course, CourseChannel, TermOutcome
 from ...train import Fit, TrainingData, fit, predict
 from ...train.data import joined
 from ...train.fitting import FrontEnd, samples_of
@@ -59,7 +59,7 @@ class Played:
         slope: C per block, of every correction.
         on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
         day: Days since the first run, or None.
-        channels: Samples of the channels, one for every row.
+        channels: The channels at every correction.
         block_s: Length of a block, s.
         environment: Environment as the data set names it.
     """
@@ -70,7 +70,7 @@ class Played:
     slope: Array
     on_s: Array
     day: float | None
-    channels: Mapping[str, Array]
+    channels: Mapping[str, CourseChannel]
     block_s: float
     environment: str
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
@@ -104,7 +104,7 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
     blocks, rows = front.blocks(run), run.rows()
     data = samples_of(blocks, front.block_s, number)
     before = blocks_since_power_on(rows, run, front.block_s)
-    course = blocks.stream.course(blocks.steps, blocks.samples_per_block, before)
+    course = blocks.stream.course(blocks.steps, blocks.settings.samples_per_block, before)
     day = None
     if run.started is not None and first is not None:
         day = (run.started - first).total_seconds() / 86400.0
@@ -115,10 +115,30 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
         slope=blocks.steps.slope.astype(np.float64),
         on_s=data.time_s - (run.power_on_s or 0.0),
         day=day,
-        channels={name: rows.channels[name] for name in dataset.channels},
+        channels={name: _shown(blocks, rows.channels[name]) for name in dataset.channels},
         block_s=front.block_s,
         environment=run.environment,
     )
+
+
+_OPEN = Guarded(  # as of a channel without a guard: every reading passes
+    low=np.float32(-1e9),
+    high=np.float32(1e9),
+    max_step=np.float32(1e9),
+    max_rate=np.float32(0.0),
+    agree_us=0,
+    stuck_us=0,
+    missing_blocks=0,
+    takes_edge=True,
+)
+
+
+def _shown(blocks: Blocks, column: Array) -> CourseChannel:
+    """A channel as the target sees it; where it shows nothing it adds nothing."""
+    readings = with_missing(F32, F32.numbers(column), blocks.stream.position)
+    guard = replace(_OPEN, missing_blocks=blocks.settings.guard.missing_blocks)
+    shown = channel_at(F32, readings, guard, np.float32(np.nan), blocks.settings, blocks.steps)
+    return replace(shown, mean=shown.mean.astype(np.float64))
 
 
 def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:

@@ -29,10 +29,11 @@ from .candidates import Candidate, diagnosed
 from .signature_bank import Alternative, Signature, SignatureBank, build
 from .static_map import MapBasis
 
-__all__ = ["bank_of", "folder"]
+__all__ = ["bank_of", "clear", "folder", "held", "limit", "set_limit"]
 
 _VERSION = 4  # raised with every change of what a bank holds
-_MOST_BYTES = 2 * 2**30  # some dozens of banks
+_MOST_BYTES = 2 * 10**9  # some dozens of banks
+_LIMIT = "limit_bytes"  # a file beside the banks that says otherwise
 _MAKERS = (
     "diagnose/screen/blocks",
     "diagnose/noise_colour/colours",
@@ -150,11 +151,44 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
+def limit() -> int:
+    """Most bytes that all banks may take."""
+    try:
+        return min(int((folder() / _LIMIT).read_text("ascii")[:20]), 10**15)
+    except (OSError, ValueError):
+        return _MOST_BYTES
+
+
+def set_limit(most: int) -> None:
+    """Keeps to another limit from now on.
+
+    Raises:
+        InputError: The folder is not there and cannot be made, or is not the user's own.
+    """
+    if not _own_folder():
+        raise InputError(str(folder()), "is not a folder that only this user may write", "such a folder")
+    write_atomically(folder() / _LIMIT, f"{most}\n")
+    _trim()
+
+
+def held() -> tuple[int, int]:
+    """How many banks there are, and their bytes."""
+    sizes = [path.stat().st_size for path in folder().glob("*.bank")]
+    return len(sizes), sum(sizes)
+
+
+def clear() -> None:
+    """Removes all banks."""
+    for path in folder().glob("*.bank"):
+        path.unlink(missing_ok=True)
+
+
 def _trim() -> None:
-    """Drops the banks that were not used for longest, down to 2 GiB."""
+    """Drops the banks that were not used for longest, down to the limit."""
+    most = limit()
     files = sorted(folder().glob("*.bank"), key=lambda p: p.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size
-        if total > _MOST_BYTES:
+        if total > most:
             path.unlink(missing_ok=True)

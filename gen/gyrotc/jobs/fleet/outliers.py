@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...metrics import MAD_TO_SIGMA
-from ...results.fleet import FleetOutlier, FleetUnit, Spread
 
-__all__ = ["FIGURES", "outliers", "spread"]
+__all__ = ["FIGURES", "FleetOutlier", "outliers", "spread"]
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
@@ -19,40 +21,63 @@ FIGURES = {
     "noise_floor_dph": True,
     "bias_dph": False,
     "after_mean_dph": False,
-    "sum_abs_weights_dph": True,
 }
 _LEAST = 8  # fewer serials do not say what a usual one is
-# Once in two million normal figures: of a fleet of a thousand with seven figures none by chance
-_SIGMAS = 5.0
+_SIGMAS = 5.0  # once in two million normal figures: of a thousand gyros with six figures none by chance
+_LEAST_OF_RMS = 0.1  # of the others, in shares of what usually remains: means of 1e-9 deg/h say nothing
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
 
-def spread(units: Sequence[FleetUnit], figure: str) -> Spread | None:
+@dataclass(frozen=True, slots=True)
+class FleetOutlier:
+    """A figure of a serial, the fleet's median of it, and the distance in robust standard deviations."""
+
+    name: str
+    figure: str
+    value: float
+    median: float
+    sigmas: float
+
+
+def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] | None:
     """Median, least and largest value of a figure; None where no serial has it."""
-    values = [value for unit in units if (value := getattr(unit, figure)) is not None]
+    values = [entry[figure] for entry in entries if entry.get(figure) is not None]
     if not values:
         return None
-    return Spread(median=float(np.median(values)), least=float(min(values)), largest=float(max(values)))
+    return {"median": float(np.median(values)), "least": float(min(values)), "largest": float(max(values))}
 
 
-def outliers(units: Sequence[FleetUnit]) -> list[FleetOutlier]:
-    """Serials that stand apart, the farthest first; each serial with each of its figures that does."""
-    found: list[FleetOutlier] = []
+def outliers(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
+    """Serials that stand apart from those of their axis, each with each figure that does, the farthest first."""
+    kinds: dict[str | None, list[dict[str, Any]]] = defaultdict(list)
+    for entry in entries:
+        kinds[entry.get("axis")].append(entry)
+    found = [outlier for kind in kinds.values() for outlier in _of_kind(kind)]
+    return sorted(found, key=lambda o: (-o.sigmas, o.name))
+
+
+def _of_kind(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
+    found = []
+    usual = spread(entries, "after_rms_dph")
+    usual_rms = usual["median"] if usual else 0.0
     for figure, by_ratio in FIGURES.items():
-        pairs = [(unit.name, float(value)) for unit in units if (value := getattr(unit, figure)) is not None]
-        known = [(name, value) for name, value in pairs if value > 0.0 or not by_ratio]
+        known = [e for e in entries if e.get(figure) is not None and (e[figure] > 0.0 or not by_ratio)]
         if len(known) < _LEAST:
             continue
-        values = np.array([value for _, value in known])
+        values = np.array([entry[figure] for entry in known])
         scaled = np.log(values) if by_ratio else values
         apart = np.abs(scaled - np.median(scaled))
-        sigma = max(MAD_TO_SIGMA * float(np.median(apart)), _LEAST_RATIO / _SIGMAS if by_ratio else 0.0)
+        sigma = max(
+            MAD_TO_SIGMA * float(np.median(apart)),
+            _LEAST_RATIO / _SIGMAS if by_ratio else _LEAST_OF_RMS / _SIGMAS * usual_rms,
+        )
         if sigma == 0.0:
             continue
-        median = float(np.median(values))
         found += [
-            FleetOutlier(name=name, figure=figure, value=value, median=median, sigmas=float(distance / sigma))
-            for (name, value), distance in zip(known, apart, strict=True)
+            FleetOutlier(
+                entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma)
+            )
+            for entry, value, distance in zip(known, values, apart, strict=True)
             if distance > _SIGMAS * sigma
         ]
-    return sorted(found, key=lambda o: (-o.sigmas, o.name))
+    return found

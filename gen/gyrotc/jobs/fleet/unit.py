@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from ...dataset import load
+from ...dataset import Dataset, load
 from ...errors import CheckFailed, GyrotcError, InputError
+from ...judge.conformity import coverage_factor
+from ...metrics import Averages
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ...results.evaluation import Evaluation
-from ...results.fleet import FleetEntry
 from ...results.verification import Verification
-from ..build import build_into
+from ..build import Built, build_into
 from .aside import set_aside
-from .entry import kept_entry, write_entry
+from .entry import Entry, kept_entry, write_entry
+from .facts import facts_of
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
-from .turned import curve_of
 
 __all__ = ["Task", "do_unit", "done_before", "failed"]
 
@@ -40,7 +40,7 @@ class Task:
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 
-def done_before(task: Task) -> FleetEntry | None:
+def done_before(task: Task) -> Entry | None:
     """The entry of an earlier call that still holds; None if the job must be done.
 
     It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
@@ -49,10 +49,10 @@ def done_before(task: Task) -> FleetEntry | None:
         entry = None if task.unit.refused else kept_entry(task.out, task.key())
     except OSError:
         return None
-    return entry and entry.model_copy(update=_who(task))
+    return entry and entry | _who(task)
 
 
-def do_unit(task: Task) -> FleetEntry:
+def do_unit(task: Task) -> Entry:
     """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
     try:
         if task.unit.refused:
@@ -68,16 +68,16 @@ def do_unit(task: Task) -> FleetEntry:
         return failed(task, f"{type(error).__name__}: {error}")
 
 
-def failed(task: Task, reason: str) -> FleetEntry:
+def failed(task: Task, reason: str) -> Entry:
     """The entry of a job that came to nothing; an earlier result of the gyro stays as it was."""
     try:
         stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
     except OSError:
         stays = ""
-    return FleetEntry(**_who(task), status="failed", reason=printable(reason) + stays)
+    return _who(task) | {"status": "failed", "reason": printable(reason) + stays}
 
 
-def _who(task: Task) -> dict[str, Any]:
+def _who(task: Task) -> Entry:
     return {
         "name": task.unit.name,
         "dataset": printable(str(task.unit.dataset)),
@@ -85,11 +85,12 @@ def _who(task: Task) -> dict[str, Any]:
     }
 
 
-def _built(task: Task) -> FleetEntry:
+def _built(task: Task) -> Entry:
     """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
     key = task.key()
     dataset = load(task.unit.dataset, axis=task.unit.axis)
     aside = set_aside(task.out)
+    runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
         fleet = task.fleet
@@ -100,30 +101,27 @@ def _built(task: Task) -> FleetEntry:
             numerics=fleet.numerics,
             limits=fleet.limits,
             compiled=task.full,
+            watch=lambda run, averages: runs.append((run.file, averages)),
         )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        entry = FleetEntry(
-            **_who(task),
-            status="done",
-            key=key,
-            sketch="".join(f"{word:016x}" for word in dataset.sketch),
-            curve=tuple(curve_of(built.model)),
-            **_figures(built.model, built.evaluation, built.verification),
+        failed_checks = "; ".join(built.failures)
+        status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
+        figures: Entry = {"serial": dataset.serial} | _figures(
+            built.model, built.evaluation, built.verification
         )
-        if built.failures:
-            entry = entry.model_copy(update={"status": "failed", "reason": "; ".join(built.failures)})
-        write_entry(stage.folder, entry)
-    return entry.model_copy(update={"aside": aside}) if aside else entry
+        figures |= _judgement(built, dataset) | {"facts": facts_of(runs)}
+        figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
+        entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
+    return entry | {"aside": aside} if aside else entry
 
 
-def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> dict[str, Any]:
+def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> Entry:
     """What the summary shows and outliers are sought in."""
     role, judged = evaluation.judged() or (None, None)
     floor = evaluation.noise_floor_dph
     after = judged.after.rms_dph if judged else None
     return {
-        "serial": model.serial,
         "judged_on": role,
         "before_rms_dph": judged.before.rms_dph if judged else None,
         "after_rms_dph": after,
@@ -135,6 +133,21 @@ def _figures(model: Model, evaluation: Evaluation, verification: Verification) -
         "table_bytes": evaluation.model.table_bytes,
         "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
         "error_bound_dph": verification.error_bound_dph,
-        "findings": tuple(finding.id for finding in evaluation.findings),
+        "findings": [finding.id for finding in evaluation.findings],
         "model_hash": model.hash,
+    }
+
+
+def _judgement(built: Built, dataset: Dataset) -> Entry:
+    """Verdict, uncertainty and date, as the page of the unit states them."""
+    held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
+    stated = built.model.meta.get("calibrated_on")
+    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
+    return {
+        "verdict": held.verdict if held else None,
+        "limits_met": sum(limit.met for limit in held.limits) if held else None,
+        "limits_held": len(held.limits) if held else None,
+        "expanded_uncertainty_dph": coverage_factor(known.freedom) * known.standard if known else None,
+        "date": str(stated) if stated is not None else max(days, default=None),
+        "rows_left_out": built.evaluation.rows_left_out,
     }

@@ -1,0 +1,196 @@
+"""One axis of one unit as its page tells it: the results that stand in a folder, and words about them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..model import Model, load_model
+from ..results.base import read_optional, read_result
+from ..results.changes import Changes
+from ..results.diagnosed import Diagnosed
+from ..results.evaluation import Evaluation, Pooled
+from ..results.limits import HeldLimits, Limit
+from ..results.manifest import Manifest
+from ..results.training import Rung, Training
+from ..results.verification import Verification
+from .words import limit_words, plain, words
+
+__all__ = ["UnitResults", "unit_in"]
+
+_JUDGED_ON = {
+    "exam": "exam runs, never seen in training",
+    "left_out": "spans left out of training in turn",
+    "train": "the training runs themselves",
+}
+_RULES = {
+    "guard_band": "a guard band of w = U; PASS up to the limit less w, CONDITIONAL PASS from there up to the limit, "
+    "else FAIL (ILAC-G8:09/2019, non-binary)",
+    "guard_band_binary": "a guard band of w = U; PASS up to the limit less w, else FAIL (ILAC-G8:09/2019, binary)",
+    "simple_acceptance": "simple acceptance, w = 0 (ILAC-G8:09/2019, binary)",
+}
+_GRAVEST = ("FAIL", "CONDITIONAL PASS", "PASS")
+_COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
+
+
+def unit_in(folder: Path) -> UnitResults:
+    """What a result folder says of its unit.
+
+    Raises:
+        InputError: `model.json` or `evaluate.json` is missing, or a result is broken.
+    """
+    return UnitResults(
+        model=load_model(folder / "model.json"),
+        evaluation=read_result(folder / "evaluate.json", Evaluation),
+        training=read_optional(folder / "training.json", Training),
+        verification=read_optional(folder / "verify.json", Verification),
+        manifest=read_optional(folder / "manifest.json", Manifest),
+        diagnosis=read_optional(folder / "diagnosis" / "diagnose.json", Diagnosed),
+        limits=read_optional(folder / "limits.json", HeldLimits),
+        changes=read_optional(folder / "changes.json", Changes),
+    )
+
+
+class UnitResults:
+    """The results of one axis. What is not there is None."""
+
+    def __init__(
+        self,
+        model: Model,
+        evaluation: Evaluation,
+        training: Training | None,
+        verification: Verification | None,
+        manifest: Manifest | None,
+        diagnosis: Diagnosed | None,
+        limits: HeldLimits | None,
+        changes: Changes | None,
+    ) -> None:
+        self.model, self.evaluation, self.training = model, evaluation, training
+        self.verification, self.manifest, self.diagnosis = verification, manifest, diagnosis
+        self.limits, self.changes = limits, changes
+        judged = evaluation.judged()
+        self.judged = judged[1] if judged else None
+        self.judged_on = _JUDGED_ON[judged[0]] if judged else "nothing"
+
+    @property
+    def verdict(self) -> str:
+        """Of the limits and of what was proven; empty without limits where nothing failed."""
+        if self.failures:
+            return "FAIL"
+        return _verdict(self.limits) if self.limits else ""
+
+    @property
+    def failures(self) -> list[str]:
+        """Checks that failed beside the limits."""
+        return list(_failures(self.verification, self.evaluation))
+
+    @property
+    def held(self) -> list[Limit]:
+        """The limits, those that are not met first."""
+        limits = self.limits.limits if self.limits else ()
+        return sorted(limits, key=lambda one: _GRAVEST.index(_verdict(one)))
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many limits have each verdict."""
+        return Counter(_verdict(one) for one in self.held)
+
+    def named(self, verdict: str) -> str:
+        """The limits of a verdict, in words."""
+        return "; ".join(limit_words(one.limit) for one in self.held if _verdict(one) == verdict)
+
+    @property
+    def rule(self) -> str:
+        """The decision rule in words."""
+        rule = self.limits.decision_rule if self.limits else None
+        return _RULES[rule] if rule else "simple acceptance (a result of an earlier gyrotc)"
+
+    def spread(self, figure: str) -> float | None:
+        """Expanded uncertainty (k = 2) of a figure."""
+        known = (self.evaluation.uncertainty or {}).get(figure)
+        return _COVERAGE * known.standard if known else None
+
+    @property
+    def about_the_mean(self) -> float | None:
+        """How many times smaller the standard deviation has become."""
+        return _ratio(self.judged, "std_dph")
+
+    @property
+    def over_floor(self) -> float | None:
+        """RMS over noise floor."""
+        floor, rms = self.evaluation.noise_floor_dph, self.judged.after.rms_dph if self.judged else None
+        return rms / floor if floor and rms is not None else None
+
+    def against_constant(self, rung: Rung) -> float | None:
+        """How many times what this correction leaves a constant leaves."""
+        ladder = self.training.ladder if self.training else ()
+        constant = next((r.left_out_rms_dph for r in ladder if r.id == "constant"), None)
+        return constant / rung.left_out_rms_dph if constant and rung.left_out_rms_dph else None
+
+    @property
+    def who(self) -> list[tuple[str, str]]:
+        """Who, what and when, of what is known."""
+        meta = {
+            k: v for k, v in self.model.meta.items() if k not in ("warnings", "environments", "description")
+        }
+        product = self.limits.product if self.limits else ""
+        date = meta.pop("calibrated_on", None)
+        train = sum(run.role == "train" for run in self.evaluation.runs)
+        found = [
+            ("serial", self.model.serial + (f", axis {self.model.axis}" if self.model.axis else "")),
+            ("product", product),
+            ("calibrated on", str(date) if date is not None else "not stated"),
+            *((words(key), plain(value)) for key, value in meta.items()),
+            ("recordings", f"{train} for training, {len(self.evaluation.runs) - train} for the exam"),
+            ("correction", f"{self.model.method}, model {self.model.hash[:12]}"),
+            ("made with", f"gyrotc {self.evaluation.gyrotc_version}"),
+        ]
+        return [(name, value) for name, value in found if value]
+
+    @property
+    def other_changes(self) -> list[tuple[str, str, str | None]]:
+        """Figures, versions and files that are not as in the earlier result: before and now, or one text."""
+        return list(_changes(self.changes)) if self.changes else []
+
+
+def _verdict(one: Limit | HeldLimits) -> str:
+    return one.verdict or ("PASS" if one.met else "FAIL")
+
+
+def _ratio(judged: Pooled | None, figure: str) -> float | None:
+    if judged is None:
+        return None
+    before, after = getattr(judged.before, figure), getattr(judged.after, figure)
+    return before / after if before is not None and after else None
+
+
+def _failures(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:
+    if verification:
+        for target in verification.targets:
+            if target.status == "fail":
+                yield f"{target.name}, {target.numeric}: does not answer as the reference does"
+        for file in verification.emitted:
+            if file.status == "fail":
+                yield f"{file.file}: {file.verdict}"
+        for error in verification.errors:
+            if error.status == "fail":
+                yield f"{error.numeric}: farther from the model than the proven bound"
+    if evaluation.mismatches:
+        yield f"{evaluation.mismatches} steps of the recordings differ from the reference"
+
+
+def _changes(changes: Changes) -> Iterator[tuple[str, str, str | None]]:
+    for name, figure in changes.figures.items():
+        if not isinstance(figure, str) and figure.before != figure.after:
+            yield words(name), plain(figure.before), plain(figure.after)
+    for name, version in changes.versions.items():
+        yield name, version.before or "–", version.after or "–"
+    for kind, part in (
+        ("recordings", changes.recordings),
+        ("findings", changes.findings),
+        ("files", changes.files),
+    ):
+        for what, names in part:
+            if names:
+                yield f"{kind}, {words(what)}", ", ".join(names), None

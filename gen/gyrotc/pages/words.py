@@ -1,0 +1,159 @@
+"""Words for people where results have keys, and figures rounded to what is known of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..results.limits import Limit
+
+__all__ = [
+    "bound_words", "limit_words", "measured_words", "plain", "sci", "with_uncertainty", "words", "words_of_rung",
+]  # fmt: skip
+
+_UNITS = (
+    ("_dph_per_c_per_min", "deg/h/(C/min)"),
+    ("_dph_per_sqrt_h", "deg/h/√h"),
+    ("_deg_per_sqrt_h", "deg/√h"),
+    ("_c_per_min", "C/min"),
+    ("_dph_per_day", "deg/h a day"),
+    ("_dph_per_unit", "deg/h a unit"),
+    ("_dph_per_c", "deg/h/C"),
+    ("_dph", "deg/h"),
+    ("_arcsec", "arcsec"),
+    ("_bytes", "bytes"),
+    ("_rad", "rad"),
+    ("_s", "s"),
+    ("_c", "C"),
+)
+"""Ends of keys, the longer first."""
+
+_STEMS = {
+    "tau": "time constant",
+    "width": "width",
+    "rms": "RMS",
+    "std": "standard deviation about the mean",
+    "mean": "mean",
+    "max_abs": "largest magnitude",
+    "rms_30min": "RMS of 30-minute means, worst run",
+    "angle_1h": "angle after one hour, worst run",
+    "first_10min_rms": "RMS of the first 10 minutes, worst run",
+    "rms_over_floor": "RMS ÷ noise floor",
+    "noise_floor": "noise floor",
+    "uncertainty": "uncertainty of the map (1 σ), largest",
+    "error_bound": "error of the emitted arithmetic, proven bound",
+    "table": "table",
+    "rom": "code and constants",
+    "ram": "memory",
+    "rows_left_out": "rows of training left out as outliers",
+    "centers": "centers",
+    "improvement": "RMS before ÷ after, mean included",
+    "covered": "share of the envelope with training data",
+    "before_rms": "RMS before, mean included",
+    "after_rms": "RMS after",
+    "after_mean": "mean after",
+    "bias": "mean bias",
+    "sum_abs_weights": "sum of the map's weights",
+}
+
+_LIMITS = {
+    "covers.temperature_c": "calibrated temperatures, C",
+    "covers.slope_c_per_min": "calibrated temperature rates, C/min",
+    "needs.arithmetics": "arithmetic emitted",
+    "needs.targets": "bit for bit on the target",
+    "needs.generalises": "holds on thermal history that it has not seen",
+    "needs.no_findings": "findings that must not be there",
+}
+
+_RUNGS = {
+    "nothing": "no correction",
+    "constant": "a constant",
+    "linear": "a plane in T and dT/dt",
+    "cubic": "a cubic in T",
+    "cubic_slope": "a cubic in T and dT/dt",
+    "mrbf_t": "the network over T",
+    "mrbf": "the network over T and dT/dt",
+}
+
+
+def words(key: str) -> str:
+    """A key such as `before_rms_dph` as words with its unit: "RMS before, mean included, deg/h"."""
+    for end, unit in _UNITS:
+        stem = key.removesuffix(end)
+        if stem != key and stem:
+            return f"{_STEMS.get(stem, stem.replace('_', ' '))}, {unit}"
+    return _STEMS.get(key, key.replace("_", " "))
+
+
+def limit_words(limit: str) -> str:
+    """What a limit of the limits file is about."""
+    return _LIMITS.get(limit) or words(limit.partition(".")[2])
+
+
+def words_of_rung(id: str) -> str:
+    """A correction of the ladder."""
+    return _RUNGS.get(id, id.replace("_", " "))
+
+
+def sci(value: float | None, digits: int = 2) -> str:
+    """A number with its power of ten, as the trade writes it: 7.00e-04 → 7.00·10⁻⁴."""
+    if value is None:
+        return "–"
+    if value == 0.0:
+        return "0"
+    if 0.01 <= abs(value) < 1e5:
+        return f"{value:.{digits + 1}g}" if abs(value) < 1e3 else f"{value:,.0f}"
+    mantissa, exponent = f"{value:.{digits}e}".split("e")
+    return f"{mantissa}·{_power(int(exponent))}"
+
+
+def _power(exponent: int) -> str:
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def with_uncertainty(value: float | None, expanded: float | None) -> str:
+    """A figure and its expanded uncertainty to the same digit, two of the uncertainty: (7.21 ± 0.25)·10⁻⁴."""
+    if value is None or not expanded or not math.isfinite(expanded):
+        return sci(value)
+    exponent = math.floor(math.log10(max(abs(value), expanded)))
+    if -3 < exponent < 4:
+        exponent = 0
+    scaled, spread = value / 10.0**exponent, expanded / 10.0**exponent
+    digits = max(0, 1 - math.floor(math.log10(spread)))
+    text = f"{scaled:.{digits}f} ± {spread:.{digits}f}"
+    return text if exponent == 0 else f"({text})·{_power(exponent)}"
+
+
+def plain(value: Any) -> str:
+    """A figure of any kind."""
+    if isinstance(value, (list, tuple)):
+        numbers = [v for v in value if isinstance(v, float)]
+        if value and len(numbers) == len(value):
+            return " … ".join(f"{v:.4g}".replace("-", "−") for v in value)
+        return ", ".join(plain(v).replace("_", " ") for v in value) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return sci(value, 3) if value != round(value) or abs(value) >= 1e6 else f"{value:g}"
+    return "–" if value is None else str(value)
+
+
+def measured_words(limit: Limit) -> str:
+    """What was measured of a limit, rounded to what is known of it."""
+    if isinstance(limit.measured, float) and limit.expanded_uncertainty:
+        return with_uncertainty(limit.measured, limit.expanded_uncertainty)
+    if limit.measured is None:
+        return "not measured" if not limit.limit.startswith("needs.generalises") else "not known"
+    return plain(limit.measured)
+
+
+def bound_words(limit: Limit) -> str:
+    """A bound with its sense, as it was given."""
+    sign = {"at_most": "≤ ", "at_least": "≥ "}.get(limit.limit.partition(".")[0], "")
+    if isinstance(limit.bound, float):
+        mantissa, _, exponent = f"{limit.bound:.6g}".partition("e")
+        if 0.0 < abs(limit.bound) < 0.01:
+            mantissa, _, exponent = f"{limit.bound:.5e}".partition("e")
+            mantissa = mantissa.rstrip("0").rstrip(".")
+        return sign + mantissa + (f"·{_power(int(exponent))}" if exponent else "")
+    return sign + plain(limit.bound).replace("_", " ")

@@ -1,0 +1,29 @@
+; gtc_<n>_govern() (libc/gtc_map.inl), through which every correction goes that gtc_<n>_bias() and gtc_<n>_map() give:
+; whatever the correction, of whatever state, and whatever bounds a table may have, the result lies within them.
+; `unsat` says that no words break the claim.
+(set-logic ALL)
+(define-sort number () (_ FloatingPoint 8 24))
+(declare-const x number)
+(declare-const low number)
+(declare-const high number)
+; what `open`, `check` and `init` see to: numbers, the smallest not above 0, the largest not below it
+(define-fun zero () number (_ +zero 8 24))
+(define-fun governed () number (ite (not (fp.geq x low)) low (ite (not (fp.leq x high)) high x)))
+
+(push)
+(assert (and (fp.leq low zero) (fp.geq high zero)))
+(assert (not (and (fp.leq low governed) (fp.leq governed high))))
+(check-sat)
+(pop)
+
+(declare-const y (_ BitVec 64))
+(declare-const least (_ BitVec 32))
+(declare-const most (_ BitVec 32))
+(define-fun wide ((a (_ BitVec 32))) (_ BitVec 64) ((_ sign_extend 32) a))
+(define-fun whole () (_ BitVec 64) (ite (not (bvsge y (wide least))) (wide least) (ite (not (bvsle y (wide most))) (wide most) y)))
+
+(push)
+(assert (and (bvsle least #x00000000) (bvsge most #x00000000)))
+(assert (not (and (bvsle (wide least) whole) (bvsle whole (wide most)))))
+(check-sat)
+(pop)
