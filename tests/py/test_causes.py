@@ -17,7 +17,7 @@ from gyrotc.pages.plan_page import write_plan
 from gyrotc.plan import plan
 from gyrotc.simulate import simulate
 from gyrotc.terms import CATALOGUE, Cause, History, Scene, register, separate_by
-from gyrotc.terms.recursion import Course, TermOutcome
+from gyrotc.terms.recursion import Course, CourseChannel, TermOutcome
 from gyrotc.terms.search import Reach
 from gyrotc.train.fitting import FitOptions
 
@@ -139,11 +139,12 @@ def test_every_cause_of_a_table_does_there_what_it_does_in_the_simulation(id: st
     term, values = CATALOGUE[id], _values(CATALOGUE[id])
     assert term.table
     number = np.arange(TIME.size)
-    course = Course(WAVE, number > 0, number, number + 1, 1)
+    course = Course(WAVE, number > 0, number)
     nothing = np.zeros_like(WAVE)
     outcome = TermOutcome(WAVE, nothing, nothing, np.zeros(WAVE.size, dtype=np.int32))
     table = term.table
-    table.recursion(values, 10.0).apply(course, WAVE, outcome)
+    channel = CourseChannel(WAVE, np.zeros(WAVE.size, dtype=np.int32))
+    table.recursion(values, 10.0).apply(course, channel, outcome)
     scene = Scene(TIME, TIME, WAVE, WAVE, WAVE, WAVE, 0.0)
     if term.cavity is not None:
         assert np.abs(outcome.temperature - term.cavity(scene, values)).max() < np.abs(np.diff(WAVE)).max()

@@ -12,7 +12,7 @@ from gyrotc.errors import InputError
 from gyrotc.simulate.biasmap import draw
 from gyrotc.terms import CATALOGUE, History, Scene
 from gyrotc.terms.operators import delayed, first_order, play
-from gyrotc.terms.recursion import Course, TermOutcome
+from gyrotc.terms.recursion import Course, CourseChannel, TermOutcome
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -139,7 +139,7 @@ REFERENCES = {
 def course_of(temperature_c: Array) -> Course:
     """One correction for every row: the first starts, every other one closes a block of one sample."""
     number = np.arange(len(temperature_c))
-    return Course(temperature_c, number > 0, number, number + 1, 1)
+    return Course(temperature_c, number > 0, number)
 
 
 def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, channel: Array) -> TermOutcome:
@@ -147,7 +147,8 @@ def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, chann
     assert table
     nothing = np.zeros_like(temperature_c)
     outcome = TermOutcome(temperature_c, nothing, nothing, np.zeros(len(nothing), dtype=np.int32))
-    table.recursion(values, 10.0).apply(course_of(temperature_c), channel, outcome)
+    seen = CourseChannel(channel, np.zeros(len(nothing), dtype=np.int32))
+    table.recursion(values, 10.0).apply(course_of(temperature_c), seen, outcome)
     return outcome
 
 
