@@ -212,6 +212,11 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
         and "c/gtc.c" not in changes["files"]["other_bytes"]
     )
     assert "maps 1.000e-02 deg/h RMS apart" in done.stdout
+    found = changes["as_found"]
+    assert found["judged_on"] == "train" and found["limits"]["met"] is True
+    assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"
+    assert [c["moved_rms_dph"] is None for c in changes["history"]] == [True, False]
+    assert changes["map"]["significant"] is True and "as found: RMS 1.0" in done.stdout
     names = json.loads((tmp_path / "two" / "manifest.json").read_text())["files"]
     assert "limits.json" in names
 

@@ -33,6 +33,9 @@ def as_found(
         return None, "the earlier correction was made from recordings that are among these"
     try:
         found = evaluate(earlier.folder, dataset, average_s=average_s, compiled=False)
+        known = earlier.evaluation  # of its training: the new recordings say nothing about it
+        update = {"generalises": known.generalises, "rows_left_out": known.rows_left_out} if known else {}
+        found = found.model_copy(update=update)
         verification = read_optional(earlier.folder / "verify.json", Verification)
         held = held_against(limits, earlier.model, found, verification) if limits else None
     except (GyrotcError, OSError) as error:

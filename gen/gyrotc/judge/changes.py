@@ -111,7 +111,7 @@ def changes_since(
         limits: Limits of the product, which hold for the state as found as well.
     """
     old = earlier.model
-    moved = _map(old, model)
+    moved = _map(old, model, _of_means(earlier.evaluation, evaluation))
     found, missing = (None, "not asked for")
     if dataset is not None:
         found, missing = as_found(earlier, dataset, limits, evaluation.average_s)
@@ -172,8 +172,23 @@ def _recordings(old: Model, new: Model) -> FileChanges:
     return _hashes_apart(before, after)
 
 
-def _map(old: Model, new: Model) -> Apart | None:
-    """How far the maps lie apart where both were calibrated, deg/h; None where nothing is common."""
+def _of_means(*evaluations: Evaluation | None) -> float | None:
+    """Standard uncertainty of the difference of the means of what remains; None where one is not known."""
+    variance = 0.0
+    for evaluation in evaluations:
+        known = (evaluation.uncertainty or {}).get("mean_dph") if evaluation else None
+        if known is None:
+            return None
+        variance += known.standard**2
+    return float(np.sqrt(variance))
+
+
+def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
+    """How far the maps lie apart where both were calibrated, deg/h; None where nothing is common.
+
+    Args:
+        of_means: What two means differ by although nothing moved; it stands in where a map states no uncertainty.
+    """
     limits = []
     for name in ("temperature_c", "slope_c_per_min"):
         (a, b), (c, d) = getattr(old.envelope, name), getattr(new.envelope, name)
@@ -186,6 +201,7 @@ def _map(old: Model, new: Model) -> Apart | None:
     floor = new.noise_floor_dph
     rms = float(np.sqrt(np.mean(apart**2)))
     expected = _expected_rms(old, new, t, slope)
+    expected = of_means if expected is None else expected
     return Apart(
         rms_dph=rms,
         mean_dph=float(np.mean(apart)),

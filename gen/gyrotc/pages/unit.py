@@ -193,4 +193,4 @@ def _changes(changes: Changes) -> Iterator[tuple[str, str, str | None]]:
     ):
         for what, names in part:
             if names:
-                yield f"{kind}, {words(what)}", ", ".join(names), None
+                yield f"{kind}, {what.replace('_', ' ')}", ", ".join(names), None

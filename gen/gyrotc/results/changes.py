@@ -80,7 +80,8 @@ class Apart(Part):
     expanded_uncertainty_dph: Amount | None = Field(
         default=None,
         description="U (k = 2) of `rms_dph`: twice the RMS that the uncertainties of both maps give "
-        "(`uncertainty_dph` of the models) although the gyro has not changed; null where a model has none",
+        "(`uncertainty_dph` of the models; without it those of the means of what remains) although the gyro has not "
+        "changed; null where that is not known",
     )
     significant: bool | None = Field(
         default=None, description="whether `rms_dph` is more than that; null where it is not known"
