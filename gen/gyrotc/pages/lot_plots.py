@@ -52,7 +52,7 @@ def unit_apart(known: Mapping[str, Mapping[str, Any]], reason: Mapping[str, Any]
     """
     entry = known[reason["name"]]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.2, 2.4), layout="constrained")
+        figure = Figure(figsize=(4.4, 2.1), layout="constrained")
         ax = figure.subplots()
         if reason["id"] in _IN_TIME and entry["facts"]["series"]:
             _draw_series(ax, entry["facts"]["series"], reason)
