@@ -29,6 +29,9 @@ static int_least32_t NAME(window_slope)(const NAME(state_t) *state, num_t *slope
 static inline int gtc_f32_is_missing(float x);
 #endif
 
+/* `volatile` stands in libc/ so that compilers make no calls of memset() and memmove() out of loops. Nobody else
+ * writes there, but Eva takes every such read for anything. */
+#define volatile
 #include "gtc.c"
 
 static NAME(state_t) state;
