@@ -53,13 +53,13 @@ class Case:
 
 
 def content(result: Path) -> Content:
-    """Every file of a result but the markers; nothing if it is not there."""
+    """Every file of a result; nothing if it is not there. Hidden names are gyrotc's books (`left_beside`)."""
     if result.is_file():
         return {"": result.read_bytes()}
     return {
         p.relative_to(result).as_posix(): p.read_bytes()
         for p in sorted(result.rglob("*"))
-        if p.is_file() and p.name != MARKER
+        if p.is_file() and not any(name.startswith(".") for name in p.relative_to(result).parts)
     }
 
 

@@ -129,7 +129,7 @@ def test_no_alarm(name: str, numeric: str, machine: str, tables: dict[str, Path]
             "step",
             "q31",
             r"for \(i = state->table->slope_blocks - 1U; i > 0U; i--\)",
-            "for (i = 25U; i > 0U; i--)",
+            "for (i = 250U; i > 0U; i--)",  # Eva sees what leaves the state, not what leaves a member of it
         ),
     ],
 )
