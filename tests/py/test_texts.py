@@ -506,6 +506,13 @@ def test_a_picture_of_somebody_elses_folder_does_nothing_but_draw(tmp_path: Path
             checked_svg(text)
 
 
+def test_a_picture_that_no_folder_can_have_is_missing(tmp_path: Path) -> None:
+    """Before: a name longer than the system allows was an error of the system."""
+    for name in ("x" * 300, "../" * 2000, "..", "/", ""):
+        (tmp_path / "diagnose.json").write_text(json.dumps(_DIAGNOSIS | {"pictures": [f"pictures/{name}"]}))
+        assert "<svg" not in write_page(tmp_path).read_text()
+
+
 # ---- TOML ----
 
 

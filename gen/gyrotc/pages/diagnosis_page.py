@@ -52,9 +52,10 @@ def _pictures(folder: Path, result: Diagnosed) -> dict[str, Markup]:
     Raises:
         InputError: One is more than a drawing.
     """
-    paths = [folder / PICTURES / Path(name).name for name in result.pictures or ()]
+    here = {path.name: path for path in (folder / PICTURES).glob("*") if path.is_file()}
     found = {}
-    for path in (p for p in paths if p.is_file()):
+    names = (Path(name).name for name in result.pictures or ())
+    for path in (here[name] for name in names if name in here):
         try:
             found[path.stem] = checked_svg(read_input(path, "result_mib", "a picture").decode("utf-8"))
         except ValueError as error:
