@@ -51,8 +51,11 @@ class Campaign:
         found = case.contents()
         if "Traceback" in end.told:
             self._tell(where, f"a traceback: {end.told[-600:]}")
-        if blow.action in ("TERM", "INT") and not blow.workers and self._left():
-            self._tell(where, f"left {self._left()} itself")
+        if blow.action in ("TERM", "INT") and not blow.workers:
+            if end.status not in (0, -ACTIONS[blow.action]) or (end.status and end.told):
+                self._tell(where, f"ends with {end.status}: {end.told[-300:]}")
+            if self._left():
+                self._tell(where, f"left {self._left()} itself")
         again = run(case.job(version), self.root)
         if again.status != 0:
             self._tell(where, f"the next job ends with {again.status}: {again.told}")
