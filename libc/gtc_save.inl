@@ -168,18 +168,28 @@ static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t 
 {
     const NUM low = FN(lesser_of)(ELEMENT(guard[0]), NUM_ZERO);
     const NUM high = -FN(lesser_of)(-ELEMENT(guard[1]), NUM_ZERO);
-    const int counts = ((in->valid <= state->position) && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
+    const int counts = ((state->position <= state->samples_per_block) && (in->valid <= state->position)
+                        && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
                         && (in->held_blocks <= (guard[GUARD_MISSING].bits + 1U))) ? 1 : 0;
 
-    return counts & FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
-           & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high)
-           & FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1]));
+    const int numbers = FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
+                        & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high);
+
+    /* The sum last: its bounds are products of what was tested before. */
+    return ((counts & numbers) != 0) ? FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1])) : 0;
 }
 
 /* A temperature of the window, or of a term, which an envelope may have moved. */
 static int FN(is_temperature)(NUM x)
 {
     return FN(is_within)(x, FN(number_limits)[9].least, FN(number_limits)[9].most);
+}
+
+/* Whether a term has remembered something since the first temperature. */
+static int FN(remembers)(const STATE *state, uint_least32_t i)
+{
+    return ((state->input[0].gap_us != 0U) && (i < state->table->n_terms)
+            && (state->table->term_code[i]->survives != 0U)) ? 1 : 0;
 }
 
 static int FN(terms_are_sound)(const STATE *state)
@@ -190,7 +200,11 @@ static int FN(terms_are_sound)(const STATE *state)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         const NUM z = state->term[i][0];
 
-        sound &= FN(is_missing)(z) | (FN(is_temperature)(z) & FN(is_fraction)(state->term[i][1]));
+        if (FN(is_missing)(z) != 0) {
+            sound &= 1 - FN(remembers)(state, i);
+        } else {
+            sound &= FN(is_temperature)(z) & FN(is_fraction)(state->term[i][1]);
+        }
     }
     return sound;
 }

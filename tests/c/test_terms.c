@@ -201,6 +201,29 @@ TEST(times_without_power_add_up)
     CHECK_INT(6, a.off_blocks);
 }
 
+/* Before: sums of numbers that no call leaves overflowed, with a right CRC. */
+TEST(a_forged_state_is_refused_before_anything_is_computed_of_it)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    const state_t fresh = started_with(&TERMS);
+    state_t a = started_with(&TERMS);
+    state_t b;
+
+    CHECK_INT(GTC_WARMING, samples(&a, C(15.0), C(12.0), 3));
+    b = a;
+    CHECK_INT(GTC_OK, FN(save)(&b, words));
+    CHECK_INT(GTC_OK, FN(restore)(&b, &TERMS, PERIOD, words, 0U));
+    b = a;
+    b.term[0][0] = fresh.term[0][0]; /* a memory that has begun and remembers nothing */
+    CHECK_INT(GTC_OK, FN(save)(&b, words));
+    CHECK_INT(GTC_E_IMAGE, FN(restore)(&b, &TERMS, PERIOD, words, 0U));
+    b = a;
+    b.input[0].valid = 0xFFFFFFFFUL; /* more readings than samples */
+    b.position = 0xFFFFFFFFUL;
+    CHECK_INT(GTC_OK, FN(save)(&b, words));
+    CHECK_INT(GTC_E_IMAGE, FN(restore)(&b, &TERMS, PERIOD, words, 0U));
+}
+
 /* ---- what a sensor of a channel can deliver ---- */
 
 /* Edges of the guard of the supply: 9 and 15 V; fallback 12.5 V after 4 blocks. */
