@@ -60,6 +60,9 @@ extern "C" {
 #define gtc_f32_sample_at GTC_LINKED(gtc_f32_sample_at)
 #define gtc_f32_missed GTC_LINKED(gtc_f32_missed)
 #define gtc_f32_bias GTC_LINKED(gtc_f32_bias)
+#define gtc_f32_snapshot GTC_LINKED(gtc_f32_snapshot)
+#define gtc_f32_rezero GTC_LINKED(gtc_f32_rezero)
+#define gtc_f32_unzero GTC_LINKED(gtc_f32_unzero)
 #define gtc_f32_save GTC_LINKED(gtc_f32_save)
 #define gtc_f32_restore GTC_LINKED(gtc_f32_restore)
 #define gtc_f32_term_memory GTC_LINKED(gtc_f32_term_memory)
@@ -75,6 +78,9 @@ extern "C" {
 #define gtc_q31_sample_at GTC_LINKED(gtc_q31_sample_at)
 #define gtc_q31_missed GTC_LINKED(gtc_q31_missed)
 #define gtc_q31_bias GTC_LINKED(gtc_q31_bias)
+#define gtc_q31_snapshot GTC_LINKED(gtc_q31_snapshot)
+#define gtc_q31_rezero GTC_LINKED(gtc_q31_rezero)
+#define gtc_q31_unzero GTC_LINKED(gtc_q31_unzero)
 #define gtc_q31_save GTC_LINKED(gtc_q31_save)
 #define gtc_q31_restore GTC_LINKED(gtc_q31_restore)
 #define gtc_q31_term_memory GTC_LINKED(gtc_q31_term_memory)
@@ -124,6 +130,31 @@ extern "C" {
 #define GTC_MUST_CHECK
 #endif
 
+/* What the uncertainty of a correction goes by; part of a state, as private. */
+typedef struct {
+    float at[2];           /* where the map was asked: C, C/block */
+    float drift;           /* slope as far as it is known, C/block */
+    float start;           /* sample with which the front end began, C */
+    float low;             /* lowest ... */
+    float high;            /* ... and highest temperature that the terms saw since they began, C */
+    float plain;           /* correction without the shift, deg/h */
+    uint_least32_t begun;  /* blocks since init when the terms began */
+    uint_least32_t known;  /* one bit a term: it went on from where it was */
+    uint_least32_t sure;   /* 0: there was no correction yet, 1: nothing is known of the slope, 2: drift is known */
+} gtc_f32_doubt_t;
+
+typedef struct {
+    int_least32_t at[2];
+    int_least32_t drift;
+    int_least32_t start;
+    int_least32_t low;
+    int_least32_t high;
+    int_least32_t plain;
+    uint_least32_t begun;
+    uint_least32_t known;
+    uint_least32_t sure;
+} gtc_q31_doubt_t;
+
 /* State of one channel of a table: temperature or auxiliary. */
 typedef struct {
     uint_least32_t gap_us;      /* since the last believed reading; 0: none was */
@@ -171,6 +202,9 @@ typedef struct {
     uint_least32_t off_blocks;     /* blocks without power before it */
     uint_least32_t is_stamped;     /* 1: a sample with a time came, and ... */
     uint_least32_t time_us;        /* ... this is the last one's, on the grid of sample periods */
+    float shift;                   /* of the constant, deg/h: gtc_f32_rezero() */
+    float constant;                /* 1 sigma of the constant with it, deg/h */
+    gtc_f32_doubt_t doubt;
     float window[GTC_MAX_SLOPE_BLOCKS];        /* block means, newest first, C */
     float term[GTC_MAX_TERMS][2];              /* states of the terms */
     gtc_f32_input_t input[GTC_MAX_TERMS + 1];  /* temperature, auxiliary channels */
@@ -189,6 +223,9 @@ typedef struct {
     uint_least32_t off_blocks;
     uint_least32_t is_stamped;
     uint_least32_t time_us;
+    int_least32_t shift;
+    int_least32_t constant;
+    gtc_q31_doubt_t doubt;
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS]; /* 2^-16 C */
     int_least32_t term[GTC_MAX_TERMS][2];
     gtc_q31_input_t input[GTC_MAX_TERMS + 1];
@@ -203,8 +240,25 @@ typedef struct {
     int_least64_t rest; /* 10^-6 of a unit of the angle */
 } gtc_q31_angle_t;
 
+/* A correction with its uncertainty, all of one moment; see gtc_<n>_snapshot(). */
+typedef struct {
+    float bias;                /* in force, deg/h */
+    float sigma;               /* 1 sigma of (true bias - bias), deg/h */
+    float correlation_s;       /* correlation time of that error, s */
+    uint_least32_t age_blocks; /* blocks since the last valid one, one more than are bridged at most */
+    int_least32_t status;      /* of the correction in force */
+} gtc_f32_snapshot_t;
+
+typedef struct {
+    int_least32_t bias;          /* 2^-bias_frac_bits deg/h */
+    int_least32_t sigma;         /* 2^-bias_frac_bits deg/h */
+    int_least32_t correlation_s; /* s */
+    uint_least32_t age_blocks;
+    int_least32_t status;
+} gtc_q31_snapshot_t;
+
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (37 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
@@ -272,6 +326,35 @@ GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
  * holds. Returns its status or GTC_E_ARG. */
 GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
+
+/* The correction in force with its 1 sigma, the correlation time of its error, its status and its age, all of one
+ * moment: for the bias state of a filter, a first-order process with variance sigma^2 and this correlation time.
+ * Sigma grows while the correction is held, the slope is not known yet, inputs lie outside the envelope or where
+ * training was not, and until terms have forgotten the time before the start; docs/design.md gives the rules. It is
+ * of the bias: the noise of the rate comes on top. Where sigma grows at once, add sigma_new^2 - sigma_old^2 to the
+ * filter's variance (examples/nav_loop). A table without uncertainties is refused.
+ * Returns the status of the correction, GTC_E_ARG (NULL) or GTC_E_LAYOUT (no uncertainties in the table).
+ * Cost: about 250 operations in float32, 600 in fixed point, with 4 terms twice that; the map is not evaluated. */
+GTC_MUST_CHECK int gtc_f32_snapshot(const gtc_f32_state_t *state, gtc_f32_snapshot_t *snapshot);
+GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapshot_t *snapshot);
+
+/* Re-zero at rest: moves the constant of the correction by a rest of known length.
+ *   mean_rate  mean of the compensated rate (measured - bias) over the rest, Earth's rate along the axis taken off,
+ *              deg/h (q31: 2^-bias_frac_bits deg/h). A heading error of 1 mrad at the equator is 0.015 deg/h:
+ *              what is not known of Earth's rate goes into the constant.
+ *   seconds    length of the rest, s
+ * The rest is weighed against what training saw from power-on to power-on, with the uncertainty of the correction and
+ * the noise of the rate over its length; a table that saw no turn-on offsets moves next to nothing. The shift of all
+ * calls together stays within the table's `rezero`; what would go beyond ends there, with GTC_CLAMPED. It is in the
+ * correction at once, in the fallback, too, outlasts save and restore, and gtc_<n>_unzero() takes it back.
+ * Returns 0, GTC_CLAMPED, GTC_E_ARG (NULL, not a number, 0 s) or GTC_E_LAYOUT (the table grants no shift);
+ * negative: nothing was changed. */
+GTC_MUST_CHECK int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds);
+GTC_MUST_CHECK int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds);
+
+/* Takes every re-zero back. Returns 0 or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_f32_unzero(gtc_f32_state_t *state);
+GTC_MUST_CHECK int gtc_q31_unzero(gtc_q31_state_t *state);
 
 /* The angle to subtract from an angle increment over dt, of a bias that gtc_<n>_bias() gave; what rounding
  * leaves is carried on. f32: dt in s, increment in arcsec, a multiple of 2^-16 while it is below 64. q31: dt

@@ -111,8 +111,10 @@ static int FN(is_fraction)(float x)
 #include "gtc_limits.inl"
 #include "gtc_map.inl"
 #include "gtc_terms.inl"
+#include "gtc_sigma.inl"
 #include "gtc_table.inl"
 #include "gtc_front.inl"
+#include "gtc_rezero.inl"
 #include "gtc_save.inl"
 
 /* ---- angle increments -------------------------------------------------------------------- */
@@ -262,4 +264,19 @@ int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,
                     uint_least32_t off_blocks)
 {
     return FN(run_restore)(state, table, period_us, words, off_blocks);
+}
+
+int gtc_f32_snapshot(const gtc_f32_state_t *state, gtc_f32_snapshot_t *snapshot)
+{
+    return FN(run_snapshot)(state, snapshot);
+}
+
+int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds)
+{
+    return FN(run_rezero)(state, mean_rate, seconds);
+}
+
+int gtc_f32_unzero(gtc_f32_state_t *state)
+{
+    return FN(run_unzero)(state);
 }

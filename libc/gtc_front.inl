@@ -37,12 +37,17 @@
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
-/* Puts a correction in force: the only place that writes one. */
+/* Puts a correction in force, moved by the shift of the constant: the only place that writes one. */
 static void FN(put)(STATE *state, WIDE bias, int_least32_t status)
 {
     WIDE governed = bias;
-    const int remark = FN(govern)(state->table, &governed);
+    int remark = FN(govern)(state->table, &governed);
 
+    state->doubt.plain = (NUM)governed;
+    if ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO)) {
+        governed = FN(add)(governed, state->shift);
+        remark |= FN(govern)(state->table, &governed);
+    }
     state->bias = (NUM)governed;
     state->status = status | (int_least32_t)remark;
 }
@@ -80,11 +85,13 @@ static NUM FN(seen)(const TABLE *table, NUM temp)
 static void FN(step_terms)(STATE *state, NUM temp)
 {
     const TABLE *const table = state->table;
+    const NUM seen = FN(seen)(table, temp);
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
-        table->term_code[i]->step(state, i, FN(seen)(table, temp));
+        table->term_code[i]->step(state, i, seen);
     }
+    FN(doubt_step)(state, seen);
 }
 
 /* Makes the correction for an input and puts it in force. */
@@ -106,6 +113,7 @@ static void FN(correct)(STATE *state, NUM temp, NUM slope, int_least32_t remarks
         table->term_code[i]->apply(state, i, seen, &effect);
     }
     status = FN(map)(table, effect.temp, effect.slope, &bias);
+    FN(doubt_input)(state, &effect, slope);
     total = bias;
     if (table->n_terms != 0U) {
         total = FN(add)(total, FN(added)(table, &effect));
@@ -137,9 +145,11 @@ static void FN(restart)(STATE *state, NUM x, int is_first)
 
     state->filled = 0U;
     state->window_valid = 0U;
+    state->doubt.start = x;
     if (!is_first) {
         FN(forget_terms)(state);
     }
+    FN(doubt_begin)(state, FN(seen)(table, x));
     for (i = 0U; i < table->n_terms; i++) {
         table->term_code[i]->begin(state, i, FN(seen)(table, x));
     }
@@ -508,6 +518,7 @@ static void FN(clear)(STATE *state)
     state->off_blocks = 0U;
     state->is_stamped = 0U;
     state->time_us = 0U;
+    FN(doubt_clear)(state);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         window[i] = NUM_ZERO;
     }
@@ -527,6 +538,7 @@ static void FN(start)(STATE *state, const TABLE *table, uint_least32_t period_us
     state->period_us = period_us;
     state->samples_per_block = FN(samples_in_block)(table, period_us);
     FN(clear)(state);
+    FN(rezero_clear)(state);
     for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
         state->input[i].near = LIMIT_ZERO;
         if (i < table->n_channels) {

@@ -484,4 +484,121 @@ static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitud
     return value;
 }
 
+/* ---- the uncertainty -------------------------------------------------------------------- */
+
+#define SNAPSHOT gtc_f32_snapshot_t
+#define SQUARE float /* (deg/h)^2 */
+#define NO_SQUARE 0.0F
+#define SHIFT_SHARE float
+
+/* 1 if x is no finite number. */
+static inline int FN(is_wild)(float x)
+{
+    return FN(is_missing)(x);
+}
+
+static inline float FN(limited)(float x)
+{
+    return x;
+}
+
+static inline float FN(squared)(float x)
+{
+    float square;
+
+    square = x * x;
+    return square;
+}
+
+static inline float FN(plus)(float a, float b)
+{
+    float sum;
+
+    sum = a + b;
+    return sum;
+}
+
+/* square / n */
+static inline float FN(shared_out)(float square, uint_least32_t n)
+{
+    const float count = (float)n;
+    float share;
+
+    share = square / count;
+    return share;
+}
+
+/* a / (a + b), 0 where both are */
+static inline float FN(share_of)(float a, float b)
+{
+    float whole;
+
+    whole = a + b;
+    if (!(whole > 0.0F)) {
+        return 0.0F;
+    }
+    whole = a / whole;
+    return whole;
+}
+
+static inline float FN(part)(float share, float x)
+{
+    float product;
+
+    product = share * x;
+    return product;
+}
+
+static inline float FN(part_of_square)(float share, float x)
+{
+    return FN(part)(share, x);
+}
+
+/* Square root, 0.6 units of the last place: half the exponent, then Newton's rule. x >= 0 */
+static inline float FN(root)(float x)
+{
+    gtc_word_t guess;
+    float y;
+    uint_least32_t i;
+
+    if (!(x > 0.0F)) {
+        return 0.0F;
+    }
+    guess.value = x;
+    guess.bits = (guess.bits >> 1) + 0x1FBB4F2EUL;
+    y = guess.value;
+    for (i = 0U; i < 4U; i++) {
+        float quotient;
+
+        quotient = x / y;
+        quotient = y + quotient;
+        y = 0.5F * quotient;
+    }
+    return y;
+}
+
+/* word (1 - gain)^blocks */
+static inline float FN(remaining)(float word, float gain, uint_least32_t blocks)
+{
+    float left;
+
+    left = FN(power)(gain, blocks);
+    left = 1.0F - left;
+    left = word * left;
+    return left;
+}
+
+/* word (2 width - (high - low)), 0 where that is negative */
+static inline float FN(unsettled)(float width, float low, float high, float word)
+{
+    float range;
+    float left;
+
+    range = high - low;
+    left = width + width;
+    left = left - range;
+    left = word * left;
+    return (left > 0.0F) ? left : 0.0F;
+}
+
 #endif /* GTC_NUM_F32_H_INCLUDED */

@@ -560,4 +560,114 @@ static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, i
     return FN(floored)(amplitude * h, 30U);
 }
 
+/* ---- the uncertainty -------------------------------------------------------------------- */
+
+#define SNAPSHOT gtc_q31_snapshot_t
+#define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
+#define NO_SQUARE 0U
+#define SHIFT_SHARE uint_least64_t /* 2^-31 */
+#define Q31_PART 1073741824
+
+/* 1 if x is no finite number: no integer is. */
+static inline int FN(is_wild)(int_least64_t x)
+{
+    (void)x;
+    return 0;
+}
+
+/* The nearest number of magnitude 2^30 at most. */
+static inline int_least64_t FN(limited)(int_least64_t x)
+{
+    int_least64_t y = x;
+
+    if (y > Q31_PART) {
+        y = Q31_PART;
+    } else if (y < -Q31_PART) {
+        y = -Q31_PART;
+    } else {
+        /* it fits */
+    }
+    return y;
+}
+
+static inline uint_least64_t FN(squared)(int_least64_t x)
+{
+    const int_least64_t y = FN(limited)(x);
+
+    return (uint_least64_t)(y * y);
+}
+
+static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
+{
+    return a + b;
+}
+
+/* square / n */
+static inline uint_least64_t FN(shared_out)(uint_least64_t square, uint_least32_t n)
+{
+    return square / n;
+}
+
+/* a / (a + b), 0 where both are */
+static inline uint_least64_t FN(share_of)(uint_least64_t a, uint_least64_t b)
+{
+    uint_least64_t part = a;
+    uint_least64_t whole = a + b;
+
+    while (whole > 0xFFFFFFFFU) {
+        part >>= 1;
+        whole >>= 1;
+    }
+    if (whole == 0U) {
+        return 0U;
+    }
+    part = (part << 31) / whole;
+    return (part > 0x80000000U) ? 0x80000000U : part;
+}
+
+static inline int_least64_t FN(part)(uint_least64_t share, int_least32_t x)
+{
+    return FN(floored)((int_least64_t)share * x, 31U);
+}
+
+static inline uint_least64_t FN(part_of_square)(uint_least64_t share, uint_least64_t x)
+{
+    return ((x >> 31) * share) + (((x & 0x7FFFFFFFU) * share) >> 31);
+}
+
+/* Square root, rounded down; 2^31 - 1 at most. */
+static inline int_least32_t FN(root)(uint_least64_t x)
+{
+    uint_least64_t rest = x;
+    uint_least64_t root = 0U;
+    uint_least64_t bit = (uint_least64_t)1U << 62;
+
+    while (bit != 0U) {
+        if (rest >= (root + bit)) {
+            rest -= root + bit;
+            root = (root >> 1) + bit;
+        } else {
+            root >>= 1;
+        }
+        bit >>= 2;
+    }
+    return (root > 0x7FFFFFFFU) ? 0x7FFFFFFF : (int_least32_t)root;
+}
+
+/* word (1 - gain)^blocks */
+static inline int_least64_t FN(remaining)(int_least32_t word, int_least32_t gain, uint_least32_t blocks)
+{
+    const int_least32_t left = 0x7FFFFFFF - FN(power)(gain, blocks);
+
+    return FN(floored)((int_least64_t)word * left, 31U);
+}
+
+/* word (2 width - (high - low)), 0 where that is negative */
+static inline int_least64_t FN(unsettled)(int_least32_t width, int_least32_t low, int_least32_t high, int_least32_t word)
+{
+    const int_least64_t left = (2 * (int_least64_t)width) - ((int_least64_t)high - low);
+
+    return (left > 0) ? FN(floored)(FN(limited)(left) * word, 16U) : 0;
+}
+
 #endif /* GTC_NUM_Q31_H_INCLUDED */

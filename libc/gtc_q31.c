@@ -148,8 +148,10 @@ static int FN(is_fraction)(int_least32_t x)
 #include "gtc_limits.inl"
 #include "gtc_map.inl"
 #include "gtc_terms.inl"
+#include "gtc_sigma.inl"
 #include "gtc_table.inl"
 #include "gtc_front.inl"
+#include "gtc_rezero.inl"
 #include "gtc_save.inl"
 
 /* ---- angle increments -------------------------------------------------------------------- */
@@ -231,4 +233,19 @@ int gtc_q31_restore(gtc_q31_state_t *state, const gtc_q31_table_t *table,
                     uint_least32_t off_blocks)
 {
     return FN(run_restore)(state, table, period_us, words, off_blocks);
+}
+
+int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapshot_t *snapshot)
+{
+    return FN(run_snapshot)(state, snapshot);
+}
+
+int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds)
+{
+    return FN(run_rezero)(state, mean_rate, seconds);
+}
+
+int gtc_q31_unzero(gtc_q31_state_t *state)
+{
+    return FN(run_unzero)(state);
 }

@@ -100,6 +100,23 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
     }
 }
 
+/* What the uncertainty goes by, and the shift of the constant. */
+static void FN(carry_doubt)(FN(cursor_t) *at, STATE *state)
+{
+    FN(carry)(at, &state->doubt.at[0]);
+    FN(carry)(at, &state->doubt.at[1]);
+    FN(carry)(at, &state->doubt.drift);
+    FN(carry)(at, &state->doubt.start);
+    FN(carry)(at, &state->doubt.low);
+    FN(carry)(at, &state->doubt.high);
+    FN(carry)(at, &state->doubt.plain);
+    FN(carry_bits)(at, &state->doubt.begun);
+    FN(carry_bits)(at, &state->doubt.known);
+    FN(carry_bits)(at, &state->doubt.sure);
+    FN(carry)(at, &state->shift);
+    FN(carry)(at, &state->constant);
+}
+
 /* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written. */
 static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
 {
@@ -113,6 +130,7 @@ static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from
         FN(carry)(&at, &state->term[i][0]);
         FN(carry)(&at, &state->term[i][1]);
     }
+    FN(carry_doubt)(&at, state);
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
@@ -209,6 +227,18 @@ static int FN(terms_are_sound)(const STATE *state)
     return sound;
 }
 
+/* What the uncertainty goes by: numbers, temperatures, and a shift that the table grants. */
+static int FN(doubt_is_sound)(const STATE *state)
+{
+    const NUM most = MEMBER(state->table->rezero);
+
+    return ((!FN(is_missing)(state->doubt.at[0])) && (!FN(is_missing)(state->doubt.at[1]))
+            && (!FN(is_missing)(state->doubt.drift)) && (!FN(is_missing)(state->doubt.plain))
+            && FN(is_temperature)(state->doubt.start) && FN(is_temperature)(state->doubt.low)
+            && FN(is_temperature)(state->doubt.high) && (!FN(is_missing)(state->constant))
+            && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
+}
+
 /* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
 static int FN(is_sound)(const STATE *state)
 {
@@ -223,7 +253,7 @@ static int FN(is_sound)(const STATE *state)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         sound &= FN(is_temperature)(state->window[i]);
     }
-    return sound & FN(terms_are_sound)(state) & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
+    return sound & FN(terms_are_sound)(state) & FN(doubt_is_sound)(state) & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
 }
 
 /* Of a state that was read, what outlasts a time without power: terms. If it had not begun when it was saved,
@@ -236,6 +266,7 @@ static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
 
     FN(clear)(state);
     state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
+    FN(rezero_outlast)(state);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         if ((i >= state->table->n_terms) || (state->table->term_code[i]->survives == 0U)) {
             FN(forget)(state, i);

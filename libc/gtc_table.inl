@@ -259,10 +259,10 @@ static int FN(networks_fit)(const TABLE *table)
     return fit;
 }
 
-/* Parameters of the terms, and the uncertainties, which nothing reads yet. */
+/* Parameters of the terms, and the uncertainties. */
 static int FN(rest_fits)(const TABLE *table)
 {
-    int fit = 1;
+    int fit = FN(sigma_fits)(table);
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {

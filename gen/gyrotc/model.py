@@ -39,6 +39,7 @@ __all__ = [
     "Guard",
     "Model",
     "Network",
+    "Rules",
     "Scale",
     "Term",
     "Uncertainty",
@@ -106,16 +107,57 @@ class Coverage(_Frozen):
         return self
 
 
+Amount = Annotated[float, Field(ge=0.0, le=7.5e6)]
+
+
+class Rules(_Frozen):
+    """How the uncertainty grows where a correction is not as it was trained, 1 σ; docs/design.md gives the reasons.
+
+    Attributes:
+        hold_dph_per_c: For each C by which a held input may have gone on at its slope.
+        rest_dph_per_min: For each minute for which a correction is held, whatever its slope.
+        slope_dph_per_c_per_min: For the slope while it is known and not in the correction yet.
+        start_dph: Nothing is known of the slope.
+        beyond_dph_per_c, beyond_dph_per_c_per_min: For each C and C/min beyond the envelope.
+        fallback_dph: About the constant correction.
+        none_dph: Of the bias itself, before anything is believed.
+        between_dph: Of the constant from power-on to power-on; part of every cell.
+        noise_deg_per_sqrt_h: Angle random walk of the rate.
+        correlation_s: Correlation time of the error of the compensated bias, s.
+        terms: Of what each term does not know of the time before it began, deg/h (`hysteresis`: deg/h/C).
+    """
+
+    hold_dph_per_c: Amount
+    rest_dph_per_min: Amount
+    slope_dph_per_c_per_min: Amount
+    start_dph: Amount
+    beyond_dph_per_c: Amount
+    beyond_dph_per_c_per_min: Amount
+    fallback_dph: Amount
+    none_dph: Amount
+    between_dph: Amount
+    noise_deg_per_sqrt_h: Amount
+    correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)]
+    terms: tuple[Amount, ...] = ()
+
+
 class Uncertainty(_Frozen):
-    """1 σ of the compensated bias, deg/h: `rows[j][i]` for cell i of T and j of dT/dt."""
+    """1 σ of the compensated bias, deg/h: `rows[j][i]` for cell i of T and j of dT/dt.
+
+    `uncovered`: the same where training was not; `rules`: what comes on top of a cell. Without both a table does not
+    say how uncertain its corrections are.
+    """
 
     cells: Cells
-    rows: tuple[tuple[Annotated[float, Field(ge=0.0, le=7.5e6)], ...], ...]
+    rows: tuple[tuple[Amount, ...], ...]
+    uncovered: tuple[tuple[Amount, ...], ...] | None = None
+    rules: Rules | None = None
 
     @model_validator(mode="after")
     def _shape(self) -> Uncertainty:
-        if len(self.rows) != self.cells[1] or any(len(r) != self.cells[0] for r in self.rows):
-            raise ValueError("rows do not have the size that cells gives")
+        for rows in (self.rows, self.uncovered or self.rows):
+            if len(rows) != self.cells[1] or any(len(r) != self.cells[0] for r in rows):
+                raise ValueError("rows do not have the size that cells gives")
         return self
 
 
@@ -249,6 +291,9 @@ class Model(_Frozen):
         regions = [n.region is not None for n in self.networks]
         if len(regions) > 1 and not all(regions):
             raise ValueError("every network of a bank needs a region")
+        sigma = self.uncertainty_dph
+        if sigma and sigma.rules and len(sigma.rules.terms) != len(self.terms):
+            raise ValueError("uncertainty_dph: its rules do not have a number for each term")
         moved = [t.id for t in self.terms if t.cause.kind == "input"]
         if len(moved) > 1:
             raise ValueError(f"{moved[1]} can be there only once: the map sees one temperature")

@@ -40,7 +40,7 @@ TEST(every_flipped_bit_of_an_array_is_found)
     flip_all(&table, &table.coverage, 1U);
     flip_all(&table, &table.serial, GTC_SERIAL_WORDS);
     flip_all(&table, &table.guards, GTC_GUARD_WORDS);
-    flip_all(&table, &table.sigma, 2U);
+    flip_all(&table, &table.sigma, table.n_sigma);
     flip_all(&table, &table.probes, table.n_probes * 4U);
 }
 

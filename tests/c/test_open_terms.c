@@ -14,7 +14,7 @@ static int try_open(uint_least32_t n)
 TEST(terms_open_where_their_code_is)
 {
     const uint_least32_t n = image_of(&TERMS, image);
-    const uint_least32_t kind = n - 1U - (TERMS.n_probes * 4U) - (TERMS.n_terms * 8U);
+    const uint_least32_t kind = n - 1U - (TERMS.n_probes * 4U) - TERMS.n_sigma - (TERMS.n_terms * 8U);
     table_t table;
 
     CHECK_INT(GTC_OPEN_TERMS ? GTC_OK : GTC_E_LAYOUT, try_open(n));
@@ -37,8 +37,8 @@ TEST(more_terms_than_there_is_room_for_are_refused)
     const uint_least32_t n = image_of(&TERMS, image) + 8U;
     uint_least32_t i;
 
-    /* One term more, before the probes. */
-    for (i = n - 1U; i >= (n - 1U - (TERMS.n_probes * 4U)); i--) {
+    /* One term more, before the uncertainty and the probes. */
+    for (i = n - 1U; i >= (n - 1U - (TERMS.n_probes * 4U) - TERMS.n_sigma); i--) {
         image[i] = image[i - 8U];
     }
     image[2].bits = n;

@@ -57,6 +57,13 @@ PARTS = {
         },
         checks=17,
     ),
+    "snapshot, re-zero": Part(
+        "sigma",
+        precision=7,
+        contracts={"f32": "gtc_f32_cell,gtc_f32_is_missing", "q31": "gtc_q31_position"},
+        checks=4,
+        shape=(1, "auxiliary"),
+    ),
     "memory": Part("follow", "terms", left=2),
     "memories, play, warm-up": Part("terms", "terms", precision=7, contracts=_TERMS, checks=1),
     "harmonic, channels": Part("terms", "bank", precision=7, contracts=_TERMS),

@@ -90,6 +90,31 @@ class Runtime:
         )
         return status, bits
 
+    def snapshots(
+        self, table: Table, channels: Words, missed: np.ndarray, samples_per_block: int
+    ) -> tuple[np.ndarray, Words]:
+        """What `sample` and `snapshot` return for every row, status, age, shape (n, 4); bits of bias, sigma, time."""
+        struct, _keep = self.struct(table)
+        size = self._shim(table, "state_size", ctypes.c_size_t)()
+        state = ctypes.create_string_buffer(size + 16)
+        started = self._function(table, "init")(
+            state, ctypes.byref(struct), ctypes.c_uint32(period_us(table.block_us, samples_per_block))
+        )
+        assert started == 0, started
+        channels = np.ascontiguousarray(channels, dtype=np.uint32)
+        missed = np.ascontiguousarray(missed, dtype=np.uint32)
+        status, bits = np.zeros((len(channels), 4), np.int32), np.zeros((len(channels), 3), np.uint32)
+        self._shim(table, "snapshots")(
+            state,
+            _address(channels),
+            ctypes.c_long(channels.shape[1]),
+            _address(missed),
+            ctypes.c_long(len(channels)),
+            _address(status),
+            _address(bits),
+        )
+        return status, bits
+
     def out_of_range(self) -> int:
         """Claims about ranges that did not hold so far, in a build with `libc_counted.h`."""
         return ctypes.c_long.in_dll(self.library, "shim_out_of_range").value

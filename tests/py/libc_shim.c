@@ -9,6 +9,8 @@
                          num *bias);                                                              \
     void shim_##n##_steps(gtc_##n##_state_t *state, const num *channels, long n_channels,         \
                           const uint_least32_t *missed, long rows, int *status, num *bias);       \
+    void shim_##n##_snapshots(gtc_##n##_state_t *state, const num *channels, long n_channels,     \
+                              const uint_least32_t *missed, long rows, int *status, num *out);    \
     size_t shim_##n##_state_size(void)                                                            \
     {                                                                                             \
         return sizeof(gtc_##n##_state_t);                                                         \
@@ -30,6 +32,22 @@
             status[3 * i] = (missed[i] != 0U) ? gtc_##n##_missed(state, missed[i]) : 0;           \
             status[(3 * i) + 1] = gtc_##n##_sample(state, &channels[i * n_channels]);             \
             status[(3 * i) + 2] = gtc_##n##_bias(state, &bias[i]);                                \
+        }                                                                                         \
+    }                                                                                             \
+    void shim_##n##_snapshots(gtc_##n##_state_t *state, const num *channels, long n_channels,     \
+                              const uint_least32_t *missed, long rows, int *status, num *out)     \
+    {                                                                                             \
+        long i;                                                                                   \
+        for (i = 0; i < rows; i++) {                                                              \
+            gtc_##n##_snapshot_t snapshot = {0, 0, 0, 0U, 0};                                      \
+            status[4 * i] = (missed[i] != 0U) ? gtc_##n##_missed(state, missed[i]) : 0;           \
+            status[4 * i] = gtc_##n##_sample(state, &channels[i * n_channels]);                   \
+            status[(4 * i) + 1] = gtc_##n##_snapshot(state, &snapshot);                           \
+            status[(4 * i) + 2] = snapshot.status;                                                \
+            status[(4 * i) + 3] = (int)snapshot.age_blocks;                                       \
+            out[3 * i] = snapshot.bias;                                                           \
+            out[(3 * i) + 1] = snapshot.sigma;                                                    \
+            out[(3 * i) + 2] = snapshot.correlation_s;                                            \
         }                                                                                         \
     }
 

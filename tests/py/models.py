@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gyrotc.model import Coverage, Envelope, Guard, Model, Network, Scale, Term
+from gyrotc.model import Coverage, Envelope, Guard, Model, Network, Rules, Scale, Term, Uncertainty
 
 
 def random_model(seed: int, **changes: Any) -> Model:
@@ -76,6 +76,26 @@ def random_guards(seed: int) -> dict[str, Guard]:
         )
         for name in ("supply_v", "magnetic_ut")
     }
+
+
+def random_uncertainty(seed: int, n_terms: int = 0) -> Uncertainty:
+    """Grids and rules of the sizes that training gives, spread over decades, some of them 0."""
+    rng = np.random.default_rng([seed, 4])
+    cells = int(rng.integers(1, 12)), int(rng.integers(1, 8))
+
+    def amounts(n: int) -> list[float]:
+        return np.where(rng.random(n) < 0.1, 0.0, 10.0 ** rng.uniform(-6.0, -2.0, n)).tolist()
+
+    def grid() -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(amounts(cells[0])) for _ in range(cells[1]))
+
+    names = [name for name in Rules.model_fields if name not in ("correlation_s", "terms")]
+    rules = Rules(
+        **dict(zip(names, amounts(len(names)), strict=True)),
+        correlation_s=float(rng.uniform(1.0, 1e5)),
+        terms=tuple(amounts(n_terms)),
+    )
+    return Uncertainty(cells=cells, rows=grid(), uncovered=grid(), rules=rules)
 
 
 def random_terms(seed: int) -> tuple[Term, ...]:

@@ -41,7 +41,7 @@ def test_one_sigma_holds_the_truth_two_times_in_three() -> None:
     for seed in range(12):
         data = samples(seed)
         found = fit(data)
-        sigma = np.array(uncertainty(data, found)["rows"])
+        sigma = np.array(uncertainty(data, found, (12, 8))["rows"])
         t, r = cells_of(data, found, (12, 8))
         error = predict(found, data.temperature_c, data.slope_c_per_min)
         error -= true_bias(data.temperature_c, data.slope_c_per_min)
@@ -59,11 +59,8 @@ def test_where_no_sample_was_it_is_larger() -> None:
     data = samples(1)
     up = data.select((data.slope_c_per_min > -0.1) | (data.temperature_c < -30.0))
     found = fit(up)
-    sigma = np.array(uncertainty(up, found)["rows"])
-    t, r = cells_of(up, found, (12, 8))
-    seen = np.zeros((8, 12), dtype=bool)
-    seen[r, t] = True
-    assert np.median(sigma[~seen]) > 1.1 * np.median(sigma[seen])
+    known = uncertainty(up, found, (12, 8))
+    assert np.median(known["uncovered"]) > 1.1 * np.median(known["rows"])
 
 
 def test_offsets_between_runs_are_part_of_it() -> None:

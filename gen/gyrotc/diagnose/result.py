@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ..dataset import Dataset, joined_runs
+from ..dataset import Dataset, Run, joined_runs
 from ..metrics import LEAST_SPAN_C
 from ..model import Model
 from ..results.diagnosed import Diagnosed
 from ..results.training import Training
 from ..terms import CATALOGUE
+from ..train.data import TrainingData
 from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
+from ..train.rules import start_sigma
 from ..train.spans import training_spans
 from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
 from .extend.extension import Extension, extend
@@ -110,7 +113,7 @@ def _extended_model(
         return None, None
     runs = [r for r in dataset.runs if r.role == "train"]
     front = front_end(runs, options.block_s)
-    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options)
+    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
     entries = []
     for effect in extension.shipped:
         if CATALOGUE[effect.id].table is None:
@@ -126,4 +129,22 @@ def _extended_model(
     left_out = extension.after if extension.measured_on == "left out" else None
     spans = training_spans(runs, extension.samples)
     training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
-    return Model.from_dict({**plain.to_dict(), "terms": entries}), training
+    return Model.from_dict(_with_terms(plain, entries, extension.samples, runs)), training
+
+
+def _with_terms(
+    plain: Model, entries: list[dict[str, Any]], samples: TrainingData, runs: Sequence[Run]
+) -> dict[str, Any]:
+    """The model with its terms, and what its uncertainty says of each."""
+    content = {**plain.to_dict(), "terms": entries}
+    if content["uncertainty_dph"] is not None:
+        rules = content["uncertainty_dph"]["rules"]
+        channels = {
+            e["channel"]: np.concatenate([run.rows().channels[e["channel"]] for run in runs])
+            for e in entries
+            if e["channel"] is not None
+        }
+        rules["terms"] = [
+            start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries
+        ]
+    return content

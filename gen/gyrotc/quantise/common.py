@@ -11,6 +11,7 @@ import numpy as np
 
 from ..model import Model
 from ..reference.table import SERIAL_WORDS, Words
+from .sigma import sigma_cells
 
 __all__ = ["STEEPEST", "Shared", "coverage_words", "shared"]
 
@@ -35,7 +36,7 @@ class Shared(TypedDict):
 
 def shared(model: Model) -> Shared:
     """The members that need no rounding."""
-    coverage, sigma = model.coverage, model.uncertainty_dph
+    coverage = model.coverage
     return Shared(
         name=model.id,
         id=zlib.crc32(model.id.encode("ascii")),
@@ -44,7 +45,7 @@ def shared(model: Model) -> Shared:
         slope_blocks=model.slope_blocks,
         lead_blocks=model.lead_blocks,
         coverage_cells=coverage.cells if coverage else (0, 0),
-        sigma_cells=sigma.cells if sigma else (0, 0),
+        sigma_cells=sigma_cells(model),
         serial=_serial_words(model.serial),
         coverage=coverage_words(model),
     )

@@ -20,6 +20,7 @@ from .bank import Axis, handover_error_dph, regions
 from .common import STEEPEST, shared
 from .gradient import largest_gradient
 from .guards import guard_words
+from .sigma import sigma_values
 from .terms import f32_terms
 
 __all__ = ["table_of"]
@@ -65,7 +66,7 @@ def table_of(model: Model) -> Table:
         centers=np.concatenate(centers).view(np.uint32).reshape(-1),
         guards=guard_words(model, "f32"),
         terms=f32_terms(model),
-        sigma=f32_words(model.uncertainty_dph.rows if model.uncertainty_dph else []),
+        sigma=f32_words(sigma_values(model)),
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,

@@ -23,6 +23,7 @@ from .bank import Axis, handover_error_dph, regions
 from .common import shared
 from .guards import guard_words
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
+from .sigma import sigma_values
 from .solve import gram, solve
 from .terms import q31_terms, term_size_dph
 
@@ -251,7 +252,7 @@ def _table(
         centers=_words(np.concatenate(records)),
         guards=guard_words(model, "q31"),
         terms=q31_terms(model, frac_bits),
-        sigma=_words(np.rint(np.array(model.uncertainty_dph.rows) * unit) if model.uncertainty_dph else []),
+        sigma=_words(sigma_values(model, frac_bits)),
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reference.runtime import runtime_folders
+from ..reference.squares import RULES
 from ..reference.table import ARRAYS, Table
 from ..terms.recursion import TableKind
 
@@ -53,8 +54,10 @@ def _refused(table: Table) -> Iterator[str]:
     low, high = table.numbers(table.authority)
     if not low <= table.numbers([table.fallback])[0] <= high:
         yield "fallback is beyond the authority"
-    if table.sigma.size < table.sigma_cells[0] * table.sigma_cells[1]:
-        yield "sigma has fewer words than cells"
+    cells = table.sigma_cells[0] * table.sigma_cells[1]
+    words = 2 * cells + RULES + table.terms.size // ARRAYS["terms"]
+    if table.sigma.size and (cells == 0 or table.sigma.size != words):
+        yield "sigma has not a word for each of its cells, twice, each rule and each term"
     yield from _guards(table, guard, guard_whole)
     records = table.networks.reshape(-1, ARRAYS["networks"])
     if int(records[:, 0].sum(dtype=np.uint64)) != table.n_centers:

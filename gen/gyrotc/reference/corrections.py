@@ -32,9 +32,10 @@ from ..frontend.numbers import Numbers
 from ..terms.recursion import CourseChannel, TermOutcome
 from .maps import evaluate_map, governed
 from .operations import recursions
+from .sigma import Evidence, evidence_of
 from .table import ARRAYS, Table, Words
 
-__all__ = ["arithmetic_of", "corrections", "settings_of"]
+__all__ = ["arithmetic_of", "corrections", "evidence", "settings_of"]
 
 
 def settings_of(table: Table, samples_per_block: int) -> Settings:
@@ -94,6 +95,22 @@ def corrections(
     return np.concatenate([[np.int32(status_bits.HELD)], status]).astype(np.int32), np.concatenate(
         [[np.uint32(0)], bits]
     ).astype(np.uint32)
+
+
+def evidence(
+    table: Table,
+    steps: Steps,
+    stream: Stream,
+    channels: Words,
+    samples_per_block: int,
+    status: NDArray[np.int32],
+) -> Evidence:
+    """What the uncertainty of every correction goes by; arguments as of `corrections`, and the status of each."""
+    led = steps.led(table.lead_blocks)
+    outcome = _outcome(table, led, stream, table.numbers(channels), samples_per_block)
+    seen = np.clip(led.temperature, *table.numbers(table.envelope)[:2])
+    course = replace(stream.course(led, samples_per_block), temperature=seen)
+    return evidence_of(table, steps, course, outcome, status)
 
 
 def _outcome(

@@ -156,10 +156,10 @@ def _fraction(start: Any, x: NDArray[np.float32], end: Any) -> NDArray[np.float3
     return np.asarray(np.where(way > 0, way, np.float32(0.0)))
 
 
-def cells(table: Table, points: Points) -> NDArray[np.int64]:
-    """Cells of the coverage map, (T, slope), shape (n, 2)."""
+def cells(table: Table, points: Points, counts: tuple[int, int]) -> NDArray[np.int64]:
+    """Cells of a grid of so many over the envelope, (T, slope), shape (n, 2)."""
     envelope = table.numbers(table.envelope)
-    columns = [_cell(points.x[:, k], envelope[2 * k : 2 * k + 2], table.coverage_cells[k]) for k in (0, 1)]
+    columns = [_cell(points.x[:, k], envelope[2 * k : 2 * k + 2], counts[k]) for k in (0, 1)]
     return np.stack(columns, axis=1)
 
 

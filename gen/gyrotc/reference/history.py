@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ..frontend import Settings, Steps, Stream, follow
 from ..status import HELD
-from .corrections import arithmetic_of, corrections, settings_of
+from .corrections import arithmetic_of, corrections, evidence, settings_of
 from .maps import evaluate_map
+from .sigma import sigma_bits
 from .table import Table, Words
 
 __all__ = ["Replay", "answers", "replay"]
@@ -47,6 +48,8 @@ class Replay:
     bits: Words  # of the bias that it writes
     missed_status: NDArray[np.int32]  # what `missed` returns before the row (0 where nothing was missed)
     block_valid: NDArray[np.bool_]  # the row's own block has enough believed samples
+    sigma: Words | None  # bits of 1 σ that `snapshot` writes; None: the table has no uncertainties
+    age: NDArray[np.int64]  # blocks that it writes
 
 
 def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> Replay:
@@ -62,6 +65,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     channels, missed = np.asarray(channels), np.asarray(missed, dtype=np.int64)
     stream, steps = _followed(table, settings, channels, missed)
     status, bits = corrections(table, steps, stream, channels, samples_per_block)
+    sigma, age = _uncertain(table, steps, stream, channels, samples_per_block, status)
     position = stream.position
     valid = steps.valid[position // samples_per_block]
     in_force = steps.in_force(position)
@@ -77,7 +81,23 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         bits=bits[in_force],
         missed_status=missed_status,
         block_valid=valid,
+        sigma=None if sigma is None else sigma[in_force],
+        age=age[in_force],
     )
+
+
+def _uncertain(
+    table: Table,
+    steps: Steps,
+    stream: Stream,
+    channels: Words,
+    samples_per_block: int,
+    status: NDArray[np.int32],
+) -> tuple[Words | None, NDArray[np.int64]]:
+    """Bits of 1 σ and age of every correction, after one entry for the time before the first."""
+    found = evidence(table, steps, stream, channels, samples_per_block, status[1:])
+    age = np.concatenate([[0], found.age])
+    return sigma_bits(table, found) if table.sigma.size else None, age
 
 
 def _followed(

@@ -35,10 +35,11 @@ def evaluate_map(
     x = np.minimum(np.maximum(x, low), high)
     if table.numeric == "f32":
         points = f32.normalise(table, x, fused)
-        cells, bias = f32.cells(table, points), f32.biases(table, points, fused)
+        cells = f32.cells(table, points, table.coverage_cells)
+        bias = f32.biases(table, points, fused)
     else:
         positions = q31.normalise(table, x)
-        cells, bias = q31.cells(table, positions), q31.biases(table, positions)
+        cells, bias = q31.cells(positions, table.coverage_cells), q31.biases(table, positions)
     within, clamped = governed(table.numbers(table.authority), table.numbers(bias))
     bias = np.where(clamped, _words(table, within), bias)
     status = status | np.where(clamped, CLAMPED, 0)

@@ -127,7 +127,7 @@ def _share(region: Integers, x: Integers) -> Integers:
     return share
 
 
-def cells(table: Table, points: Points) -> Integers:
-    """Cells of the coverage map, (T, slope), shape (n, 2)."""
-    n_t, n_r = table.coverage_cells
+def cells(points: Points, counts: tuple[int, int]) -> Integers:
+    """Cells of a grid of so many over the envelope, (T, slope), shape (n, 2)."""
+    n_t, n_r = counts
     return np.stack([(points.x_t * n_t) >> 16, (points.x_r * n_r) >> 16], axis=1)

@@ -37,6 +37,7 @@ from . import (
 from .data import joined
 from .noisefloor import noise_terms, sensitivities, stretches
 from .outliers import outliers_of, stretches_left_out
+from .rules import rezero_dph
 from .spans import Span, training_spans
 
 __all__ = [
@@ -59,7 +60,8 @@ _AGREE_S = 1.0  # longer than any burst of wrong conversions; an alignment does 
 _MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse thermometer
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
-_UNCERTAINTY_CELLS = (6, 4)  # of T and of dT/dt: 24 words in a table
+# of T and of dT/dt: 80 words in a table; an odd number of slopes, so that rest has cells of its own
+_UNCERTAINTY_CELLS = (8, 5)
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
@@ -247,8 +249,12 @@ def model_of(  # long: one line for each field of model.json
     fitted: Fit,
     front: FrontEnd,
     options: FitOptions,
+    added: NDArray[np.float64] | float = 0.0,
 ) -> Model:
-    """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data."""
+    """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data.
+
+    `added`: what terms, which are not in it yet, add to the map at each sample, deg/h.
+    """
     started = [run.started for run in runs if run.started is not None]
     meta = dict(dataset.meta)
     if dataset.description:
@@ -260,6 +266,7 @@ def model_of(  # long: one line for each field of model.json
     mean = float(np.average(data.bias_dph, weights=data.weight))
     warnings = [*dataset.warnings, earth_rate_warning(dataset.earth_rate, mean)]
     meta["warnings"] = [warning for warning in warnings if warning]
+    known = _uncertainty(data, fitted, front.block_s, added)
     return Model.from_dict(
         {
             "schema": "gyrotc.model/1",
@@ -282,7 +289,10 @@ def model_of(  # long: one line for each field of model.json
             "noise_floor_dph": fitted.noise_floor_dph,
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
-            "uncertainty_dph": _uncertainty(data, fitted),
+            "uncertainty_dph": known,
+            "rezero_dph": rezero_dph(known["rules"]["between_dph"], len(np.unique(data.run)))
+            if known
+            else 0.0,
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,
@@ -290,12 +300,12 @@ def model_of(  # long: one line for each field of model.json
     )
 
 
-def _uncertainty(data: TrainingData, fitted: Fit) -> dict[str, Any] | None:
-    """Of a map; None of what has no Gaussians, and where the process behind it cannot be solved."""
-    if not fitted.n_centers:
-        return None
+def _uncertainty(
+    data: TrainingData, fitted: Fit, block_s: float, added: NDArray[np.float64] | float
+) -> dict[str, Any] | None:
+    """Of the corrections; None where the process behind them cannot be solved."""
     try:
-        return uncertainty(data, fitted, _UNCERTAINTY_CELLS)
+        return uncertainty(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
     except TrainingFailed:
         return None
 

@@ -82,6 +82,12 @@ class Process:
         return self.spread**2 * self.model.variance(t, r)
 
     @property
+    def scales(self) -> tuple[float, float]:
+        """Shortest scales over which it forgets, of the normalised inputs."""
+        _, short, _, _, _, of_t, of_r, _ = np.exp(self.model.log_parameters)
+        return float(min(short, of_t)), float(of_r)
+
+    @property
     def noise_dph(self) -> float:
         """σ of a mean of weight 1, deg/h."""
         return self.spread * self.model.sigma

@@ -4,9 +4,10 @@ What the map may be wrong by at (T, dT/dt), noise of the gyro not included:
 
     σ² = κ² variance of the evidence process + (map − mean of the process)² + τ²
 
-κ and τ come from runs left out in turn: the squares of the mean residuals that the process has there are
-explained by its own variance (factor κ² ≥ 1: it may be too sure), by a variance between runs (τ²), and by
-noise. κ = 1 and τ = 0 unless the runs left out speak against it (likelihood ratio, 5 %).
+κ and τ come from runs left out in turn: the squares of the mean residuals that the process has there are explained by
+its own variance (factor κ²), by a variance between runs (τ²), and by noise. ln κ² is known beforehand to 0.3: over
+many gyros the process is right about itself, and six runs say little of it. τ = 0 unless the runs left out speak
+against it (likelihood ratio, 5 %); of few runs it is what the next one may differ by (Student's t).
 """
 
 from __future__ import annotations
@@ -15,22 +16,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.special import chdtri
 
 from .data import TrainingData, cleaned
 from .process import Process, fit_process
 from .result import Fit, predict
+from .rules import Known, rules_of
 
 __all__ = ["coverage", "uncertainty"]
 
 Floats = NDArray[np.float64]
 
-_POINTS = 3  # in each direction of a cell
+_POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
 _SPANS = 5  # a single run is cut into so many
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
-_ROUNDS = 5  # of weighting anew by what was found; chosen, not derived
-_SIGNIFICANT = float(chdtri(2, 0.05))  # κ² and τ² are two parameters: chi-square with two degrees of freedom
+_SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))
+_SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
+_LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
+_SIGNIFICANT = float(chdtri(1, 0.1))  # one parameter on its border: half of chi-square, 5 %
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
@@ -42,22 +45,86 @@ def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) ->
     return {"cells": list(cells), "rows": ["".join("1" if x else "0" for x in row) for row in seen]}
 
 
-def uncertainty(data: TrainingData, fit: Fit, cells: tuple[int, int] = (12, 8)) -> dict[str, Any]:
-    """`uncertainty_dph` of `model.json`: 1 σ over cells of the envelope, deg/h.
+def uncertainty(
+    data: TrainingData,
+    fit: Fit,
+    cells: tuple[int, int] = (8, 5),
+    block_s: float = 10.0,
+    added: Floats | float = 0.0,
+) -> dict[str, Any]:
+    """`uncertainty_dph` of `model.json`: 1 σ over cells of the envelope, deg/h, and the rules of what comes on top.
+
+    A cell with training samples has their mean variance: a correction is asked for where the gyro is, not evenly over
+    the cell. `uncovered` is the mean over those points of the cell where training was not.
 
     Args:
         data: The samples that `fit` has seen.
         fit: The trained map.
         cells: Number of cells of T and of dT/dt.
+        block_s: Length of a block, s.
+        added: What terms add to the map at each sample, deg/h; the samples are in order then.
     """
     samples = cleaned(data)
     process = fit.outcome.process or fit_process(samples, fit.scaling)
-    t, r = _points(fit, cells)
     scale, between = _calibrated(samples, process, fit)
-    departure = predict(fit, t, r) - process.mean_dph(*fit.scaling.normalise(t, r))
-    variance = scale * process.variance_dph2(*fit.scaling.normalise(t, r)) + departure**2 + between
-    mean = variance.reshape(cells[1], cells[0], -1).mean(axis=2)
-    return {"cells": list(cells), "rows": np.sqrt(mean).tolist()}
+    at_samples = _variance(process, fit, samples.temperature_c, samples.slope_c_per_min, scale)
+    t, r = _points(fit)
+    at_points = _variance(process, fit, t, r, scale)
+    covered = _covered(data, fit, t, r)
+    index, place = _cell(fit, cells, samples.temperature_c, samples.slope_c_per_min), _cell(fit, cells, t, r)
+    everywhere = _means(place, at_points, np.ones(len(t)), cells, np.zeros(cells[::-1]))
+    seen = _means(index, at_samples, samples.weight, cells, everywhere)
+    unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
+    points = t[covered], r[covered]
+    added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
+    known = Known(samples, fit, process, np.sqrt(at_samples), float(np.sqrt(between)), points, added)
+    return {
+        "cells": list(cells),
+        "rows": np.sqrt(seen + between).tolist(),
+        "uncovered": np.sqrt(unseen + between).tolist(),
+        "rules": rules_of(known, block_s),
+    }
+
+
+def _variance(process: Process, fit: Fit, t: Floats, r: Floats, scale: float) -> Floats:
+    """Variance of the map at points, (deg/h)², without that from power-on to power-on."""
+    z = fit.scaling.normalise(t, r)
+    return scale * process.variance_dph2(*z) + (predict(fit, t, r) - process.mean_dph(*z)) ** 2
+
+
+def _points(fit: Fit) -> tuple[Floats, Floats]:
+    """A fine grid of points over the envelope, C and C/min."""
+
+    def inner(span: tuple[float, float], n: int) -> Floats:
+        return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
+
+    t, r = np.meshgrid(
+        inner(fit.scaling.temperature_c, _POINTS[0]), inner(fit.scaling.slope_c_per_min, _POINTS[1])
+    )
+    return t.reshape(-1), r.reshape(-1)
+
+
+def _covered(data: TrainingData, fit: Fit, t: Floats, r: Floats) -> NDArray[np.bool_]:
+    """Whether points lie in cells of the coverage that hold training samples."""
+    rows = coverage(data, fit)["rows"]
+    seen = np.array([[c == "1" for c in row] for row in rows]).reshape(-1)
+    return np.asarray(seen[_cell(fit, (len(rows[0]), len(rows)), t, r)])
+
+
+def _cell(fit: Fit, cells: tuple[int, int], t: Floats, r: Floats) -> NDArray[np.int64]:
+    """Number of the cell of each point, T fastest."""
+    of_t = _index(t, fit.scaling.temperature_c, cells[0])
+    return of_t + cells[0] * _index(r, fit.scaling.slope_c_per_min, cells[1])
+
+
+def _means(
+    cell: NDArray[np.int64], values: Floats, weight: Floats, cells: tuple[int, int], otherwise: Floats
+) -> Floats:
+    """Weighted means by cell, a row for each cell of dT/dt; `otherwise` where a cell has none."""
+    n = cells[0] * cells[1]
+    total = np.bincount(cell, weight, n)
+    mean = np.bincount(cell, weight * values, n) / np.where(total > 0.0, total, 1.0)
+    return np.asarray(np.where(total > 0.0, mean, otherwise.reshape(-1)).reshape(cells[::-1]))
 
 
 def _index(x: Floats, span: tuple[float, float], n: int) -> NDArray[np.int64]:
@@ -65,23 +132,6 @@ def _index(x: Floats, span: tuple[float, float], n: int) -> NDArray[np.int64]:
     if width <= 0.0:
         return np.zeros(len(x), dtype=np.int64)
     return np.clip(np.floor((x - span[0]) * n / width), 0, n - 1).astype(np.int64)
-
-
-def _points(fit: Fit, cells: tuple[int, int]) -> tuple[Floats, Floats]:
-    """Points of the cells, cell by cell, T running fastest over the cells."""
-
-    def inner(span: tuple[float, float], n: int) -> Floats:
-        edges = np.linspace(*span, n + 1)
-        share = (np.arange(_POINTS) + 0.5) / _POINTS
-        return np.asarray(edges[:-1, None] + share * np.diff(edges)[:, None])
-
-    t = inner(fit.scaling.temperature_c, cells[0])
-    r = inner(fit.scaling.slope_c_per_min, cells[1])
-    shape = (cells[1], cells[0], _POINTS, _POINTS)
-    return (
-        np.broadcast_to(t[None, :, None, :], shape).reshape(-1),
-        np.broadcast_to(r[:, None, :, None], shape).reshape(-1),
-    )
 
 
 def _parts(samples: TrainingData) -> NDArray[np.int64]:
@@ -104,15 +154,28 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
     if not rows:
         return 1.0, 0.0
     squares, variance, noise = np.concatenate(rows, axis=1)
-    scale, between = 1.0, 0.0
-    for _ in range(_ROUNDS):
-        root = 1.0 / (scale * variance + between + noise)
-        columns = np.stack([variance, np.ones_like(variance)], axis=1) * root[:, None]
-        (scale, between), _ = nnls(columns, (squares - noise) * root)
-        scale = max(float(scale), 1.0)
-    plain = _deviance(squares, variance + noise)
-    better = _deviance(squares, scale * variance + between + noise)
-    return (scale, float(between)) if plain - better > _SIGNIFICANT else (1.0, 0.0)
+    plain, scale = _likeliest(squares, variance, noise, 0.0)
+    level = float(np.mean(variance + noise)) * _LEVELS
+    found = [(*_likeliest(squares, variance, noise, between), between) for between in level]
+    best, its_scale, between = min(found)
+    if plain - best <= _SIGNIFICANT:
+        return scale, 0.0
+    return its_scale, float(between) * _of_few(len(rows))
+
+
+def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float) -> tuple[float, float]:
+    """Least deviance and its κ² for a variance between runs."""
+    deviance = [
+        _deviance(squares, scale * variance + between + noise) + (float(np.log(scale)) / _SCALE_SD) ** 2
+        for scale in _SCALES
+    ]
+    k = int(np.argmin(deviance))
+    return deviance[k], float(_SCALES[k])
+
+
+def _of_few(runs: int) -> float:
+    """Variance of the next run over that of so many: of Student's t with a degree of freedom less than runs."""
+    return (runs - 1.0) / max(runs - 3.0, 1.0)
 
 
 def _deviance(squares: Floats, variance: Floats) -> float:

@@ -1,7 +1,7 @@
 /* gtc_test_1.c - bias table of gyro TEST-1. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 15eaf6f108f06d94edfba845fa696b4361687de8ebd5aa570c72ec2a6b8b1817
+ * Model:       sha256 1b449dd90d9843007d772275ca4f61d4dabfde0f854247f2db208404e9715e4f
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -48,8 +48,15 @@ static const gtc_word_t f32_coverage[1] = {
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
-static const gtc_word_t f32_sigma[2] = {
-    V(0.00999999978F), V(0.0199999996F),
+static const gtc_word_t f32_sigma[15] = {
+    V(0.00800000038F), V(0.0190787837F),
+    V(0.0293938778F), V(0.0395474397F),
+    V(0.00100000005F), V(9.99999975e-05F),
+    V(0.0179999992F), V(0.00400000019F),
+    V(0.00200000009F), V(0.0299999993F),
+    V(0.0500000007F), V(0.150000006F),
+    V(0.00600000005F), V(0.0599999987F),
+    V(900.0F),
 };
 
 /* known answers: T, slope, bias, status */
@@ -75,9 +82,9 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-1.98713243F), V(1.60987401F) },
+    .authority = { V(-2.01713252F), V(1.63987398F) },
     .effect = { V(0.0F), V(0.0F) },
-    .rezero = V(0.0F),
+    .rezero = V(0.0299999993F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
@@ -86,7 +93,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
-    .n_sigma = 2UL,
+    .n_sigma = 15UL,
     .n_probes = 8UL,
     .serial = f32_serial,
     .networks = f32_networks,
@@ -96,7 +103,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x94bd7609UL,
+    .crc = 0x491e93a7UL,
     .term_code = { NULL },
 };
 
@@ -132,8 +139,15 @@ static const gtc_word_t q31_coverage[1] = {
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
-static const gtc_word_t q31_sigma[2] = {
-    B(0x0028f5c3UL), B(0x0051eb85UL),
+static const gtc_word_t q31_sigma[15] = {
+    B(0x0020c49cUL), B(0x004e258eUL),
+    B(0x007865b7UL), B(0x00a1fc7fUL),
+    B(0x00041893UL), B(0x000068dcUL),
+    B(0x0049ba5eUL), B(0x0010624eUL),
+    B(0x00083127UL), B(0x007ae148UL),
+    B(0x00cccccdUL), B(0x02666666UL),
+    B(0x00189375UL), B(0x00f5c28fUL),
+    B(0x00000384UL),
 };
 
 /* known answers: T, slope, bias, status */
@@ -159,9 +173,9 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 28UL,
     .fallback = 100663296L,
-    .authority = { -533412762L, 432145498L },
+    .authority = { -541465826L, 440198562L },
     .effect = { 0L, 0L },
-    .rezero = 0L,
+    .rezero = 8053064L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -170,7 +184,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
-    .n_sigma = 2UL,
+    .n_sigma = 15UL,
     .n_probes = 8UL,
     .serial = q31_serial,
     .networks = q31_networks,
@@ -180,7 +194,7 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x12648636UL,
+    .crc = 0x0cb0b457UL,
     .term_code = { NULL },
 };
 

@@ -1,7 +1,7 @@
 /* gtc_test_b.c - bias table of gyro TEST-B. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 f2633da1ee3e458a610adbc3fd4b6d6543118f2f752c1ed5c14c3130b24c2fa3
+ * Model:       sha256 f5d6b8c8dd72ef0d4317fc40534deed61797bf0d6e2268a4588ebc5adfdfb741
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -53,8 +53,15 @@ static const gtc_word_t f32_coverage[1] = {
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
-static const gtc_word_t f32_sigma[2] = {
-    V(0.00999999978F), V(0.0199999996F),
+static const gtc_word_t f32_sigma[15] = {
+    V(0.00800000038F), V(0.0190787837F),
+    V(0.0293938778F), V(0.0395474397F),
+    V(0.00100000005F), V(9.99999975e-05F),
+    V(0.0179999992F), V(0.00400000019F),
+    V(0.00200000009F), V(0.0299999993F),
+    V(0.0500000007F), V(0.150000006F),
+    V(0.00600000005F), V(0.0599999987F),
+    V(900.0F),
 };
 
 /* known answers: T, slope, bias, status */
@@ -80,9 +87,9 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-4.28671885F), V(6.15734434F) },
+    .authority = { V(-4.31671858F), V(6.18734455F) },
     .effect = { V(0.0F), V(0.0F) },
-    .rezero = V(0.0F),
+    .rezero = V(0.0299999993F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 3UL,
@@ -91,7 +98,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
-    .n_sigma = 2UL,
+    .n_sigma = 15UL,
     .n_probes = 8UL,
     .serial = f32_serial,
     .networks = f32_networks,
@@ -101,7 +108,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x4f008d1dUL,
+    .crc = 0xaec5889dUL,
     .term_code = { NULL },
 };
 
@@ -142,8 +149,15 @@ static const gtc_word_t q31_coverage[1] = {
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
-static const gtc_word_t q31_sigma[2] = {
-    B(0x00147ae1UL), B(0x0028f5c3UL),
+static const gtc_word_t q31_sigma[15] = {
+    B(0x0010624eUL), B(0x002712c7UL),
+    B(0x003c32dbUL), B(0x0050fe40UL),
+    B(0x00020c4aUL), B(0x0000346eUL),
+    B(0x0024dd2fUL), B(0x00083127UL),
+    B(0x00041893UL), B(0x003d70a4UL),
+    B(0x00666666UL), B(0x01333333UL),
+    B(0x000c49baUL), B(0x007ae148UL),
+    B(0x00000384UL),
 };
 
 /* known answers: T, slope, bias, status */
@@ -169,9 +183,9 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 27UL,
     .fallback = 50331648L,
-    .authority = { -575356275L, 826424246L },
+    .authority = { -579382807L, 830450778L },
     .effect = { 0L, 0L },
-    .rezero = 0L,
+    .rezero = 4026532L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 3UL,
@@ -180,7 +194,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .n_terms = 0UL,
     .coverage_cells = { 8UL, 3UL },
     .sigma_cells = { 2UL, 1UL },
-    .n_sigma = 2UL,
+    .n_sigma = 15UL,
     .n_probes = 8UL,
     .serial = q31_serial,
     .networks = q31_networks,
@@ -190,7 +204,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x27da5e50UL,
+    .crc = 0x6b413bc4UL,
     .term_code = { NULL },
 };
 

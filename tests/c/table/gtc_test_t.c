@@ -1,7 +1,7 @@
 /* gtc_test_t.c - bias table of gyro TEST-T. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 eb49137ef2f09e1eddd0f024b7b0c2b70053294f1c5206030f90846f1210574b
+ * Model:       sha256 ece8d2ab954afa0ec74d872aac0fa0a9e6ef7ef059eca0009e17bb6f0fd2fcab
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -51,6 +51,20 @@ static const gtc_word_t f32_terms[32] = {
     B(0x5UL), B(0x1UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
 };
 
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t f32_sigma[19] = {
+    V(0.00800000038F), V(0.0190787837F),
+    V(0.0293938778F), V(0.0395474397F),
+    V(0.00100000005F), V(9.99999975e-05F),
+    V(0.0179999992F), V(0.00400000019F),
+    V(0.00200000009F), V(0.0299999993F),
+    V(0.0500000007F), V(0.150000006F),
+    V(0.00600000005F), V(0.0599999987F),
+    V(900.0F), V(0.00999999978F),
+    V(0.0199999996F), V(0.0F),
+    V(0.0299999993F),
+};
+
 /* known answers: T, slope, bias, status */
 static const gtc_word_t f32_probes[32] = {
     V(0.774153054F), V(0.456940234F), V(-0.723808289F), B(0x0UL),
@@ -82,9 +96,9 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
     .fallback = V(0.375F),
-    .authority = { V(-3.99148464F), V(3.63148212F) },
+    .authority = { V(-4.02148485F), V(3.66148233F) },
     .effect = { V(-2.0259223F), V(2.0259223F) },
-    .rezero = V(0.0F),
+    .rezero = V(0.0299999993F),
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
@@ -92,8 +106,8 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .n_channels = 2UL,
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
-    .sigma_cells = { 0UL, 0UL },
-    .n_sigma = 0UL,
+    .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 19UL,
     .n_probes = 8UL,
     .serial = f32_serial,
     .networks = f32_networks,
@@ -101,9 +115,9 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .guards = f32_guards,
     .terms = f32_terms,
     .coverage = NULL,
-    .sigma = NULL,
+    .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x7c0a886cUL,
+    .crc = 0x672bb996UL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
 };
 
@@ -142,6 +156,20 @@ static const gtc_word_t q31_terms[32] = {
     B(0x5UL), B(0x1UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
 };
 
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t q31_sigma[19] = {
+    B(0x00041893UL), B(0x0009c4b2UL),
+    B(0x000f0cb7UL), B(0x00143f90UL),
+    B(0x00008312UL), B(0x00000d1bUL),
+    B(0x0009374cUL), B(0x00020c4aUL),
+    B(0x00010625UL), B(0x000f5c29UL),
+    B(0x0019999aUL), B(0x004ccccdUL),
+    B(0x0003126fUL), B(0x001eb852UL),
+    B(0x00000384UL), B(0x00051eb8UL),
+    B(0x000a3d71UL), B(0x00000000UL),
+    B(0x000f5c29UL),
+};
+
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
     B(0x002863e5UL), B(0x000011e1UL), B(0xffbf167cUL), B(0x0UL),
@@ -173,9 +201,9 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .lead_blocks = 0UL,
     .bias_frac_bits = 25UL,
     .fallback = 12582912L,
-    .authority = { -133931517L, 121852113L },
+    .authority = { -134938150L, 122858746L },
     .effect = { -67978665L, 67978665L },
-    .rezero = 0L,
+    .rezero = 1006633L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -183,8 +211,8 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .n_channels = 2UL,
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
-    .sigma_cells = { 0UL, 0UL },
-    .n_sigma = 0UL,
+    .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 19UL,
     .n_probes = 8UL,
     .serial = q31_serial,
     .networks = q31_networks,
@@ -192,9 +220,9 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .guards = q31_guards,
     .terms = q31_terms,
     .coverage = NULL,
-    .sigma = NULL,
+    .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x8a94f69aUL,
+    .crc = 0xd3977209UL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
 };
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...dataset import Dataset
 from ...metrics import Averages
@@ -46,6 +47,7 @@ class Extension:
         shipped: Effects of the extended model.
         crossed: The cross-validation on the training runs that decided so.
         samples: Training samples as the extended map sees them.
+        added: What the effects add to the map at each of them, deg/h.
         floor: Noise floor of the scored samples, deg/h.
         baseline_rms, baseline_centers: RMS (deg/h) and number of centers of the model without causes.
         measured_on: "exam" or "left out".
@@ -60,6 +62,7 @@ class Extension:
     shipped: tuple[Effect, ...]
     crossed: Shipping
     samples: TrainingData
+    added: NDArray[np.float64]
     floor: float
     baseline_rms: float
     baseline_centers: int
@@ -91,6 +94,8 @@ def extend(
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     extended = refitting.fit(shipped) if shipped else None
+    seen = joined([samples(run, shipped) for run in refitting.train])
+    bare = joined([samples(run, []) for run in refitting.train])
     return Extension(
         steps=tuple(steps),
         total=total,
@@ -99,7 +104,8 @@ def extend(
         extended=extended,
         shipped=tuple(shipped),
         crossed=crossed,
-        samples=joined([samples(run, shipped) for run in refitting.train]),
+        samples=seen,
+        added=bare.bias_dph - seen.bias_dph,
         floor=floor,
         baseline_rms=_rms(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,

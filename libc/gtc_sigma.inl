@@ -1,0 +1,234 @@
+/* gtc_sigma.inl - how uncertain a correction is, in the numbers included before.
+ *
+ * docs/design.md gives the rules with their reasons, docs/numerics.md every step; gen/gyrotc/reference/sigma.py is
+ * the mirror. All of it is a function of a state: whoever does not ask for a snapshot pays a few words at the end
+ * of a block.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+/* Words of a table's uncertainty behind its two grids; then one for each term. */
+#define RULE_HOLD 0U        /* deg/h per C that a held input may have gone on by at its slope */
+#define RULE_REST 1U        /* deg/h per block for which a correction is held, whatever its slope */
+#define RULE_SLOPE 2U       /* deg/h per C/block of a slope that is known and not in the correction yet */
+#define RULE_START 3U       /* deg/h: nothing is known of the slope */
+#define RULE_BEYOND 4U      /* deg/h per C, deg/h per C/block beyond the envelope */
+#define RULE_FALLBACK 6U    /* deg/h about the constant correction */
+#define RULE_NONE 7U        /* deg/h of the bias itself */
+#define RULE_BETWEEN 8U     /* deg/h of the constant from power-on to power-on */
+#define RULE_NOISE 9U       /* deg/h of a mean of the rate over 1 s */
+#define RULE_CORRELATION 10U /* s */
+
+/* 1 if a table says how uncertain its corrections are: two grids, rules, and a word for each term. */
+static int FN(has_sigma)(const TABLE *table)
+{
+    return (table->n_sigma != 0U) ? 1 : 0;
+}
+
+/* A table's words of uncertainty are all there, or none. */
+static int FN(sigma_fits)(const TABLE *table)
+{
+    const uint_least32_t cells = table->sigma_cells[0] * table->sigma_cells[1];
+    const uint_least32_t whole = (2U * cells) + GTC_SIGMA_RULES + table->n_terms;
+
+    return ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole))) ? 1 : 0;
+}
+
+static NUM FN(rule)(const TABLE *table, uint_least32_t k)
+{
+    return ELEMENT(table->sigma[(2U * table->sigma_cells[0] * table->sigma_cells[1]) + k]);
+}
+
+/* ---- what a state takes note of ------------------------------------------------------------------ */
+
+static void FN(doubt_clear)(volatile STATE *state)
+{
+    state->doubt.at[0] = NUM_ZERO;
+    state->doubt.at[1] = NUM_ZERO;
+    state->doubt.drift = NUM_ZERO;
+    state->doubt.start = NUM_ZERO;
+    state->doubt.low = NUM_ZERO;
+    state->doubt.high = NUM_ZERO;
+    state->doubt.plain = NUM_ZERO;
+    state->doubt.begun = 0U;
+    state->doubt.known = 0U;
+    state->doubt.sure = 0U;
+}
+
+/* The terms begin at x: which of them know where they were, is known by what outlasted. */
+static void FN(doubt_begin)(STATE *state, NUM x)
+{
+    uint_least32_t i;
+
+    state->doubt.known = 0U;
+    for (i = 0U; i < state->table->n_terms; i++) {
+        if (!FN(is_missing)(state->term[i][0])) {
+            state->doubt.known |= (uint_least32_t)1U << i;
+        }
+    }
+    state->doubt.begun = state->elapsed;
+    state->doubt.low = x;
+    state->doubt.high = x;
+}
+
+/* A block ends, of which the terms see this temperature. */
+static void FN(doubt_step)(STATE *state, NUM x)
+{
+    if (x < state->doubt.low) {
+        state->doubt.low = x;
+    }
+    if (x > state->doubt.high) {
+        state->doubt.high = x;
+    }
+}
+
+/* The map is asked at an input; `slope` is that of the window, 0 while it is not full. */
+static void FN(doubt_input)(STATE *state, const EFFECT *effect, NUM slope)
+{
+    const uint_least32_t filled = state->filled;
+
+    state->doubt.at[0] = effect->temp;
+    state->doubt.at[1] = effect->slope;
+    state->doubt.sure = 2U;
+    state->doubt.drift = slope;
+    if ((effect->remarks & GTC_WARMING) != 0) {
+        if ((filled >= 2U) && (filled < state->table->slope_blocks)) {
+            const WIDE d = FN(diff)(state->input[0].mean, state->doubt.start);
+
+            state->doubt.drift = FN(quotient)(FN(scaled)(2U, d), (2U * filled) - 1U);
+        } else {
+            state->doubt.sure = 1U;
+        }
+    }
+}
+
+/* ---- the parts of a variance ------------------------------------------------------------------------- */
+
+/* Of the map where it was asked, from the grid of covered or that of uncovered cells. */
+static SQUARE FN(variance_of_map)(const STATE *state)
+{
+    const TABLE *const table = state->table;
+    uint_least32_t cell[2];
+    uint_least32_t index;
+    POINT in;
+
+    if (FN(locate)(table, state->doubt.at[0], state->doubt.at[1], &in) < 0) {
+        return NO_SQUARE;
+    }
+    FN(cells)(table, &in, table->sigma_cells, cell);
+    index = (cell[1] * table->sigma_cells[0]) + cell[0];
+    if ((state->status & GTC_UNCOVERED) != 0) {
+        index += table->sigma_cells[0] * table->sigma_cells[1];
+    }
+    return FN(squared)(ELEMENT(table->sigma[index]));
+}
+
+/* Of an input that went on while the correction was held. */
+static SQUARE FN(variance_of_age)(const STATE *state)
+{
+    const uint_least32_t age = state->input[0].held_blocks;
+    WIDE moved;
+    SQUARE square;
+
+    if (age == 0U) {
+        return NO_SQUARE;
+    }
+    moved = FN(limited)(FN(scaled_difference)(state->doubt.drift, NUM_ZERO, FN(rule)(state->table, RULE_HOLD)));
+    square = FN(squared)(FN(scaled)(age, moved));
+    return FN(plus)(square, FN(squared)(FN(scaled)(age, FN(rule)(state->table, RULE_REST))));
+}
+
+/* Of a slope that the correction does not have yet. */
+static SQUARE FN(variance_of_start)(const STATE *state)
+{
+    if ((state->status & GTC_WARMING) == 0) {
+        return NO_SQUARE;
+    }
+    if (state->doubt.sure != 2U) {
+        return FN(squared)(FN(rule)(state->table, RULE_START));
+    }
+    return FN(squared)(FN(scaled_difference)(state->doubt.drift, NUM_ZERO, FN(rule)(state->table, RULE_SLOPE)));
+}
+
+/* Of inputs beyond the envelope. */
+static SQUARE FN(variance_beyond)(const STATE *state)
+{
+    SQUARE sum = NO_SQUARE;
+    uint_least32_t k;
+
+    for (k = 0U; k < 2U; k++) {
+        const NUM x = state->doubt.at[k];
+        const NUM low = MEMBER(state->table->envelope[2U * k]);
+        const NUM high = MEMBER(state->table->envelope[(2U * k) + 1U]);
+        const NUM edge = (x < low) ? low : ((x > high) ? high : x);
+
+        sum = FN(plus)(sum, FN(squared)(FN(scaled_difference)(x, edge, FN(rule)(state->table, RULE_BEYOND + k))));
+    }
+    return sum;
+}
+
+/* Of what terms do not know of the time before they began, or of a channel that is lost. */
+static SQUARE FN(variance_of_terms)(const STATE *state)
+{
+    const TABLE *const table = state->table;
+    SQUARE sum = NO_SQUARE;
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
+        const NUM word = FN(rule)(table, GTC_SIGMA_RULES + i);
+        const NUM first = FN(parameter)(state, i, 0U);
+
+        if (kind == GTC_TERM_AUXILIARY) {
+            if ((state->status & GTC_CHANNEL_LOST) != 0) {
+                sum = FN(plus)(sum, FN(squared)(word));
+            }
+        } else if (((state->doubt.known >> i) & 1U) != 0U) {
+            /* it went on from where it was */
+        } else if (kind == GTC_TERM_MEMORY) {
+            sum = FN(plus)(sum, FN(squared)(FN(remaining)(word, first, state->elapsed - state->doubt.begun)));
+        } else if (kind == GTC_TERM_PLAY) {
+            sum = FN(plus)(sum, FN(squared)(FN(unsettled)(first, state->doubt.low, state->doubt.high, word)));
+        } else {
+            /* it has no state */
+        }
+    }
+    return sum;
+}
+
+/* Of the correction in force, but for the constant from power-on to power-on. */
+static SQUARE FN(variance)(const STATE *state)
+{
+    SQUARE sum;
+
+    if ((state->status & GTC_FALLBACK) != 0) {
+        sum = FN(squared)(FN(rule)(state->table, RULE_FALLBACK));
+    } else if (state->doubt.sure == 0U) {
+        sum = FN(squared)(FN(rule)(state->table, RULE_NONE));
+    } else {
+        sum = FN(plus)(FN(variance_of_map)(state), FN(variance_of_age)(state));
+        sum = FN(plus)(sum, FN(variance_of_start)(state));
+        sum = FN(plus)(sum, FN(variance_beyond)(state));
+        sum = FN(plus)(sum, FN(variance_of_terms)(state));
+    }
+    return sum;
+}
+
+/* ---- the constant of a power-on ------------------------------------------------------------------- */
+
+/* No shift; the constant is as uncertain as from power-on to power-on. */
+static void FN(rezero_clear)(STATE *state)
+{
+    state->shift = NUM_ZERO;
+    state->constant = FN(has_sigma)(state->table) ? FN(rule)(state->table, RULE_BETWEEN) : NUM_ZERO;
+}
+
+/* A shift goes on; the constant of the next power-on differs from that of the last one by twice the variance. */
+static void FN(rezero_outlast)(STATE *state)
+{
+    if (FN(has_sigma)(state->table) && ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO))) {
+        const SQUARE between = FN(squared)(FN(rule)(state->table, RULE_BETWEEN));
+
+        state->constant = FN(root)(FN(plus)(FN(squared)(state->constant), FN(plus)(between, between)));
+    }
+}

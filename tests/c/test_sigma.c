@@ -1,0 +1,220 @@
+/* test_sigma.c - the snapshot of a correction, and a rest that moves the constant. */
+#include "test_num.h"
+
+#if TEST_Q31
+typedef gtc_q31_snapshot_t snapshot_t;
+#define DPH(x) ((int_least32_t)((x) * (double)(1L << TABLE.bias_frac_bits)))
+#define MUCH 2147483647L
+#define VALUE(member) (member)
+#else
+typedef gtc_f32_snapshot_t snapshot_t;
+#define DPH(x) ((float)(x))
+#define MUCH 1.0e30F
+#define VALUE(member) ((member).value)
+#endif
+
+static const snapshot_t nothing;
+
+static snapshot_t snapshot_of(const state_t *state)
+{
+    snapshot_t snapshot = nothing;
+
+    CHECK(FN(snapshot)(state, &snapshot) >= 0);
+    return snapshot;
+}
+
+/* n samples about a temperature whose blocks have it as their mean; a reading that stays the same would be stuck. */
+static void rest(state_t *state, num_t temp, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        const num_t x = (num_t)(temp + (((i % 2) == 0) ? (C(1) / 64) : -(C(1) / 64)));
+
+        CHECK(FN(sample)(state, &x) >= 0);
+    }
+}
+
+TEST(bad_arguments_are_refused_and_nothing_is_written)
+{
+    state_t state = started();
+    snapshot_t snapshot = nothing;
+
+    rest(&state, C(15), 60);
+    CHECK_INT(GTC_E_ARG, FN(snapshot)(NULL, &snapshot));
+    CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, NULL));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(NULL, DPH(0.01), 600U));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, MISSING, 600U));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, DPH(0.01), 0U));
+    CHECK_INT(GTC_E_ARG, FN(unzero)(NULL));
+    CHECK(same(bias_of(&state), map_of(C(15), 0)));
+    memset(&state, 0, sizeof state);
+    CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, &snapshot));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, DPH(0.01), 600U));
+    CHECK_INT(GTC_E_ARG, FN(unzero)(&state));
+    CHECK(memcmp(&snapshot, &nothing, sizeof snapshot) == 0);
+}
+
+/* Before anything is believed, warming, then as trained. */
+TEST(sigma_falls_while_the_front_end_learns)
+{
+    state_t state = started();
+    const snapshot_t before = snapshot_of(&state);
+    snapshot_t warming;
+    snapshot_t settled;
+
+    CHECK_INT(GTC_HELD, before.status);
+    rest(&state, C(15), 1);
+    warming = snapshot_of(&state);
+    CHECK_INT(GTC_WARMING, warming.status);
+    rest(&state, C(15), 100);
+    settled = snapshot_of(&state);
+    CHECK(before.sigma > warming.sigma);
+    CHECK(warming.sigma > settled.sigma);
+    CHECK(settled.sigma > 0);
+    CHECK(same(settled.bias, bias_of(&state)));
+    CHECK(settled.correlation_s == 900);
+}
+
+TEST(sigma_grows_with_the_age_of_a_held_correction)
+{
+    state_t state = started();
+    num_t temp = C(12);
+    num_t last;
+    uint_least32_t age;
+
+    ramp(&state, &temp, C(1) / 64, 60);
+    last = snapshot_of(&state).sigma;
+    for (age = 1U; age < 4U; age++) {
+        CHECK(FN(missed)(&state, (age == 1U) ? (N + 1U) : N) >= 0);
+        CHECK_INT(age, snapshot_of(&state).age_blocks);
+        CHECK(snapshot_of(&state).sigma > last);
+        last = snapshot_of(&state).sigma;
+    }
+}
+
+TEST(sigma_grows_beyond_the_envelope)
+{
+    state_t state = started();
+    num_t near_it = 0;
+    int i;
+
+    for (i = 0; i < 2; i++) {
+        const num_t edge = VALUE(TABLE.envelope[1]);
+
+        state = started();
+        rest(&state, (num_t)(edge + C(1 + (9 * i))), 100);
+        CHECK((status_of(&state) & GTC_CLAMPED) != 0);
+        if (i == 0) {
+            near_it = snapshot_of(&state).sigma;
+        } else {
+            CHECK(snapshot_of(&state).sigma > near_it);
+        }
+    }
+}
+
+/* A rest of an hour takes nearly all of a residual; the constant is known better then; one call takes it back. */
+TEST(a_rest_moves_the_constant_and_one_call_takes_it_back)
+{
+    state_t state = started();
+    num_t before;
+    num_t moved;
+    num_t sigma;
+
+    rest(&state, C(15), 100);
+    before = bias_of(&state);
+    sigma = snapshot_of(&state).sigma;
+    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
+    moved = (num_t)(bias_of(&state) - before);
+    CHECK((moved > 0) && (moved <= DPH(0.004)));
+    CHECK(snapshot_of(&state).sigma < sigma);
+    CHECK(same(bias_of(&state), snapshot_of(&state).bias));
+    rest(&state, C(15), 100);
+    CHECK(same(bias_of(&state), (num_t)(before + moved)));
+    CHECK_INT(GTC_OK, FN(unzero)(&state));
+    CHECK(same(bias_of(&state), before));
+    CHECK(same(snapshot_of(&state).sigma, sigma));
+}
+
+TEST(the_bound_holds_for_any_rate_and_any_number_of_calls)
+{
+    static const uint_least32_t seconds[4] = {1U, 60U, 86400U, 0xFFFFFFFFUL};
+    const num_t most = VALUE(TABLE.rezero);
+    num_t rates[6];
+    state_t state = started();
+    num_t plain;
+    int clamped = 0;
+    int i;
+
+    rates[0] = MUCH;
+    rates[1] = -MUCH;
+    rates[2] = DPH(0.5);
+    rates[3] = -DPH(0.02);
+    rates[4] = 0;
+    rates[5] = MISSING;
+    rest(&state, C(15), 100);
+    plain = bias_of(&state);
+    for (i = 0; i < 240; i++) {
+        const int status = FN(rezero)(&state, rates[(i * 7) % 6], seconds[(i / 6) % 4]);
+        const num_t shift = (num_t)(bias_of(&state) - plain);
+
+        CHECK((status == GTC_OK) || (status == GTC_CLAMPED) || (status == GTC_E_ARG));
+        clamped += (status == GTC_CLAMPED) ? 1 : 0;
+        CHECK((shift <= (most + DPH(1e-7))) && (shift >= -(most + DPH(1e-7))));
+        CHECK(snapshot_of(&state).sigma > 0);
+    }
+    CHECK(clamped > 0);
+    CHECK_INT(GTC_OK, FN(unzero)(&state));
+    CHECK(same(bias_of(&state), plain));
+}
+
+TEST(a_shift_outlasts_save_and_restore_and_a_time_without_power)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t state = started();
+    state_t other;
+    num_t sigma;
+
+    rest(&state, C(15), 100);
+    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&other, &TABLE, PERIOD, words, 0U));
+    CHECK(same(bias_of(&state), bias_of(&other)));
+    CHECK(same(snapshot_of(&state).sigma, snapshot_of(&other).sigma));
+    sigma = snapshot_of(&state).sigma;
+    CHECK_INT(GTC_OK, FN(restore)(&other, &TABLE, PERIOD, words, 100U));
+    rest(&other, C(15), 100);
+    CHECK(same(bias_of(&state), bias_of(&other)));
+    CHECK(snapshot_of(&other).sigma > sigma); /* another power-on has another constant */
+}
+
+TEST(a_table_that_grants_no_shift_keeps_its_constant)
+{
+    table_t table = TABLE;
+    state_t state;
+    num_t before;
+
+#if TEST_Q31
+    table.rezero = 0;
+#else
+    table.rezero.value = 0.0F;
+#endif
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    rest(&state, C(15), 100);
+    before = bias_of(&state);
+    CHECK_INT(GTC_E_LAYOUT, FN(rezero)(&state, DPH(0.01), 3600U));
+    CHECK(same(bias_of(&state), before));
+}
+
+int main(void)
+{
+    RUN(bad_arguments_are_refused_and_nothing_is_written);
+    RUN(sigma_falls_while_the_front_end_learns);
+    RUN(sigma_grows_with_the_age_of_a_held_correction);
+    RUN(sigma_grows_beyond_the_envelope);
+    RUN(a_rest_moves_the_constant_and_one_call_takes_it_back);
+    RUN(the_bound_holds_for_any_rate_and_any_number_of_calls);
+    RUN(a_shift_outlasts_save_and_restore_and_a_time_without_power);
+    RUN(a_table_that_grants_no_shift_keeps_its_constant);
+    return test_end();
+}

@@ -1,0 +1,97 @@
+/* sigma.c - the snapshot, and a rest of any rate and length, on every state with any table that `init` accepts.
+ *
+ * The bound: whatever the state, the rate and the time, the shift stays within the table's `rezero`, here 1 deg/h or
+ * 2^20 units, where it starts (`init`: 0) or is put by `restore`.
+ */
+#include "arithmetic.h"
+
+#if defined(F32)
+/*@ requires n >= 1; assigns \result \from x, range[0 .. 1], n; ensures \result <= n - 1; */
+static inline uint_least32_t gtc_f32_cell(float x, const gtc_word_t *range, uint_least32_t n);
+/*@ assigns \result \from x;
+    behavior number: assumes \is_finite(x); ensures \result == 0;
+    behavior missing: assumes !\is_finite(x); ensures \result == 1;
+    complete behaviors; */
+static inline int gtc_f32_is_missing(float x);
+#define BOUND 1.0F
+#else
+/*@ assigns \result \from x, range[0 .. 1];
+    assigns *position \from x, range[0 .. 1], gain;
+    ensures \initialized(position) && *position <= 65535;
+    ensures \result == 0 || \result == 2 || \result == -1; */
+static inline int gtc_q31_position(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+                                   uint_least32_t *position);
+#define BOUND 1048576L
+#endif
+
+#include "gtc.c"
+#include "any_table.h"
+
+#define CELLS 6U
+
+static gtc_word_t any_sigma[(2U * CELLS) + GTC_SIGMA_RULES + GTC_MAX_TERMS];
+static NAME(state_t) state;
+
+static void any_uncertainty(void)
+{
+    unsigned i;
+    /*@ loop unroll 32; */
+    for (i = 0; i < ((2U * CELLS) + GTC_SIGMA_RULES + GTC_MAX_TERMS); i++) {
+        NUMBER(any_sigma[i]) = ANY_IN(NAME(sigma_limits)[0]);
+    }
+    any.sigma = any_sigma;
+    any.sigma_cells[0] = 3U;
+    any.sigma_cells[1] = 2U;
+    any.n_sigma = (2U * CELLS) + GTC_SIGMA_RULES + GTC_MAX_TERMS;
+    MEMBER_OF(any.rezero) = BOUND;
+}
+
+static void any_state(void)
+{
+    unsigned i;
+    state.table = &THE_TABLE;
+    state.status = Frama_C_interval(0, 63);
+    state.input[0].held_blocks = Frama_C_unsigned_long_interval(0, 100001);
+    state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
+    state.bias = any_number(0);
+#if defined(F32)
+    state.shift = Frama_C_float_interval(-BOUND, BOUND);
+#else
+    state.shift = (int_least32_t)Frama_C_long_interval(-BOUND, BOUND);
+#endif
+    state.constant = any_number(0);
+    state.doubt.at[0] = any_number(0);
+    state.doubt.at[1] = any_number(0);
+    state.doubt.drift = any_number(0);
+    state.doubt.low = ANY_PLAUSIBLE();
+    state.doubt.high = ANY_PLAUSIBLE();
+    state.doubt.plain = any_number(0);
+    state.doubt.begun = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
+    state.doubt.known = Frama_C_unsigned_long_interval(0, 15);
+    state.doubt.sure = Frama_C_unsigned_long_interval(0, 2);
+    /*@ loop unroll 4; */
+    for (i = 0; i < GTC_MAX_TERMS; i++) {
+        state.term[i][0] = any_number((unsigned)Frama_C_interval(0, KINDS - 1));
+    }
+}
+
+int main(void)
+{
+    unsigned kind;
+    any_table();
+    any_uncertainty();
+    /*@ loop unroll KINDS; */
+    for (kind = 0; kind < KINDS; kind++) {
+        NAME(snapshot_t) snapshot;
+        int status;
+        any_state();
+        status = NAME(snapshot)(&state, &snapshot);
+        //@ check status >= 0;
+        status = NAME(rezero)(&state, any_number(kind), Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
+        //@ check status == -1 || status == 0 || status == 2;
+        //@ check -BOUND <= state.shift <= BOUND;
+        status = NAME(unzero)(&state);
+        //@ check status == 0 && state.shift == 0;
+    }
+    return 0;
+}
