@@ -7,7 +7,7 @@ import pytest
 from gyrotc.errors import CheckFailed
 from gyrotc.quantise import NUMERICS, quantise
 from gyrotc.reference import replay
-from gyrotc.status import E_LAYOUT, HELD
+from gyrotc.status import E_LAYOUT
 from libc_build import Runtime, runtime
 from libc_device import history, variant
 from models import random_model, random_uncertainty
@@ -54,4 +54,3 @@ def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> 
     table = quantise(random_model(5), numeric)
     status, _ = build.snapshots(table, table.encode_inputs(np.full((20, 1), 20.0)), np.zeros(20), 2)
     assert set(status[:, 1]) == {E_LAYOUT}
-    assert HELD not in status[:, 0]

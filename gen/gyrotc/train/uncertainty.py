@@ -33,7 +33,7 @@ _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
 _SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))
 _SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
 _LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
-_SIGNIFICANT = float(chdtri(1, 0.1))  # one parameter on its border: half of chi-square, 5 %
+_SIGNIFICANT = float(chdtri(2, 0.05))  # a level and a run that differs most: two degrees of freedom
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
