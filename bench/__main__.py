@@ -1,4 +1,4 @@
-"""`python -m bench docs [--only training|raw|runtime]`: figures into docs/results/, sections of docs/results.md."""
+"""`python -m bench docs [--only PART]`: figures into docs/results/, sections of docs/results.md."""
 
 from __future__ import annotations
 
@@ -77,8 +77,17 @@ def _runtime(docs: Path) -> None:
     write(docs, "runtime", runtime(_say), section)
 
 
+def _sigma(docs: Path) -> None:
+    """Whether the uncertainty of corrections holds, on simulated gyros."""
+    from .runtime_page import write
+    from .sigma import coverage
+    from .sigma_page import section
+
+    write(docs, "sigma", coverage(_say), section)
+
+
 _PARTS = {"training": _training, "runtime": _runtime}
-_ALONE = {"raw": _raw}
+_ALONE = {"raw": _raw, "sigma": _sigma}
 
 
 def main() -> None:
