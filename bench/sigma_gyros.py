@@ -16,7 +16,7 @@ from gyrotc.simulate import simulate
 from gyrotc.simulate.campaign import campaign, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.terms.arithmetic import FLOAT64
-from gyrotc.terms.recursion import Outcome, recursion_of
+from gyrotc.terms.recursion import TermOutcome, recursion_of
 from gyrotc.train import TrainingData, fit
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
@@ -103,7 +103,7 @@ def _beside(terms: Sequence[Term], blocks: Any, part: TrainingData, block_s: flo
     """The samples as the map sees them beside the terms."""
     steps, n = blocks.steps, blocks.samples_per_block
     slope, none = steps.slope.astype(np.float64), np.zeros(steps.slope.size)
-    seen = Outcome(steps.temperature.astype(np.float64), slope, none, steps.remarks)
+    seen = TermOutcome(steps.temperature.astype(np.float64), slope, none, steps.remarks)
     for term in terms:
         parameters = term.table.parameters(term.parameters, block_s)
         recursion = recursion_of(term.table.kind, FLOAT64, parameters)
