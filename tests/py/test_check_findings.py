@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import Command
 from gyrotc.dataset.earth import earth_rate
 from gyrotc.judge.advice import advice_of
 from gyrotc.judge.changes import earlier_models
@@ -252,3 +253,33 @@ def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
             for k in range(12)
         ]
         assert turned(entries) == []
+
+
+@pytest.mark.parametrize("lost", [0.06, 0.2])
+def test_rows_that_are_really_missing_are_gaps_and_no_coarse_stamps(lost: float, tmp_path: Path) -> None:
+    table = columns(3000)
+    kept = np.random.default_rng(4).random(3000) > lost
+    write_csv(tmp_path / "R" / "a.csv", {name: values[kept] for name, values in table.items()})
+    assert {d.id for d in check(tmp_path / "R").doubts} == {"gaps"}
+
+
+def test_the_command_draws_and_holds_against_an_earlier_result(
+    calibrated: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    write_csv(tmp_path / "RLG-0042" / "a.csv", turned(three(5), "x -y z"))
+    page = tmp_path / "check.html"
+    command = ("check", tmp_path / "RLG-0042", "--axis", "all", "--previous", calibrated, "--plots", page)
+    done = gyrotc(*command)
+    assert done.returncode == 0, done.stderr
+    assert "axis y stands with the other sign in the column of y" in done.stdout
+    assert page.read_text("utf-8").count("<svg") >= 1
+    page.write_text("mine")
+    assert gyrotc(*command).returncode == 2
+    assert page.read_text("utf-8") == "mine"
+    (tmp_path / "RLG-0042").rename(tmp_path / "RLG-7")
+    refused = gyrotc("check", tmp_path / "RLG-7", "--axis", "all", "--previous", calibrated)
+    assert refused.returncode == 2
+    assert "--previous: is of gyro RLG-0042" in refused.stderr
+    nothing = gyrotc("check", tmp_path / "RLG-7", "--axis", "all", "--previous", tmp_path)
+    assert nothing.returncode == 2
+    assert "has no model.json" in nothing.stderr

@@ -26,6 +26,7 @@ _PARTS, _LEAST_STEPS = 50, 40
 _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
 # Of a row period, and of the rows: a clock of coarser ticks than the rows
 _COARSE, _COARSE_SHARE = 0.4, 0.05
+_EVEN_ROWS, _EVEN, _EVEN_SHARE = 400, 1.25, 0.8  # parts in which even rows stay so near a line, in units
 _TOLD = 20  # that are told: enough to see a pattern
 _HOUR_S = 3600.0  # a change of summer time
 
@@ -131,7 +132,7 @@ def _coarse(run: Run, step: Floats) -> Finding | None:
     unit = min(float(kinds[0]), float(np.diff(kinds).min()))
     whole = np.abs(kinds / unit - np.round(kinds / unit)).max() < 0.01
     odd = float(np.mean(np.abs(short - run.row_period_s) > 0.25 * run.row_period_s))
-    if not whole or unit < _COARSE * run.row_period_s or odd < _COARSE_SHARE:
+    if not whole or unit < _COARSE * run.row_period_s or odd < _COARSE_SHARE or not _regular(some, unit):
         return None
     return {
         "id": "coarse_time",
@@ -142,6 +143,17 @@ def _coarse(run: Run, step: Floats) -> Finding | None:
         "evidence": {"file": run.file, "from_s": run.from_s},
         "marks": (),
     }
+
+
+def _regular(step: Floats, unit: float) -> bool:
+    """Whether stamps are those of even rows, cut to a unit: rows that are really missing leave the line by and by."""
+    time = np.cumsum(step)
+    size = min(_EVEN_ROWS, len(time))
+    parts = time[: len(time) // size * size].reshape(-1, size)
+    at = np.arange(size) - 0.5 * (size - 1)
+    centred = parts - parts.mean(axis=1, keepdims=True)
+    rest = centred - (centred @ at / (at @ at))[:, None] * at
+    return float(np.mean(np.abs(rest).max(axis=1) < _EVEN * unit)) > _EVEN_SHARE
 
 
 def _drift(run: Run, time: Floats, at: NDArray[np.int64], step: Floats) -> Iterator[Finding]:
