@@ -295,6 +295,38 @@ def keithley(t: Truth) -> list[str]:
     ]  # fmt: skip
 
 
+@text()
+def parts(t: Truth) -> list[str]:
+    def row(k: int, s: float, c: float, r: list[float]) -> str:
+        at = _at(s)
+        return f"{at.year},{at.month},{at.day},{at.hour},{at.minute},{at.second},{c!r},{r[0]!r}"
+
+    return ["Year,Month,Day,Hour,Minute,Second,temp_c,rate_dph", *_rows(t, row)]
+
+
+@text("ascii", "\r\n")
+def milliseconds(t: Truth) -> list[str]:
+    """Two rows a second: whole seconds in the stamp, the rest in the next column."""
+
+    def row(k: int, s: float, c: float, r: list[float]) -> str:
+        at = _at(s / 20.0)
+        return f"{k + 1},{at:%Y/%m/%d %H:%M:%S},{at.microsecond // 1000},{c!r},{r[0]!r}"
+
+    return ["Number,Date&Time,ms,T_gyro,rate", "NO.,Time,ms,degC,deg/h", *_rows(t, row)]
+
+
+@text()
+def imar(t: Truth) -> list[str]:
+    def row(k: int, s: float, c: float, r: list[float]) -> str:
+        return f"{400_000 + s:.3f} {' '.join(f'{v / 3600:.12f}' for v in r)} 0.1 {c:.9f}"
+
+    return [
+        "% IMU data, decoded",
+        "%GPS-Time [s] omg_x[deg/s] omg_y[deg/s] omg_z[deg/s] acc_x [m/s2] Temp [degC]",
+        *_rows(t, row),
+    ]
+
+
 STRANGERS = [
     Case("Campbell Scientific TOA5", "toa5.dat", campbell),
     Case(
@@ -367,5 +399,15 @@ STRANGERS = [
     ),
     Case("Fluke, AM and PM", "fluke.csv", fluke, ("--time-format", "%m/%d/%Y %I:%M:%S.%f %p")),
     Case("Honeywell", "hg.csv", honeywell, axes=True),
+    Case("parts of the time in columns", "parts.csv", parts),
+    Case(
+        "decoded by a maker's tool, blanks in names",
+        "decoded.txt",
+        imar,
+        axes=True,
+        starts_at=400_000.0,
+        tolerance=1e-5,
+        temperature_tolerance=1e-8,
+    ),
     Case("Keithley DMM6500", "dmm.csv", keithley, ("--column", "time=Relative Time (s)")),
 ]

@@ -14,7 +14,7 @@ from gyrotc.dataset import load
 from gyrotc.importers.stamps import Stamps
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
-from logger_strangers import STRANGERS
+from logger_strangers import STRANGERS, milliseconds
 from logger_table import PAGE, cases, filled
 
 
@@ -106,3 +106,14 @@ def test_the_kept_map_reads_the_next_file(
     assert status == 0, error
     [one], [two] = (sorted((tmp_path / name).glob("*.parquet")) for name in "AB")
     assert one.read_bytes() == two.read_bytes()
+
+
+def test_milliseconds_beside_a_stamp_are_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    milliseconds(tmp_path / "gl.csv", truth())
+    command = ("import", tmp_path / "gl.csv", "--out", tmp_path / "R", "--trust-units")
+    status, told, error = run(capsys, monkeypatch, *command)
+    assert status == 0, error
+    assert "Date&Time + ms" in told
+    np.testing.assert_allclose(load(tmp_path / "R").runs[0].rows().time_s, truth().time_s / 20.0, atol=1e-9)

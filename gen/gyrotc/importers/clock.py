@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..dataset.units import Conversion, conversion
 from ..errors import InputError
+from .clockparts import form_of_parts, text_of
 from .forms import forms_of
 from .mapping import TimeMap
 from .stamps import Stamps
@@ -67,7 +68,7 @@ class Clock:
         self._stamps: Stamps | None = None
         self._last: float | None = None
         self._added = 0
-        if columns and columns[0].kind != "number" and columns[0].sample:
+        if columns and (columns[0].kind != "number" or len(columns) > 1) and columns[0].sample:
             self.form = stated.format or _form(file, columns)
             in_name = _ZONE.search(columns[0].name)
             self._stamps = Stamps(self.form, stated.zone or (in_name[1] if in_name else None))
@@ -99,7 +100,7 @@ class Clock:
     def needs_zone(self) -> bool:
         """Whether stamps with a date lack a zone."""
         dated = self._stamps is not None and self._stamps.dated
-        return bool(self._columns) and self._columns[0].kind == "stamp" and not self._known_zone and dated
+        return bool(self._columns) and not self._known_zone and dated
 
     def __call__(self, chunk: Chunk) -> Floats:
         """Times of the rows of a chunk, s; NaN where there is none.
@@ -122,8 +123,8 @@ class Clock:
         assert self._stamps is not None
         texts = chunk.columns[self._columns[0].name]
         if len(self._columns) > 1:
-            trimmed = [pc.utf8_trim(chunk.columns[c.name], ' "') for c in self._columns]
-            texts = pc.binary_join_element_wise(*trimmed, " ")
+            parts = [text_of(column, chunk.columns[column.name]) for column in self._columns]
+            texts = pc.binary_join_element_wise(*parts, " ")
         ns, good = self._stamps.parse(texts)
         held = np.asarray(
             pc.not_equal(pc.fill_null(texts, ""), "").to_numpy(zero_copy_only=False), dtype=bool
@@ -182,6 +183,15 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     Raises:
         InputError: There is none, or day and month could be either.
     """
+    if columns[0].kind == "number":
+        form = form_of_parts(columns)
+        if not form:
+            raise InputError(
+                file, f"parts of a time in {', '.join(c.name for c in columns)}", "--time-format"
+            )
+        return form
+    if columns[-1].kind == "number":
+        return f"{_form(file, columns[:-1])} %f"
     pairs = list(zip(*(c.sample for c in columns), strict=True))
     texts = [" ".join(part.strip() for part in pair) for pair in pairs if all(pair)]
     forms = forms_of(texts)

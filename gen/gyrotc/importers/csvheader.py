@@ -22,10 +22,23 @@ def in_comments(
     found = []
     for k, line in enumerate(lines[: data_line - 1], start=1):
         mark = next((m for m in comment if line.startswith(m)), None)
-        cells = cells_of(line[len(mark) :].strip(), delimiter) if mark else []
+        cells = _rejoined(cells_of(line[len(mark) :].strip(), delimiter), count) if mark else []
         if len(cells) == count and count > 1:
             found.append((k, cells))
     return found
+
+
+def _rejoined(cells: list[str], count: int) -> list[str]:
+    """Cells between blanks, each unit in brackets with the name before it, where there are more than columns."""
+    if len(cells) <= count:
+        return cells
+    joined: list[str] = []
+    for cell in cells:
+        if joined and re.fullmatch(r"[\[(].*[\])]", cell):
+            joined[-1] += f" {cell}"
+        else:
+            joined.append(cell)
+    return joined
 
 
 def header_of(
@@ -37,6 +50,8 @@ def header_of(
         for k, cells in above
         if _fits_header(cells, count, decimal) and not _UNITS_LABEL.fullmatch(cells[0])
     ]
+    rows += [(k, _rejoined(cells, count)) for k, cells in above if len(cells) > count]
+    rows = sorted((k, cells) for k, cells in rows if _fits_header(cells, count, decimal))
     if "header_line" in given:
         rows = [(k, cells) for k, cells in above if k == given["header_line"]]
         rows += [(k, cells) for k, cells in above if k == given.get("units_line", 0)]

@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ..dataset.units import NATIVE, UnitError, channel_unit, conversion
+from ..dataset.units import UnitError, channel_unit, conversion
 from ..errors import InputError
+from .clockparts import fraction_of, parts_of
+from .hints import in_text, increments, listed, name_it
 from .mapping import Map
 from .names import Meaning, meaning, split_unit, words
 from .plan import Choice, ImportPlan
 from .tables import Column, LoggerFile, LoggerTable
-from .unitchoice import OPTIONS, Ask, Units, asked, said
+from .unitchoice import Ask, Units, asked, said
 
 __all__ = ["propose"]
 
@@ -57,10 +59,7 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
         unit.of("temperature", temperature[1], temperature[0]),
         temperature[2],
     )
-    picked_time = tuple(
-        Choice("time", main, column, unit.of("time", column, main) if column.kind == "number" else None, why)
-        for column, why in time
-    )
+    picked_time = tuple(_times(time, main, unit))
     if missing:
         raise InputError(file.path.name, "; ".join(said(missing)), " ".join(dict.fromkeys(asked(missing))))
     taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
@@ -68,6 +67,13 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
     taken |= {c.column.name for c in channels}
     left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
     return ImportPlan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
+
+
+def _times(time: Sequence[tuple[Column, str]], main: LoggerTable, unit: Units) -> Iterator[Choice]:
+    """The columns of time; a counter, which is one of numbers alone, has a unit."""
+    for column, why in time:
+        counter = column.kind == "number" and len(time) == 1
+        yield Choice("time", main, column, unit.of("time", column, main) if counter else None, why)
 
 
 def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
@@ -110,10 +116,8 @@ def _values(
     best = max((one[2] for one in likely), default=0)
     top = [one for one in likely if one[2] == best]
     if not top:
-        unseen = f"no column that a rate is told from among {_listed(file)}"
-        raise InputError(
-            file.path.name, unseen, _increments(file) or _name_it("rate") + _in_text(file, "rate")
-        )
+        unseen = f"no column that a rate is told from among {listed(file)}"
+        raise InputError(file.path.name, unseen, increments(file) or name_it("rate") + in_text(file, "rate"))
     if len(top) > 1:
         names = ", ".join(repr(table.name) for table, _, _ in top)
         raise InputError(
@@ -186,8 +190,8 @@ def _temperature(
     if not top:
         raise InputError(
             file.path.name,
-            f"no column that a temperature is told from among {_listed(file)}",
-            _name_it("temperature") + _in_text(file, "temperature"),
+            f"no column that a temperature is told from among {listed(file)}",
+            name_it("temperature") + in_text(file, "temperature"),
         )
     if len(top) > 1:
         names = [f"{t.name}/{c.name}" if t.name else c.name for t, c in top]
@@ -214,7 +218,11 @@ def _time(
         return [(_find(file, name, main)[1], "named by the map") for name in chosen.columns.time], None, ""
     stamps = [c for c in main.columns if c.kind == "stamp"]
     if stamps:
-        return _stamps(file, stamps), None, ""
+        whole = _stamps(file, stamps)
+        fraction = fraction_of(main.columns, whole[-1][0])
+        return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
+    if parts := parts_of(main.columns):
+        return [(column, "parts of the time, by their names") for column in parts], None, ""
     found = [(c, meaning(c.name, c.unit, main.name)) for c in main.columns if c.kind == "number"]
     likely = [(m.score, c) for c, m in found if m.kind == "time"]
     best = max((score for score, _ in likely), default=0)
@@ -226,7 +234,7 @@ def _time(
     expected = (
         '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
     )
-    raise InputError(file.path.name, f"no column that a time is told from among {_listed(file)}", expected)
+    raise InputError(file.path.name, f"no column that a time is told from among {listed(file)}", expected)
 
 
 def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
@@ -282,39 +290,3 @@ def _channel_name(name: str, unit: str | None, native: str) -> str:
             return plain
         return f"{plain}_{endings[native]}"
     return plain
-
-
-def _increments(file: LoggerFile) -> str:
-    """What to do with a file of increments of angle; empty where there are none."""
-    for table in file.tables:
-        for column in table.columns:
-            name, unit, _ = split_unit(column.name)
-            if {"delta", "increment", "incr", "dtheta"} & set(words(name)):
-                angle = column.unit or unit or "rad"
-                return (
-                    f'the increments as rates: --column rate="{column.name}" --rate-unit "{angle} / (0.01 s)" with the '
-                    "row period in place of 0.01 s"
-                )
-    return ""
-
-
-def _listed(file: LoggerFile) -> str:
-    names = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
-
-
-def _in_text(file: LoggerFile, kind: str) -> str:
-    """A column that by its name is of that kind, and holds no numbers: what stands there."""
-    for table in file.tables:
-        for column in table.columns:
-            if column.kind == "text" and meaning(column.name, column.unit, table.name).kind == kind:
-                shown = next((cell for cell in reversed(column.sample) if cell), "")
-                return (
-                    f"; or, as {column.name} holds {shown[:40]!r}, --csv decimal=, (or .) and --csv thousands=. "
-                    "(or another mark), or --csv missing=WORD"
-                )
-    return ""
-
-
-def _name_it(kind: str) -> str:
-    return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
