@@ -18,6 +18,7 @@ _CODES = {
     "year": "%Y", "month": "%m", "day": "%d", "hour": "%H", "hours": "%H", "hr": "%H", "minute": "%M", "minutes": "%M",
     "min": "%M", "second": "%S", "seconds": "%S", "sec": "%S",
 }  # fmt: skip
+# Digits of that part of a second.
 _FRACTIONS = {
     "ms": 3,
     "msec": 3,
