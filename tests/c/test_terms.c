@@ -483,6 +483,7 @@ int main(void)
     RUN(narrow_gaussians_are_there_where_they_are);
     RUN(memories_and_plays_outlast_a_time_without_power);
     RUN(times_without_power_add_up);
+    RUN(a_forged_state_is_refused_before_anything_is_computed_of_it);
 #if TEST_Q31
     RUN(an_auxiliary_channel_has_the_mean_of_its_extremes);
     RUN(what_terms_add_saturates);

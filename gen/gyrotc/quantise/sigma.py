@@ -9,8 +9,8 @@ from ..model import Model, Rules, Uncertainty
 
 __all__ = ["sigma_cells", "sigma_values"]
 
-_S_PER_MIN = 60.0
-_S_PER_H = 3600.0
+_S_PER_MIN = 60.0  # a minute
+_S_PER_H = 3600.0  # an hour
 
 
 def sigma_cells(model: Model) -> tuple[int, int]:

@@ -18,10 +18,12 @@ Numbers = NDArray[Any]
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
 RULES = 11
 
-_PART = 2**30
-_LARGEST = 2**31 - 1
-_HALF_EXPONENT = np.uint32(0x1FBB4F2E)
-_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)
+_PART = 2**30  # fewer than 16 squares of it fit 64 bits
+_LARGEST = 2**31 - 1  # of a word
+_HALF_EXPONENT = np.uint32(
+    0x1FBB4F2E
+)  # half the exponent's bias, less what makes the first guess of a root even
+_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)  # in float32, so that nothing widens
 
 
 class Squares(Protocol):

@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
 _AT_REST_C_PER_MIN = 0.01  # a temperature at rest may go on like this: a tenth of what chambers hold
 _STEP = 0.05  # of a range, for gradients
-_BISECTIONS = 60
+_BISECTIONS = 60  # leave less than the last digit of a float64
 _MOST = 20000  # samples that are looked at
 
 

@@ -94,8 +94,7 @@ def extend(
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     extended = refitting.fit(shipped) if shipped else None
-    seen = joined([samples(run, shipped) for run in refitting.train])
-    bare = joined([samples(run, []) for run in refitting.train])
+    seen = _seen(refitting, shipped)
     return Extension(
         steps=tuple(steps),
         total=total,
@@ -105,7 +104,7 @@ def extend(
         shipped=tuple(shipped),
         crossed=crossed,
         samples=seen,
-        added=bare.bias_dph - seen.bias_dph,
+        added=_seen(refitting, []).bias_dph - seen.bias_dph,
         floor=floor,
         baseline_rms=_rms(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,
@@ -113,6 +112,11 @@ def extend(
         before=chain[0],
         after=chain[-1],
     )
+
+
+def _seen(refitting: Refitting, shipped: Sequence[Effect]) -> TrainingData:
+    """Training samples as the map sees them beside effects."""
+    return joined([samples(run, list(shipped)) for run in refitting.train])
 
 
 def _rms(runs: Sequence[Averages]) -> float:
