@@ -1,0 +1,201 @@
+"""Lasting steps of a rate: change points that neither temperature, nor its rate, nor a drift explains.
+
+At every place of a run a step is fitted in a window around it beside a constant, a drift, the temperature and its rate,
+for windows of several lengths. What such a fit makes of noise is read off the run itself, robustly, over all places,
+whatever the colour of its noise; a step is told where the fit is so far beyond it that chance makes one in a hundred
+records, over all places and lengths of all runs together (Bonferroni). See Basseville and Nikiforov, Detection of
+Abrupt Changes, 1993, 2.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+__all__ = ["Step", "steps_of"]
+
+Floats = NDArray[np.float64]
+
+FALSE_ALARMS = 0.01  # records of which one has a step by chance
+_HALVES_S = (120.0, 600.0, 3000.0)  # half windows: short ones place a large step, long ones find a small one
+_CELLS = 20  # of a half window
+_LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what noise makes
+_MAD_TO_SIGMA = 1.4826
+_PLACES = 3.0  # independent places in a window
+_KNOWN = 0.4  # degrees of freedom of a scale from a median, for each independent place: its efficiency
+_EDGE = 2  # cells on either side of a place that its time may lie in
+_CHI2_95 = 3.841
+_NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A step of the rate.
+
+    Attributes:
+        run: Number of its run.
+        time_s: First row behind it, and the times between which it lies, s (95 %).
+        size_dph: Size and its 95 % limits, deg/h.
+        sigmas: Size over what the fit makes of noise.
+    """
+
+    run: int
+    time_s: tuple[float, float, float]
+    size_dph: tuple[float, float, float]
+    sigmas: float
+
+
+def steps_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Step]:
+    """Steps of all runs, by run in order of time.
+
+    Args:
+        runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
+    """
+    tried = [_Windows.of(k, *rows, half) for half in _HALVES_S for k, rows in enumerate(runs)]
+    windows = [w for w in tried if w is not None]
+    places = sum(w.places for w in windows)
+    found: dict[int, list[tuple[Step, float]]] = {}
+    for half in _HALVES_S:
+        alike = [w for w in windows if w.half_s == half]
+        if not alike:
+            continue
+        noise = _noise(np.concatenate([w.z for w in alike]))
+        known = _KNOWN * sum(w.places for w in alike)
+        limit = -float(stdtrit(known, FALSE_ALARMS / 2.0 / places))
+        for w in alike:
+            found.setdefault(w.run, []).extend((step, half) for step in w.beyond(limit, noise))
+    return [step for run in sorted(found) for step in _largest(found[run])]
+
+
+def _noise(z: Floats) -> float:
+    return _MAD_TO_SIGMA * float(np.median(np.abs(z)))
+
+
+def _largest(steps: list[tuple[Step, float]]) -> list[Step]:
+    """Of steps found by several lengths at about one place, the clearest."""
+    kept: list[tuple[Step, float]] = []
+    for step, half in sorted(steps, key=lambda s: -s[0].sigmas):
+        if all(abs(step.time_s[0] - k.time_s[0]) > min(half, h) for k, h in kept):
+            kept.append((step, half))
+    return sorted((s for s, _ in kept), key=lambda s: s.time_s[0])
+
+
+@dataclass(frozen=True, slots=True)
+class _Windows:
+    """Fits of a step at every place of a run, in windows of one length.
+
+    Attributes:
+        run: Number of the run.
+        half_s: Half of a window, s.
+        rows: Time and rate of the run's rows.
+        t: Times of the cells, s; `cell_s`: their length; `width`: cells in half a window.
+        size, spread: Of the steps, and the error that white noise of size 1 makes of them, shape (n,).
+        z: Sizes over spreads, less their median.
+        places: How many of them are independent.
+    """
+
+    run: int
+    half_s: float
+    rows: tuple[Floats, Floats]
+    t: Floats
+    cell_s: float
+    width: int
+    size: Floats
+    spread: Floats
+    z: Floats
+    places: float
+
+    @staticmethod
+    def of(run: int, time: Floats, temperature: Floats, rate: Floats, half_s: float) -> _Windows | None:
+        """None where the run is too short to show what noise makes of such windows."""
+        if len(time) <= 4 * _CELLS:
+            return None
+        windows = float(time[-1] - time[0]) / (2.0 * half_s)
+        cell = max(float(np.median(np.diff(time))), half_s / _CELLS)
+        index = np.floor((time - time[0]) / cell + 1e-9).astype(np.int64)
+        first = np.flatnonzero(np.r_[True, np.diff(index) > 0])
+        count = np.diff(np.r_[first, len(time)])
+        t, x, y = (np.add.reduceat(v, first) / count for v in (time, temperature, rate))
+        width = max(round(half_s / cell), 4)
+        if min(windows, len(t) / (2 * width)) < _LEAST_WINDOWS:
+            return None
+        size, spread = _fitted(t, x, y, width)
+        z = size / spread - float(np.median(size / spread))
+        return _Windows(run, half_s, (time, rate), t, cell, width, size, spread, z, _PLACES * windows)
+
+    def beyond(self, limit: float, noise: float) -> Iterator[Step]:
+        """Steps of more than `limit` times what noise makes, of all such runs or of this one, the clearest first."""
+        scale = max(noise, _noise(self.z))
+        if scale == 0.0:
+            return
+        far = np.abs(self.z) / scale
+        open_ = far > limit
+        gaps = np.diff(self.t, append=self.t[-1] + self.cell_s) > 3.0 * self.cell_s
+        while open_.any():
+            k = int(np.argmax(np.where(open_, far, 0.0)))
+            open_[max(k - self.width, 0) : k + self.width + 1] = False
+            at = k + self.width  # the first cell behind the step
+            if not gaps[at - self.width : at + self.width].any():
+                yield self._placed(
+                    at, float(self.size[k]), _NORMAL_95 * scale * float(self.spread[k]), float(far[k])
+                )
+
+    def _placed(self, at: int, size: float, error: float, sigmas: float) -> Step:
+        """The step among the rows: where two levels leave least, and the times between which it lies."""
+        time, rate = self.rows
+        edge = float(self.t[at] - 0.5 * self.cell_s)
+        near = np.flatnonzero(np.abs(time - edge) <= (_EDGE + 8) * self.cell_s)
+        rows, n = rate[near], len(near)
+        inside = np.flatnonzero(np.abs(time[near] - edge) <= _EDGE * self.cell_s)
+        inside = inside[(inside > 0) & (inside < n)]
+        sizes = (size, size - error, size + error)
+        if len(inside) == 0:
+            return Step(self.run, (edge, edge - self.cell_s, edge + self.cell_s), sizes, sigmas)
+        total = np.concatenate([[0.0], np.cumsum(rows)])
+        left = np.array(
+            [rows @ rows - total[k] ** 2 / k - (total[n] - total[k]) ** 2 / (n - k) for k in inside]
+        )
+        best = int(np.argmin(left))
+        noise = max(float(left[best]) / max(n - 2, 1), 1e-300)
+        likely = inside[left <= left[best] + _CHI2_95 * noise]
+        between = float(time[near[max(likely[0] - 1, 0)]]), float(time[near[likely[-1]]])
+        return Step(self.run, (float(time[near[inside[best]]]), *between), sizes, sigmas)
+
+
+def _fitted(t: Floats, x: Floats, y: Floats, width: int) -> tuple[Floats, Floats]:
+    """Step at the middle of every window and the error that white noise of size 1 makes of it, shape (places,)."""
+    slope = np.gradient(x, t)
+    smooth = np.convolve(np.pad(slope, width // 4, mode="edge"), np.ones(2 * (width // 4) + 1), "valid")
+    windows = [sliding_window_view(v, 2 * width) for v in (t, x, smooth, y)]
+    tau, x_, r_, y_ = (w - w.mean(axis=1, keepdims=True) for w in windows)
+    scale = np.maximum(np.ptp(windows[0], axis=1, keepdims=True), 1e-12)
+    step = np.where(np.arange(2 * width) < width, -0.5, 0.5)
+    rest_step, rest_y = np.broadcast_to(step, tau.shape).copy(), y_.copy()
+    for column in _orthogonal([tau / scale, x_, r_, _centred(x_**2), _centred(x_ * r_), _centred(r_**2)]):
+        rest_step -= column * np.sum(column * rest_step, axis=1, keepdims=True)
+        rest_y -= column * np.sum(column * rest_y, axis=1, keepdims=True)
+    energy = np.maximum(np.sum(rest_step**2, axis=1), 1e-3 * 2 * width * 0.25)
+    return np.sum(rest_step * rest_y, axis=1) / energy, 1.0 / np.sqrt(energy)
+
+
+def _centred(columns: Floats) -> Floats:
+    return np.asarray(columns - columns.mean(axis=1, keepdims=True))
+
+
+def _orthogonal(columns: list[Floats]) -> list[Floats]:
+    """The columns of every window made orthonormal one after the other; those that hardly vary on their own drop out."""
+    done: list[Floats] = []
+    for column in columns:
+        size = np.linalg.norm(column, axis=1, keepdims=True)
+        rest = column.copy()
+        for known in done:
+            rest -= known * np.sum(known * rest, axis=1, keepdims=True)
+        left = np.linalg.norm(rest, axis=1, keepdims=True)
+        own = left > np.maximum(0.02 * size, 1e-12)
+        done.append(np.where(own, rest / np.where(own, left, 1.0), 0.0))
+    return done
