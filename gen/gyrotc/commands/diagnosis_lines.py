@@ -14,6 +14,10 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     axis = f" {result.axis}" if result.axis else ""
     yield f"{result.serial}{axis}: {result.verdict.replace('_', ' ')}. {result.text}"
     yield result.meaning
+    for event in result.events:
+        yield f"event: {event.text}"
+        if event.exclude and not result.events_accepted:
+            yield f"  {event.exclude}"
     yield from result.missing
     for d in result.discrepancies:
         if d.p_value < _RARE:

@@ -197,6 +197,9 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     average_s: AverageOption = 100.0,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
+    accept_events: Annotated[
+        bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
@@ -222,9 +225,13 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
         with progress() as say:
             if into is None:
-                found = run(recordings, model=known, options=options, progress=say)
+                found = run(
+                    recordings, model=known, options=options, progress=say, accept_events=accept_events
+                )
             else:
-                found = diagnose_into(into, recordings, model=known, options=options, progress=say)
+                found = diagnose_into(
+                    into, recordings, model=known, options=options, progress=say, accept_events=accept_events
+                )
         results[name or ""] = found.result
 
     if axis != "all" or out is None:

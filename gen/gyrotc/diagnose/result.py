@@ -22,6 +22,7 @@ from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
 from .extend.extension import Extension, extend
 from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
+from .screen.events import Event, accepted, events_of
 from .screen.gather import records_of
 from .summary import not_testable, result_of
 from .verdict import holds
@@ -58,6 +59,7 @@ def diagnose(
     model: Model | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
+    accept_events: bool = False,
 ) -> Diagnosis:
     """Runs the whole diagnosis on the training runs; exam runs measure the gain only.
 
@@ -66,14 +68,35 @@ def diagnose(
         model: A model made before: its method, block and number of centers are those of the refit.
         options: As for `fit`; default: those of `model`, else of `fit`.
         progress: Called with what is being done.
+        accept_events: Goes on without what the events that are found say to leave out.
 
     Raises:
         InputError: No training run, or nothing usable in them.
     """
     say = progress or (lambda _: None)
-    chosen = options or _options_of(model)
     say("reading")
-    dataset = replace(dataset, runs=joined_runs(dataset.runs))
+    whole = replace(dataset, runs=joined_runs(dataset.runs))
+    events = events_of(whole)
+    found = _diagnosed(
+        accepted(whole, events) if accept_events else whole, options or _options_of(model), say
+    )
+    told = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
+    steps = (*_about(events, accept_events), *found.result.next)
+    return replace(found, result=found.result.model_copy(update=told | {"next": steps}))
+
+
+def _about(events: Sequence[Event], accept: bool) -> list[str]:
+    """What to do about events before anything else."""
+    if accept or not any(event.leave_out for event in events):
+        return []
+    return [
+        "First look at the events: what is named may stand for them. Paste their exclude lines into dataset.toml, or "
+        "go on without them (gyrotc diagnose --accept-events)."
+    ]
+
+
+def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis:
+    """All stages behind the events."""
     records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
     if float(np.ptp(temperature)) < LEAST_SPAN_C:

@@ -188,7 +188,7 @@ def _centred(columns: Floats) -> Floats:
 
 
 def _orthogonal(columns: list[Floats]) -> list[Floats]:
-    """The columns of every window made orthonormal one after the other; those that hardly vary on their own drop out."""
+    """The columns of every window, orthonormal one after the other; those that hardly vary on their own drop out."""
     done: list[Floats] = []
     for column in columns:
         size = np.linalg.norm(column, axis=1, keepdims=True)

@@ -35,6 +35,7 @@ def diagnose_into(
     model: Model | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
+    accept_events: bool = False,
 ) -> Diagnosis:
     """Diagnoses a data set and fills `out`: `diagnose.json`, `report.html`, pictures, the extended model.
 
@@ -43,7 +44,9 @@ def diagnose_into(
     """
     with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
         stage.of(dataset.serial, dataset.axis)
-        found = diagnose(dataset, model=model, options=options, progress=progress)
+        found = diagnose(
+            dataset, model=model, options=options, progress=progress, accept_events=accept_events
+        )
         return save(stage.folder, found, progress)
 
 

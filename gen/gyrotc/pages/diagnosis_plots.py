@@ -24,6 +24,7 @@ from ..diagnose.discrepancy.ensemble import Discrepancy, Ensemble
 from ..diagnose.screen.blocks import Records, centred_slope
 from ..diagnose.signatures.candidates import diagnosed
 from ..metrics import Averages
+from ..results.diagnosed import FoundEvent
 from ..terms import CATALOGUE
 from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
@@ -38,6 +39,7 @@ _MOVING = 0.1  # C/min
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _WITHIN_95 = float(chdtri(1, 0.05))  # fall of 2 log likelihood of one parameter at 95 % (Wilks 1938)
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
+_MOST_PANELS = 6  # runs with events that are drawn
 
 
 def draw(found: Diagnosis) -> dict[str, str]:
@@ -54,14 +56,35 @@ def draw(found: Diagnosis) -> dict[str, str]:
         "statistics": _statistics(analysis.ensemble, analysis.extended),
         "inputs": _over_inputs(analysis.records, analysis.ensemble, term) if found.cycle is None else None,
         "considered": _considered(analysis.attribution, named=bool(causes)),
+        "events": _events(analysis.records, found.result.events),
     }
     for number, cause in enumerate(causes):
         made[f"likelihood-{number + 1}"] = _likelihood(cause)
-    if causes:
+    if extension.steps:
         made["before-and-after"] = _before_and_after(
             extension.before, extension.after, found.result.average_s
         )
     return {name: svg for name, svg in made.items() if svg is not None}
+
+
+def _events(records: Records, events: Sequence[FoundEvent]) -> str | None:
+    """The rate of every run with an event, as block means, and where the events lie."""
+    files = {event.file for event in events}
+    shown = [(run, k) for k, run in enumerate(records.runs) if run.name.partition("@")[0] in files][
+        :_MOST_PANELS
+    ]
+    if not shown:
+        return None
+    with mpl.rc_context(STYLE):
+        figure, axes = _grid(len(shown))
+        for ax, (run, number) in zip(axes, shown, strict=False):
+            hours = (records.kept[number] + 0.5) * records.block_s / 3600.0 + run.history.time_s[0] / 3600.0
+            ax.plot(hours, records.average_run(number, run.rate_dph), color=BEFORE, linewidth=0.9)
+            for event in (e for e in events if e.file == run.name.partition("@")[0]):
+                ax.axvline(event.time_s.value / 3600.0, color=AFTER, linewidth=1.2)
+            ax.set(title=picture_text(run.name), xlabel="h on the file's clock")
+        axes[0].set_ylabel("rate, deg/h")
+        return svg(figure)
 
 
 def _residual_over_time(records: Records, ensemble: Ensemble, term: Array | None) -> str:

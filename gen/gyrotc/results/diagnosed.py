@@ -17,7 +17,9 @@ __all__ = [
     "Diagnosed",
     "DiagnosisVerdict",
     "Estimate",
+    "EventSize",
     "ExtendedModel",
+    "FoundEvent",
     "GainOnUnseen",
     "NamedCause",
     "ShippingTrial",
@@ -191,6 +193,30 @@ class Unexplained(Part):
     looks_like: str | None = Field(description="in words")
 
 
+class EventSize(Part):
+    """How large an event is, with its 95 % interval."""
+
+    value: float = Field(description="the likeliest")
+    low: float = Field(description="lower end")
+    high: float = Field(description="upper end")
+    unit: str = Field(description="of these figures")
+
+
+class FoundEvent(Part):
+    """Something that happened to a recording at a time."""
+
+    id: str = Field(
+        description="`step`, `step_and_recover`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
+    )
+    file: str = Field(description="of its run")
+    time_s: Estimate = Field(description="on the file's clock, s")
+    size: EventSize = Field(description="how large it is")
+    text: str = Field(description="what it is, in words")
+    exclude: str | None = Field(
+        description="line of dataset.toml that leaves it out; null: nothing has to be left out"
+    )
+
+
 class Diagnosed(Result):
     """What the static map does not explain, and why (`gyrotc diagnose`)."""
 
@@ -217,6 +243,10 @@ class Diagnosed(Result):
     text: str = Field(description="the finding in words")
     meaning: str = Field(description="what the verdict means")
     next: tuple[str, ...] = Field(description="what to do, the most telling first")
+    events: tuple[FoundEvent, ...] = Field(
+        default=(), description="what happened to the recordings, by run and time"
+    )
+    events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")
     scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
 

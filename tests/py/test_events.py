@@ -1,0 +1,100 @@
+"""Events of recordings: steps with time and size, what they leave out, and no step in what has none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.dataset import load
+from gyrotc.diagnose.screen.events import Event, accepted, events_of
+from gyrotc.frontend.steps import steps_of
+from recordings import toml, write_csv
+
+SEED, ROW_S, HOURS = 20261122, 10.0, 8
+NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means
+Columns = dict[str, np.ndarray]
+
+
+def recording(rng: np.random.Generator, kind: int) -> Columns:
+    """Eight hours at a constant temperature, or with ramps, of a bias that follows temperature and its rate."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    corners = ([0, 8], [20, 20]) if kind % 3 == 0 else ([0, 1, 2, 4, 6, 8], [0, 0, 60, 60, -30, -30])
+    temperature = np.interp(time / 3600.0, *corners) + 0.01 * np.sin(time / 300.0)
+    rate = 2e-4 * temperature + 1e-6 * temperature**2 + 0.06 * np.gradient(temperature, time)
+    walk = np.cumsum(rng.standard_normal(time.size)) * NOISE_DPH * (0.002 if kind % 2 else 0.0)
+    noise = NOISE_DPH * rng.standard_normal(time.size)
+    return {"time_s": time, "temperature_c": temperature, "rate_dph": 0.01 + rate + walk + noise}
+
+
+def written(folder: Path, change: Columns | None = None) -> Path:
+    """Three runs; the second has the rates of `change` added."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    for k in range(3):
+        columns = recording(rng, k)
+        if k == 1 and change is not None:
+            columns["rate_dph"] = columns["rate_dph"] + change["rate_dph"]
+        write_csv(folder / f"{k}.csv", columns)
+    (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(3))), "utf-8")
+    return folder
+
+
+def only(folder: Path) -> Event:
+    (event,) = events_of(load(folder))
+    return event
+
+
+def test_recordings_without_steps_have_none() -> None:
+    """Forty sets of six runs, half of them with a random walk, at a false-alarm rate of one in a hundred."""
+    rng = np.random.default_rng(SEED)
+    alarms = 0
+    for _ in range(40):
+        runs = [recording(rng, k) for k in range(6)]
+        alarms += bool(steps_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
+    print(f"{alarms} of 40 sets with a step")
+    assert alarms <= 3, alarms
+
+
+def test_a_step_that_stays_has_its_run_time_and_size(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    size, at = 0.01, 5.0 * 3600.0
+    event = only(written(tmp_path, {"rate_dph": size * (time >= at)}))
+    assert (event.id, event.file) == ("step", "1.csv")
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 600.0
+    assert event.size[1] <= size <= event.size[2] and event.size[0] == pytest.approx(size, rel=0.3)
+    assert event.leave_out is not None and event.leave_out[1] > time[-1], "the shorter side"
+    assert (event.result().exclude or "").startswith("exclude = [{from_s = ")
+
+
+def test_a_step_that_comes_back_is_one_event_and_what_is_accepted_is_left_out(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    begin, end = 4.0 * 3600.0, 5.5 * 3600.0
+    folder = written(tmp_path, {"rate_dph": -0.012 * ((time >= begin) & (time < end))})
+    event = only(folder)
+    assert event.id == "step_and_recover" and event.leave_out is not None
+    assert event.leave_out[0] <= begin and event.leave_out[1] >= end
+    rest = accepted(load(folder), [event])
+    inside = rest.runs[1].in_span(time)
+    assert not inside[(time >= begin) & (time < end)].any() and inside.sum() > 0.75 * time.size
+    assert rest.runs[0].in_span(time).all() and rest.runs[2].in_span(time).all()
+    assert events_of(rest) == []
+
+
+def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
+    """An hour of rows of a second: bursts are told where a block has several rows."""
+    rng = np.random.default_rng(SEED)
+    time = np.arange(3600.0)
+    temperature = 20.0 + time / 600.0 + 0.01 * rng.standard_normal(time.size)
+    rate = 7e-3 * rng.standard_normal(time.size)
+    rate[900:915] += 3.0 * np.sin(time[900:915])
+    temperature[1500:1800] = temperature[1500]
+    kept = (time < 2400.0) | (time > 2700.0)
+    columns = {"time_s": time, "temperature_c": temperature, "rate_dph": rate}
+    write_csv(tmp_path / "a.csv", {name: values[kept] for name, values in columns.items()})
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    found = {e.id: e for e in events_of(load(tmp_path))}
+    assert {"burst", "dropout", "thermometer_lost"} <= set(found) and "step" not in found
+    assert found["burst"].time_s[0] == pytest.approx(900.0, abs=5.0) and found["burst"].leave_out is not None
+    assert found["dropout"].size[0] == pytest.approx(301.0, abs=2.0)
+    assert found["thermometer_lost"].leave_out == pytest.approx((1500.0, 1800.0), abs=2.0)
