@@ -146,7 +146,7 @@ static void FN(restart)(STATE *state, NUM x, int is_first)
     state->filled = 0U;
     state->window_valid = 0U;
     state->doubt.start = x;
-    if (!is_first) {
+    if (is_first == 0) {
         FN(forget_terms)(state);
     }
     FN(doubt_begin)(state, FN(seen)(table, x));
@@ -215,7 +215,9 @@ static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
 /* A time and another, microseconds, as far as can be counted. */
 static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
 {
-    return ((MAX_US - a) > b) ? (a + b) : MAX_US;
+    const uint_least32_t sum = (a + b) & MAX_US;
+
+    return (sum >= a) ? sum : MAX_US;
 }
 
 static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
@@ -227,6 +229,12 @@ static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
 static int FN(is_lost)(const INPUT *in, const gtc_word_t *guard)
 {
     return (in->held_blocks > guard[GUARD_MISSING].bits) ? 1 : 0;
+}
+
+/* Nothing of a channel was ever believed, or not since it was lost. */
+static int FN(is_new)(const INPUT *in)
+{
+    return (in->gap_us == 0U) ? 1 : 0;
 }
 
 /* `us` microseconds passed in which nothing was believed. */
@@ -330,7 +338,7 @@ static int FN(take_temperature)(STATE *state, NUM x)
 {
     INPUT *const in = &state->input[0];
     const gtc_word_t *const guard = state->table->guards;
-    const int is_first = (in->gap_us == 0U) ? 1 : 0;
+    const int is_first = FN(is_new)(in);
     int verdict = IS_HELD;
 
     if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
@@ -353,7 +361,7 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
     NUM x = reading;
     int verdict;
 
-    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us)) {
+    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
         FN(refuse)(in, state->period_us);
         return;
     }
@@ -372,22 +380,27 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
 
 /* ---- blocks -------------------------------------------------------------------------------------- */
 
+static int FN(is_enough)(const STATE *state, const INPUT *in)
+{
+    return ((2U * in->valid) >= state->samples_per_block) ? 1 : 0;
+}
+
 /* The running block of a channel ends. Returns 1 if it has enough readings; then the mean is theirs. When it is
  * lost its last reading is forgotten, so that it must agree with itself before it is believed again. */
 static int FN(end_block)(const STATE *state, INPUT *in, const gtc_word_t *guard)
 {
-    const int is_valid = ((2U * in->valid) >= state->samples_per_block) ? 1 : 0;
+    const int is_valid = FN(is_enough)(state, in);
 
-    if (is_valid) {
+    if (is_valid != 0) {
         in->mean = FN(mean)(in->base, in->sum, in->valid);
         in->held_blocks = 0U;
-        in->clamped = ((in->clamped & CLAMPED_NOW) != 0U) ? CLAMPED_MEAN : 0U;
+        in->clamped = (in->clamped & CLAMPED_NOW) * CLAMPED_MEAN;
     } else {
         in->clamped &= CLAMPED_MEAN;
         if (!FN(is_lost)(in, guard)) {
             in->held_blocks++;
         }
-        if (FN(is_lost)(in, guard)) {
+        if (FN(is_lost)(in, guard) != 0) {
             in->gap_us = 0U;
         }
     }
@@ -413,7 +426,7 @@ static void FN(close_channels)(STATE *state)
 /* A block with too few valid samples: the last correction stays, but not for ever. */
 static void FN(bridge)(STATE *state)
 {
-    if (FN(is_lost)(&state->input[0], state->table->guards)) {
+    if (FN(is_lost)(&state->input[0], state->table->guards) != 0) {
         FN(forget_terms)(state);
         FN(put)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
     } else if (state->input[0].gap_us != 0U) {
@@ -437,7 +450,7 @@ static void FN(close)(STATE *state)
 {
     FN(pass)(state, 1U);
     FN(close_channels)(state);
-    if (FN(end_block)(state, &state->input[0], state->table->guards)) {
+    if (FN(end_block)(state, &state->input[0], state->table->guards) != 0) {
         NUM temp;
         NUM slope;
         int_least32_t remarks;
@@ -487,7 +500,7 @@ static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t 
 }
 
 /* A channel that has not seen a reading yet. */
-static void FN(clear_input)(volatile INPUT *in, NUM mean)
+static void FN(clear_input)(volatile INPUT *in)
 {
     in->gap_us = 0U;
     in->agreed_us = 0U;
@@ -500,7 +513,7 @@ static void FN(clear_input)(volatile INPUT *in, NUM mean)
     in->candidate = NUM_ZERO;
     in->base = NUM_ZERO;
     in->sum = NUM_ZERO;
-    in->mean = mean;
+    in->mean = NUM_ZERO;
 }
 
 /* A front end that has not seen a sample yet. */
@@ -523,9 +536,10 @@ static void FN(clear)(STATE *state)
         window[i] = NUM_ZERO;
     }
     for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
-        const int is_channel = ((i >= 1U) && (i < state->table->n_channels)) ? 1 : 0;
-
-        FN(clear_input)(&state->input[i], is_channel ? ELEMENT(FN(guard)(state, i)[GUARD_FALLBACK]) : NUM_ZERO);
+        FN(clear_input)(&state->input[i]);
+        if ((i >= 1U) && (i < state->table->n_channels)) {
+            state->input[i].mean = ELEMENT(FN(guard)(state, i)[GUARD_FALLBACK]);
+        }
     }
 }
 
@@ -624,7 +638,7 @@ static int FN(run_missed)(STATE *state, uint_least32_t count)
         if (state->position >= state->samples_per_block) {
             FN(close)(state);
         }
-        if (FN(all_lost)(state)) {
+        if (FN(all_lost)(state) != 0) {
             rest = FN(skip)(state, rest);
         }
         step = state->samples_per_block - state->position;
@@ -642,7 +656,7 @@ static uint_least32_t FN(slots)(const STATE *state, uint_least32_t later_us)
     const uint_least32_t rest = later_us % state->period_us;
     const uint_least32_t n = later_us / state->period_us;
 
-    return (rest >= (state->period_us - rest)) ? (n + 1U) : n;
+    return n + ((rest >= (state->period_us - rest)) ? 1U : 0U);
 }
 
 /* Times are put on a grid of sample periods, from the first one on, so that no error of them adds up. */

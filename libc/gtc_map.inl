@@ -83,6 +83,17 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
     return ((rest & 1U) != 0U) ? 1 : 0;
 }
 
+/* The network, or what several make together. */
+GTC_IN_LOOP NUM FN(result)(const TABLE *table, const POINT *in)
+{
+#if GTC_WITH_BANK
+    if (table->n_networks > 1U) {
+        return FN(blend)(table, in);
+    }
+#endif
+    return FN(network)(table, table->networks, table->centers, in);
+}
+
 /* Inlined, so that the public function costs no call of its own. */
 GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
 {
@@ -100,14 +111,7 @@ GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     if (!FN(is_covered)(table, &in)) {
         status |= GTC_UNCOVERED;
     }
-#if GTC_WITH_BANK
-    if (table->n_networks > 1U) {
-        found = FN(blend)(table, &in);
-    } else
-#endif
-    {
-        found = FN(network)(table, table->networks, table->centers, &in);
-    }
+    found = FN(result)(table, &in);
     status |= FN(govern)(table, &found);
     *bias = (NUM)found;
     return status;

@@ -129,8 +129,9 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
 /* The mean of the running block lies in the range. */
 static int FN(sum_fits)(const INPUT *in, int_least32_t low, int_least32_t high)
 {
-    const int_least64_t least = ((int_least64_t)low - in->base) * in->valid;
-    const int_least64_t most = ((int_least64_t)high - in->base) * in->valid;
+    const int_least64_t n = (int_least64_t)in->valid;
+    const int_least64_t least = ((int_least64_t)low - (int_least64_t)in->base) * n;
+    const int_least64_t most = ((int_least64_t)high - (int_least64_t)in->base) * n;
 
     return ((in->valid == 0U) || ((in->sum >= least) && (in->sum <= most))) ? 1 : 0;
 }

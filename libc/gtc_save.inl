@@ -180,21 +180,25 @@ static int FN(is_within)(NUM x, NUM low, NUM high)
     return ((x >= low) && (x <= high)) ? 1 : 0;
 }
 
+static int FN(counts_fit)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
+{
+    return ((state->position <= state->samples_per_block) && (in->valid <= state->position)
+            && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
+            && (in->held_blocks <= (guard[GUARD_MISSING].bits + 1U))) ? 1 : 0;
+}
+
 /* Numbers of a channel within its range (0 before the first reading), counts within the block: what no call would
  * have left is refused. */
 static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
 {
     const NUM low = FN(lesser_of)(ELEMENT(guard[0]), NUM_ZERO);
     const NUM high = -FN(lesser_of)(-ELEMENT(guard[1]), NUM_ZERO);
-    const int counts = ((state->position <= state->samples_per_block) && (in->valid <= state->position)
-                        && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
-                        && (in->held_blocks <= (guard[GUARD_MISSING].bits + 1U))) ? 1 : 0;
+    int numbers = FN(counts_fit)(state, in, guard);
 
-    const int numbers = FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
-                        & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high);
-
+    numbers &= FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
+               & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high);
     /* The sum last: its bounds are products of what was tested before. */
-    return ((counts & numbers) != 0) ? FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1])) : 0;
+    return (numbers != 0) ? FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1])) : 0;
 }
 
 /* A temperature of the window, or of a term, which an envelope may have moved. */
@@ -242,10 +246,12 @@ static int FN(doubt_is_sound)(const STATE *state)
 /* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
 static int FN(is_sound)(const STATE *state)
 {
-    int sound = ((state->position <= state->samples_per_block) && (state->filled <= state->table->slope_blocks)
-                 && (state->elapsed <= MAX_ELAPSED)
-                 && ((state->status >= 0) && (state->status < (2 * GTC_CHANNEL_LOST)))) ? 1 : 0;
+    int sound = 1;
     uint_least32_t i;
+
+    sound &= ((state->position <= state->samples_per_block) && (state->filled <= state->table->slope_blocks)
+              && (state->elapsed <= MAX_ELAPSED) && (state->status >= 0)
+              && (state->status < (2 * GTC_CHANNEL_LOST))) ? 1 : 0;
 
     for (i = 0U; i < state->table->n_channels; i++) {
         sound &= FN(input_fits)(state, &state->input[i], FN(guard)(state, i));
@@ -297,7 +303,7 @@ static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t peri
     }
     if (status == GTC_OK) {
         FN(take_over)(&read, table, period_us, words, off_blocks);
-        if (FN(is_sound)(&read)) {
+        if (FN(is_sound)(&read) != 0) {
             FN(take_over)(state, table, period_us, words, off_blocks);
         } else {
             status = GTC_E_IMAGE;

@@ -502,6 +502,8 @@ TEST(a_table_that_this_build_cannot_use_is_refused)
     REFUSED(table.serial = NULL);
     REFUSED(table.guards = NULL);
     REFUSED(table.n_sigma = 0U);
+    REFUSED(table.sigma_cells[0] = 0U);
+    REFUSED(table.n_sigma = 0U; table.sigma_cells[0] = 0U; table.sigma_cells[1] = 0U);
     REFUSED(table.n_networks = 0U);
     REFUSED(table.n_networks = 17U);
     REFUSED(table.networks = NULL);

@@ -197,6 +197,73 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
     CHECK_INT(GTC_E_LAYOUT, restored(&state, words, 0U));
 }
 
+/* Words of a saved state: docs/numerics.md, section 7. */
+#define STATUS 3
+#define POSITION 5
+#define FILLED 6
+#define ELAPSED 8
+#define BIAS 10
+#define WINDOW_AT 11
+#define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
+#define TERM_AT (INPUT_AT + (13 * (GTC_MAX_TERMS + 1)))
+
+/* CRC of a saved state, bit by bit: over all words before it. */
+static void resealed(gtc_word_t words[WORDS])
+{
+    uint_least32_t crc = 0xFFFFFFFFUL;
+    int i;
+
+    for (i = 0; i < ((WORDS - 1) * 32); i++) {
+        const uint_least32_t bit = (words[i / 32].bits >> (i % 32)) & 1U;
+
+        crc = (((crc ^ bit) & 1U) != 0U) ? ((crc >> 1) ^ 0xEDB88320UL) : (crc >> 1);
+    }
+    words[WORDS - 1].bits = crc ^ 0xFFFFFFFFUL;
+}
+
+/* Whoever wrote it: a CRC says nothing of that. */
+TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
+{
+    static const int at[19] = {
+        STATUS, STATUS, POSITION, FILLED, ELAPSED, BIAS, WINDOW_AT + 3, INPUT_AT + 4, INPUT_AT + 5, INPUT_AT + 6,
+        INPUT_AT + 7, INPUT_AT + 8, INPUT_AT + 9, INPUT_AT + 10, INPUT_AT + 10, INPUT_AT + 7, TERM_AT, TERM_AT + 1,
+        TERM_AT + 1,
+    };
+    static const uint_least32_t to[19] = {
+        0xFFFFFFFFUL, 64UL, 5UL, 5UL, 0x1000000UL, MISSING_BITS, 0x70000000UL, 5UL, 4UL, 4UL,
+        0x70000000UL, 0x70000000UL, 0x70000000UL, 0x70000000UL, 0xF0000000UL, MISSING_BITS, 0x70000000UL, 0xF0000000UL,
+        70000UL,
+    };
+    gtc_word_t words[WORDS];
+    gtc_word_t forged[WORDS];
+    state_t state = started();
+    int k;
+
+    walk(&state, 0, 30);
+    saved(&state, words);
+    for (k = 0; k < 19; k++) {
+        memcpy(forged, words, sizeof forged);
+        if (at[k] == (TERM_AT + 1)) {
+            forged[TERM_AT].bits = 0U;
+        }
+        forged[at[k]].bits = to[k];
+        resealed(forged);
+        CHECK_INT(GTC_E_IMAGE, restored(&state, forged, 0U));
+    }
+    /* A sum that is not one of so many readings, above and below. */
+    for (k = 0; k < 2; k++) {
+        memcpy(forged, words, sizeof forged);
+        forged[POSITION].bits = 1U;
+        forged[INPUT_AT + 4].bits = 1U;
+        forged[INPUT_AT + 11].bits = (k == 0) ? 0x70000000UL : (TEST_Q31 ? 0x80000000UL : 0xF0000000UL);
+        forged[INPUT_AT + 12].bits = (TEST_Q31 && (k == 1)) ? 0xFFFFFFFFUL : 0U;
+        resealed(forged);
+        CHECK_INT(GTC_E_IMAGE, restored(&state, forged, 0U));
+    }
+    resealed(words);
+    CHECK_INT(GTC_OK, restored(&state, words, 0U));
+}
+
 TEST(bad_arguments_are_refused)
 {
     gtc_word_t words[WORDS];
@@ -228,6 +295,7 @@ int main(void)
     RUN(a_state_of_another_table_is_refused);
     RUN(erased_memory_is_refused);
     RUN(a_state_of_the_other_arithmetic_is_refused);
+    RUN(numbers_that_no_call_leaves_are_refused_with_a_right_crc);
     RUN(bad_arguments_are_refused);
     return test_end();
 }

@@ -383,6 +383,11 @@ TEST(effects_are_bounded_and_that_is_said)
     CHECK_INT(GTC_WARMING, status_of(&b));
     CHECK(same(map_with(&TERMS, C(15.0)), bias_of(&a)));
     CHECK(!same(bias_of(&a), bias_of(&b)));
+    /* Below, too: a supply of 9 V takes off more than the warm-up adds. */
+    a = started_with(&table);
+    (void)samples(&a, C(15.0), C(9.0), 400);
+    CHECK((status_of(&a) & GTC_CLAMPED) != 0);
+    CHECK(same(map_with(&TERMS, C(15.0)), bias_of(&a)));
 }
 
 #if TEST_Q31
@@ -416,6 +421,10 @@ TEST(an_auxiliary_channel_has_the_mean_of_its_extremes)
     (void)samples(&state, C(15.0), 0x40000000, (int)N - 1);
     (void)sample(&state, C(15.0), 0);
     CHECK_INT(0x20000000, state.input[1].mean);
+    /* After so long any change is believed. */
+    (void)samples(&state, C(15.0), MISSING, 8);
+    (void)sample(&state, C(15.0), 0x7FFFFFFF);
+    CHECK_INT(0x7FFFFFFF, state.input[1].last);
 }
 
 TEST(what_terms_add_saturates)
@@ -424,7 +433,6 @@ TEST(what_terms_add_saturates)
     table_t table = open_channel(guards);
     gtc_word_t terms[4 * GTC_TERM_WORDS];
     state_t state;
-    int k;
 
     memcpy(terms, TERMS.terms, sizeof terms);
     terms[(3 * GTC_TERM_WORDS) + 2].integer = 0x3FFFFFFF; /* slope of the auxiliary term */
@@ -436,13 +444,66 @@ TEST(what_terms_add_saturates)
     state = started_with(&table);
     (void)sample(&state, C(15.0), C(-30000.0));
     CHECK_INT(-0x7FFFFFFF, bias_of(&state));
-    /* And so does a slope that a memory makes. */
+}
+#endif
+
+TEST(a_reading_of_a_channel_that_sticks_or_jumps_is_held)
+{
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    table_t table = agreeing(guards, 0U);
+    state_t a;
+
+    guards[GTC_GUARD_WORDS + 4U].bits = 2U * PERIOD;
+    guards[GTC_GUARD_WORDS + 5U].bits = 16U * PERIOD;
+    a = started_with(&table);
+    (void)samples(&a, C(15.0), C(12.0), 9);
+    (void)samples(&a, C(15.0), C(14.5), 2);
+    CHECK(same(C(12.0), a.input[1].last));
+    (void)sample(&a, C(15.0), C(-5.0));
+    CHECK(same(C(12.0), a.input[1].last));
+    (void)samples(&a, C(15.0), C(12.5), 40);
+    CHECK_INT(GTC_HELD, status_of(&a) & GTC_HELD);
+    table.guards = guards;
+    guards[GTC_GUARD_WORDS + 7U] = guards[GTC_GUARD_WORDS + 1U];
+#if TEST_Q31
+    guards[GTC_GUARD_WORDS + 7U].integer++;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+    guards[GTC_GUARD_WORDS + 7U].integer = guards[GTC_GUARD_WORDS].integer - 1;
+#else
+    guards[GTC_GUARD_WORDS + 7U].value += 1.0F;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+    guards[GTC_GUARD_WORDS + 7U].value = guards[GTC_GUARD_WORDS].value - 1.0F;
+#endif
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+}
+
+#if TEST_Q31
+/* A memory that stays where it was, at -90 C, and a temperature of 200 C, and the other way. */
+TEST(a_slope_that_a_memory_makes_saturates)
+{
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    gtc_word_t terms[4 * GTC_TERM_WORDS];
+    gtc_word_t words[GTC_SAVE_WORDS];
+    table_t table = open_channel(guards);
+    int k;
+
+    memcpy(terms, TERMS.terms, sizeof terms);
+    terms[2].integer = 0;
     terms[2 + 2].integer = 0x7FFFFFFF;
-    state = started_with(&table);
-    for (k = 0; k < 9; k++) {
-        (void)sample(&state, C(15.0) + (k * C(0.5)), C(12.0));
+    table.terms = terms;
+    table.scale[0] = 0;
+    table.envelope[0] = C(-90.0);
+    table.envelope[1] = C(200.0);
+    guards[2].integer = 0x7FFFFFFF;
+    guards[3].integer = 0x7FFFFFFF;
+    for (k = 0; k < 2; k++) {
+        state_t state = started_with(&table);
+
+        (void)sample(&state, (k == 0) ? C(-90.0) : C(200.0), C(12.0));
+        CHECK_INT(GTC_OK, FN(save)(&state, words));
+        CHECK_INT(GTC_OK, FN(restore)(&state, &table, PERIOD, words, 1U));
+        CHECK((sample(&state, (k == 0) ? C(200.0) : C(-90.0), C(12.0)) & GTC_CLAMPED) != 0);
     }
-    CHECK((status_of(&state) & GTC_CLAMPED) != 0);
 }
 #endif
 
@@ -477,6 +538,7 @@ int main(void)
     RUN(terms_begin_again_with_the_map);
     RUN(three_samples_of_150_degrees_are_nothing_and_an_hour_of_them_is_the_edge);
     RUN(effects_are_bounded_and_that_is_said);
+    RUN(a_reading_of_a_channel_that_sticks_or_jumps_is_held);
     RUN(a_play_moves_only_when_the_temperature_has_gone_its_way);
     RUN(holds_and_fallback_step_the_terms_too);
     RUN(a_harmonic_repeats_itself_after_its_period);
@@ -487,6 +549,7 @@ int main(void)
 #if TEST_Q31
     RUN(an_auxiliary_channel_has_the_mean_of_its_extremes);
     RUN(what_terms_add_saturates);
+    RUN(a_slope_that_a_memory_makes_saturates);
 #endif
     RUN(terms_without_their_code_or_channel_are_refused);
     return test_end();
