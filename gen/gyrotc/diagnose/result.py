@@ -15,11 +15,13 @@ from ..results.diagnosed import Diagnosed
 from ..results.training import Training
 from ..terms import CATALOGUE
 from ..train.data import TrainingData
-from ..train.fitting import FitOptions, front_end, map_method, model_of, training_of
+from ..train.fitting import HOLD_S, FitOptions, front_end, map_method, model_of, training_of
+from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.rules import start_sigma
 from ..train.spans import training_spans
 from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
 from .extend.extension import Extension, extend
+from .extend.refit import added_range, play_runs
 from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
 from .screen.events import Event, accepted, events_of
@@ -136,6 +138,8 @@ def _extended_model(
         return None, None
     runs = [r for r in dataset.runs if r.role == "train"]
     front = front_end(runs, options.block_s)
+    longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
+    front = replace(front, stuck_s=stuck_after_s(longest_s))
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
     entries = []
     for effect in extension.shipped:
@@ -152,7 +156,10 @@ def _extended_model(
     left_out = extension.after if extension.measured_on == "left out" else None
     spans = training_spans(runs, extension.samples)
     training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
-    return Model.from_dict(_with_terms(plain, entries, extension.samples, runs)), training
+    recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
+    guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
+    seen = {"guards": guards, "effects_dph": added_range(play_runs(dataset, runs, front), extension.shipped)}
+    return Model.from_dict({**_with_terms(plain, entries, extension.samples, runs), **seen}), training
 
 
 def _with_terms(

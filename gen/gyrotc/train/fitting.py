@@ -35,12 +35,14 @@ from . import (
     uncertainty,
 )
 from .data import joined
+from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .noisefloor import noise_terms, sensitivities, stretches
 from .outliers import outliers_of, stretches_left_out
 from .rules import rezero_dph
 from .spans import Span, training_spans
 
 __all__ = [
+    "HOLD_S",
     "FitOptions",
     "Fitted",
     "fit_dataset",
@@ -55,8 +57,7 @@ __all__ = [
 
 Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0  # as long as the paper's means
-_HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
-_AGREE_S = 1.0  # longer than any burst of wrong conversions; an alignment does not feel it
+HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
 _MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse thermometer
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
@@ -98,7 +99,7 @@ class FrontEnd:
     hold_blocks: int
     stuck_s: float = 0.0
     lead_blocks: int = 1
-    agree_s: float = _AGREE_S
+    agree_s: float = AGREE_S
 
     def blocks(self, run: Run) -> Blocks:
         return run_blocks(
@@ -124,7 +125,7 @@ def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
         slope_blocks=int(np.clip(round(_SLOPE_WINDOW_S / rounded), 2, 20)),
         max_step_c=_MAX_STEP_C,
         max_rate_c_per_min=_MAX_RATE_C_PER_MIN,
-        hold_blocks=max(1, round(_HOLD_S / rounded)),
+        hold_blocks=max(1, round(HOLD_S / rounded)),
     )
 
 
@@ -164,9 +165,11 @@ def fit_dataset(
     stretches = joined_runs(runs)
     parts = []
     left_out_rows: list[LeftOutRows] = []
+    longest_s = 0.0
     for k, run in enumerate(stretches):
         say(f"reading {run.file}")
         blocks = front.blocks(run)
+        longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
         left_out_rows += stretches_left_out(run, blocks.left_out_s)
     data = joined(parts)
@@ -180,6 +183,7 @@ def fit_dataset(
     fitted = _fit(data, options, power_on=power_ons(stretches))
     spans = training_spans(stretches, data)
     left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
+    front = replace(front, stuck_s=stuck_after_s(longest_s))
     model = model_of(dataset, runs, data, fitted, front, options)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
     return Fitted(model, training.model_copy(update={"outliers": outliers_of(left_out_rows, data)}))

@@ -21,7 +21,7 @@ from ...train.fitting import FrontEnd, samples_of
 from ...train.simple import without_rate
 from ..attribute.refine import Refined
 
-__all__ = ["Effect", "Played", "fit_extended", "play_runs", "samples", "scored_means"]
+__all__ = ["Effect", "Played", "added_range", "fit_extended", "play_runs", "samples", "scored_means"]
 
 Array = NDArray[np.float64]
 
@@ -158,6 +158,19 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
         elif term.kind == "add":
             added = added + _simulated(run, effect)
     return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
+
+
+def added_range(runs: Sequence[Played], effects: Sequence[Effect]) -> list[float]:
+    """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h."""
+    held = [effect for effect in effects if effect.term.table is not None]
+    low, high = 0.0, 0.0
+    for run in runs:
+        if run.in_force.size:
+            added = sum(
+                (run.outcome(effect).added[run.in_force] for effect in held), np.zeros(run.in_force.size)
+            )
+            low, high = min(low, float(added.min())), max(high, float(added.max()))
+    return [low, high]
 
 
 def _simulated(run: Played, effect: Effect) -> Array:
