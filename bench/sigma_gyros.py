@@ -101,7 +101,7 @@ def _model(folder: Path, terms: Sequence[Term]) -> Model:
 
 def _beside(terms: Sequence[Term], blocks: Any, part: TrainingData, block_s: float) -> TrainingData:
     """The samples as the map sees them beside the terms."""
-    steps, n = blocks.steps, blocks.samples_per_block
+    steps, n = blocks.steps, blocks.settings.samples_per_block
     slope, none = steps.slope.astype(np.float64), np.zeros(steps.slope.size)
     seen = TermOutcome(steps.temperature.astype(np.float64), slope, none, steps.remarks)
     for term in terms:

@@ -94,7 +94,6 @@ def extend(
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     extended = refitting.fit(shipped) if shipped else None
-    seen = _seen(refitting, shipped)
     return Extension(
         steps=tuple(steps),
         total=total,
@@ -103,8 +102,8 @@ def extend(
         extended=extended,
         shipped=tuple(shipped),
         crossed=crossed,
-        samples=seen,
-        added=_seen(refitting, []).bias_dph - seen.bias_dph,
+        samples=_seen(refitting, shipped),
+        added=_seen(refitting, []).bias_dph - _seen(refitting, shipped).bias_dph,
         floor=floor,
         baseline_rms=_rms(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,
