@@ -231,16 +231,21 @@ static int FN(terms_are_sound)(const STATE *state)
     return sound;
 }
 
-/* What the uncertainty goes by: numbers, temperatures, and a shift that the table grants. */
-static int FN(doubt_is_sound)(const STATE *state)
+/* A re-zeroed constant: a number, and a shift that the table grants. */
+static int FN(shift_is_sound)(const STATE *state)
 {
     const NUM most = MEMBER(state->table->rezero);
 
+    return ((!FN(is_missing)(state->constant)) && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
+}
+
+/* What the uncertainty goes by: numbers and temperatures. */
+static int FN(doubt_is_sound)(const STATE *state)
+{
     return ((!FN(is_missing)(state->doubt.at[0])) && (!FN(is_missing)(state->doubt.at[1]))
             && (!FN(is_missing)(state->doubt.drift)) && (!FN(is_missing)(state->doubt.plain))
             && FN(is_temperature)(state->doubt.start) && FN(is_temperature)(state->doubt.low)
-            && FN(is_temperature)(state->doubt.high) && (!FN(is_missing)(state->constant))
-            && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
+            && FN(is_temperature)(state->doubt.high)) ? 1 : 0;
 }
 
 /* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
@@ -259,7 +264,8 @@ static int FN(is_sound)(const STATE *state)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         sound &= FN(is_temperature)(state->window[i]);
     }
-    return sound & FN(terms_are_sound)(state) & FN(doubt_is_sound)(state) & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
+    return sound & FN(terms_are_sound)(state) & FN(doubt_is_sound)(state) & FN(shift_is_sound)(state)
+           & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
 }
 
 /* Of a state that was read, what outlasts a time without power: terms. If it had not begun when it was saved,

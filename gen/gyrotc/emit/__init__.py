@@ -9,6 +9,7 @@ from .files import (
     emitted_tables,
     example_period_us,
     quantise_all,
+    samples_until_believed,
     write_texts,
 )
 
@@ -21,5 +22,6 @@ __all__ = [
     "emitted_tables",
     "example_period_us",
     "quantise_all",
+    "samples_until_believed",
     "write_texts",
 ]

@@ -23,6 +23,7 @@ from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
 from ..quantise.authority import MARGIN
+from ..quantise.guards import guard_of
 from ..quantise.terms import channel_names
 from ..reference import answers
 from ..reference.runtime import runtime_folders
@@ -42,6 +43,7 @@ __all__ = [
     "emitted_tables",
     "example_period_us",
     "quantise_all",
+    "samples_until_believed",
     "write_texts",
 ]
 
@@ -271,12 +273,21 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
 
 
 def _example_values(model: Model) -> dict[str, Any]:
+    """What the example reads: the middle of the envelope, and of each further channel what is used when it is lost."""
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
+    readings = [middle, *(guard_of(model, name).fallback for name in channel_names(model))]
     return {
-        "first_temperature": middle,
-        "first_temperature_q16": round(middle * 65536),
+        "readings": [c_code(f"{middle:.1f}F"), *(c_code(f"{value:#.7g}F") for value in readings[1:])],
+        "readings_q16": [round(value * 65536) for value in readings],
         "period_us": example_period_us(model),
+        "believed_after": samples_until_believed(model, example_period_us(model)),
     }
+
+
+def samples_until_believed(model: Model, period_us: int) -> int:
+    """Samples of steady readings until every channel is believed: the first, and its guard's time of agreement."""
+    guards = [guard_of(model, name) for name in (None, *channel_names(model))]
+    return 1 + max(-(-round(guard.agree_s * 1e6) // period_us) for guard in guards)
 
 
 def _macro(name: str, text: CText, comment: str) -> dict[str, str]:

@@ -25,12 +25,12 @@ FALSE_ALARMS = 0.01  # records of which one has a step by chance
 _HALVES_S = (120.0, 600.0, 3000.0)  # half windows: short ones place a large step, long ones find a small one
 _CELLS = 20  # of a half window
 _LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what noise makes
-_MAD_TO_SIGMA = 1.4826
+_MAD_TO_SIGMA = 1.4826  # of normal noise: 1 / 0.67449, the upper quartile of a standard normal
 _PLACES = 3.0  # independent places in a window
 _KNOWN = 0.4  # degrees of freedom of a scale from a median, for each independent place: its efficiency
 _EDGE = 2  # cells on either side of a place that its time may lie in
-_CHI2_95 = 3.841
-_NORMAL_95 = 1.96
+_CHI2_95 = 3.841  # chi-squared of one degree of freedom, 95 %
+_NORMAL_95 = 1.96  # standard normal, 95 % on two sides
 
 
 @dataclass(frozen=True, slots=True)

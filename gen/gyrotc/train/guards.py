@@ -17,6 +17,7 @@ _MARGIN = 0.5  # of the range, at either end ...
 _LEAST_MARGIN = 0.01  # ... and at least this share of the largest magnitude
 _STEPS = 2.0  # times the largest change between two rows
 _STUCK = 20.0  # times the longest that a reading stayed the same
+# Below two minutes a chamber at rest would count as stuck; above 2000 s a flight would be over before it is told.
 _SHORTEST_STUCK_S, _LONGEST_STUCK_S = 120.0, 2000.0
 
 

@@ -93,13 +93,12 @@ def extend(
     steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
-    extended = refitting.fit(shipped) if shipped else None
     return Extension(
         steps=tuple(steps),
         total=total,
         rate_left_out=_rate_left_out(refitting, len(effects), floor) if effects else None,
         forward=_forward(refitting, chain, len(effects), floor) if effects else None,
-        extended=extended,
+        extended=refitting.fit(shipped) if shipped else None,
         shipped=tuple(shipped),
         crossed=crossed,
         samples=_seen(refitting, shipped),
