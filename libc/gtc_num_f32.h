@@ -27,7 +27,6 @@
 #define INPUT gtc_f32_input_t
 #define NUM float
 #define WIDE float
-#define LIMIT float /* of a distance */
 #define NUM_ZERO 0.0F
 #define LIMIT_ZERO 0.0F
 #define NUM_PLAUSIBLE_MIN (-90.0F) /* C */
@@ -38,7 +37,6 @@
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) ((member).value)
-#define MEMBER_BITS(member) ((member).bits)
 #define ELEMENT(word) ((word).value)
 
 static inline uint_least32_t FN(bits)(float x)

@@ -24,7 +24,6 @@
 #define INPUT gtc_q31_input_t
 #define NUM int_least32_t
 #define WIDE int_least64_t
-#define LIMIT uint_least32_t /* of a distance */
 #define NUM_ZERO 0
 #define LIMIT_ZERO 0U
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
@@ -34,7 +33,6 @@
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) (member)
-#define MEMBER_BITS(member) ((uint_least32_t)(member) & 0xFFFFFFFFUL)
 #define ELEMENT(word) ((word).integer)
 
 /* Tests define it; see tests/c/gtc_checked.h. */
@@ -593,8 +591,9 @@ static inline int_least64_t FN(limited)(int_least64_t x)
 static inline uint_least64_t FN(squared)(int_least64_t x)
 {
     const int_least64_t y = FN(limited)(x);
+    const int_least64_t square = y * y;
 
-    return (uint_least64_t)(y * y);
+    return (uint_least64_t)square;
 }
 
 static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)

@@ -21,6 +21,7 @@ _MARK = re.compile(r"MISRA (?P<rule>\d+\.\d+)(?P<all> throughout)?: (?P<reason>[
 _FOUND = re.compile(r"(?P<file>[^:]+):(?P<line>\d+): misra-c2012-(?P<rule>\d+\.\d+)")
 #: Arithmetic of pointers into arrays that cppcheck follows wrongly across files.
 _NOT_SO = {"ctuArrayIndex"}
+_UNUSED = "misra-c2012-2.5"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +51,19 @@ def deviations(root: Path) -> list[Deviation]:
 
 
 def _cppcheck(root: Path) -> set[str]:
-    """Lines `file:line: id` for every set of options that the preprocessor can see."""
+    """Lines `file:line: id` for every set of options that the preprocessor can see, with and without banks and terms.
+
+    What is unused in one of them is unused only if it is so in all.
+    """
     command = ["cppcheck", "--addon=misra", "--std=c99", "--platform=unix32", "--quiet", "--force", "-U__FAST_MATH__",
                "-UGTC_CONFIG_HEADER", f"-I{root / 'include'}", "--template={file}:{line}: {id}"]  # fmt: skip
-    with tempfile.TemporaryDirectory() as work:
-        done = run([*command, *sources(root)], Path(work))
-    return {line for line in done.stderr.splitlines() if line.rsplit(" ", 1)[-1] not in _NOT_SO}
+    found = []
+    for options in ([], ["-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1"]):
+        with tempfile.TemporaryDirectory() as work:
+            done = run([*command, *options, *sources(root)], Path(work))
+        found.append({line for line in done.stderr.splitlines() if line.rsplit(" ", 1)[-1] not in _NOT_SO})
+    plain, whole = found
+    return {line for line in plain | whole if not line.endswith(_UNUSED)} | (plain & whole)
 
 
 def misra(root: Path) -> Iterator[str]:
