@@ -8,6 +8,7 @@ from .files import (
     emit_texts,
     emitted_tables,
     example_period_us,
+    example_samples,
     quantise_all,
     write_texts,
 )
@@ -20,6 +21,7 @@ __all__ = [
     "emit_texts",
     "emitted_tables",
     "example_period_us",
+    "example_samples",
     "quantise_all",
     "write_texts",
 ]

@@ -7,6 +7,7 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,6 +42,7 @@ __all__ = [
     "emit_texts",
     "emitted_tables",
     "example_period_us",
+    "example_samples",
     "quantise_all",
     "write_texts",
 ]
@@ -276,6 +278,7 @@ def _example_values(model: Model) -> dict[str, Any]:
         "first_temperature": middle,
         "first_temperature_q16": round(middle * 65536),
         "period_us": example_period_us(model),
+        "samples": example_samples(model),
     }
 
 
@@ -303,6 +306,11 @@ def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
         text = CText(f"({c_code(f'{value:#.9g}F')})")
         told = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of the range"
         yield _macro(f"AUTHORITY_{name}_DPH", text, told)
+
+
+def example_samples(model: Model) -> int:
+    """Samples until the first start of the example is believed."""
+    return math.ceil(model.agree_s * 1e6 / example_period_us(model)) + 1
 
 
 def example_period_us(model: Model) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit import emitted_tables, example_period_us
+from ..emit import emitted_tables, example_period_us, example_samples
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
@@ -77,7 +77,12 @@ def joint_texts(
     main = (
         c_environment()
         .get_template("main_axes.c.j2")
-        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]))
+        .render(
+            models=listed,
+            n=numeric,
+            period_us=example_period_us(listed[0]),
+            samples=example_samples(listed[0]),
+        )
     )
     texts["main.c"] = main.encode("ascii")
     texts[RECORD] = joint_record_text(models, texts)
