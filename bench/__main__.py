@@ -81,9 +81,10 @@ def _sigma(docs: Path) -> None:
     """Whether the uncertainty of corrections holds, on simulated gyros."""
     from .runtime_page import write
     from .sigma import coverage
+    from .sigma_cost import cost
     from .sigma_page import section
 
-    write(docs, "sigma", coverage(_say), section)
+    write(docs, "sigma", {"cost": cost(), **coverage(_say)}, section)
 
 
 _PARTS = {"training": _training, "runtime": _runtime}

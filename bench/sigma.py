@@ -94,11 +94,11 @@ class Campaign:
     name: str
     scenario: str
     terms: tuple[Term, ...] = ()
-    gyros: int = 40
+    gyros: int = 24
 
 
 CAMPAIGNS = (
-    Campaign("the paper's environments", "paper", gyros=100),
+    Campaign("the paper's environments", "paper", gyros=60),
     Campaign("holds from both sides, loops, cold starts", "separating"),
     Campaign("calibrated over a part of the range", _NARROW),
     Campaign("calibrated without one rate and one hold", _GAPS),

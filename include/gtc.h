@@ -375,7 +375,8 @@ GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int
  *      tell it the samples in between by gtc_<n>_missed(). With another period_us than it
  *      was saved with, only what survives longer.
  *   more: memories, which go on relaxing towards the first temperature, and plays.
- * A torn or foreign image, or one with numbers that no call leaves, leaves `state` unwritten. examples/two_slots keeps it over power cuts.
+ * A torn or foreign image, or one with numbers that no call leaves, leaves `state` unwritten: restore reads it into
+ * a state on the stack first. examples/two_slots keeps it over power cuts.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: saved by another arithmetic or version), GTC_E_IMAGE,
  * GTC_E_ID or GTC_E_PERIOD. Cost: about 40 operations a word. */
 GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS]);

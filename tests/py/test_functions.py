@@ -47,8 +47,6 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
         found = costs[numeric]
         assert list(found) == list(PUBLIC)
         assert found["sample"].stack_bytes > found["map"].stack_bytes > 0
-        assert found["restore"].stack_bytes <= 900, (
-            "a state is checked beside the old one, and stands once on the stack"
-        )
+        assert found["restore"].stack_bytes <= 1000, "one state on the stack, not two"
         assert found["save"].stack_bytes <= 100
         assert all(cost.code_bytes > 0 for cost in found.values())

@@ -8,8 +8,8 @@ from .files import (
     emit_texts,
     emitted_tables,
     example_period_us,
+    example_samples,
     quantise_all,
-    samples_until_believed,
     write_texts,
 )
 
@@ -21,7 +21,7 @@ __all__ = [
     "emit_texts",
     "emitted_tables",
     "example_period_us",
+    "example_samples",
     "quantise_all",
-    "samples_until_believed",
     "write_texts",
 ]

@@ -7,6 +7,7 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -42,8 +43,8 @@ __all__ = [
     "emit_texts",
     "emitted_tables",
     "example_period_us",
+    "example_samples",
     "quantise_all",
-    "samples_until_believed",
     "write_texts",
 ]
 
@@ -280,14 +281,8 @@ def _example_values(model: Model) -> dict[str, Any]:
         "readings": [c_code(f"{middle:.1f}F"), *(c_code(f"{value:#.7g}F") for value in readings[1:])],
         "readings_q16": [round(value * 65536) for value in readings],
         "period_us": example_period_us(model),
-        "believed_after": samples_until_believed(model, example_period_us(model)),
+        "samples": example_samples(model),
     }
-
-
-def samples_until_believed(model: Model, period_us: int) -> int:
-    """Samples of steady readings until every channel is believed: the first, and its guard's time of agreement."""
-    guards = [guard_of(model, name) for name in (None, *channel_names(model))]
-    return 1 + max(-(-round(guard.agree_s * 1e6) // period_us) for guard in guards)
 
 
 def _macro(name: str, text: CText, comment: str) -> dict[str, str]:
@@ -314,6 +309,12 @@ def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
         text = CText(f"({c_code(f'{value:#.9g}F')})")
         told = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of the range"
         yield _macro(f"AUTHORITY_{name}_DPH", text, told)
+
+
+def example_samples(model: Model) -> int:
+    """Samples until the first start of the example is believed, of every channel."""
+    longest_s = max(guard_of(model, name).agree_s for name in (None, *channel_names(model)))
+    return math.ceil(longest_s * 1e6 / example_period_us(model)) + 1
 
 
 def example_period_us(model: Model) -> int:

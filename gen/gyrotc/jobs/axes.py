@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit import emitted_tables, example_period_us, samples_until_believed
+from ..emit import emitted_tables, example_period_us, example_samples
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
@@ -74,15 +74,14 @@ def joint_texts(
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
     listed = list(models.values())
-    period_us = example_period_us(listed[0])
     main = (
         c_environment()
         .get_template("main_axes.c.j2")
         .render(
             models=listed,
             n=numeric,
-            period_us=period_us,
-            believed_after=samples_until_believed(listed[0], period_us),
+            period_us=example_period_us(listed[0]),
+            samples=example_samples(listed[0]),
         )
     )
     texts["main.c"] = main.encode("ascii")

@@ -32,7 +32,7 @@ from ..frontend.numbers import Numbers
 from ..terms.recursion import CourseChannel, TermOutcome
 from .maps import evaluate_map, governed
 from .operations import recursions
-from .sigma import Circumstances, evidence_of
+from .sigma import SigmaEvidence, evidence_of
 from .table import ARRAYS, Table, Words
 
 __all__ = ["arithmetic_of", "corrections", "evidence", "settings_of"]
@@ -104,7 +104,7 @@ def evidence(
     channels: Words,
     samples_per_block: int,
     status: NDArray[np.int32],
-) -> Circumstances:
+) -> SigmaEvidence:
     """What the uncertainty of every correction goes by; arguments as of `corrections`, and the status of each."""
     led = steps.led(table.lead_blocks)
     outcome = _outcome(table, led, stream, table.numbers(channels), samples_per_block)

@@ -18,6 +18,9 @@ from .table import Table, Words
 __all__ = ["Replay", "answers", "replay"]
 
 
+_SPREAD = np.uint32(0x9E3779B1)  # odd: 2^32 over the golden ratio (Knuth, TAOCP 3, section 6.4)
+
+
 class CallSequence(Protocol):
     """Calls of the step functions, one entry each: bits of every channel, or `missed` samples (0: none)."""
 
@@ -113,7 +116,8 @@ def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
     """What `board_test.c` prints for a table: (status, bits) of every result, shape (n, 2).
 
     In order: the self-test; every map vector; `init`; every step of the history, whose status is that of
-    the call plus 256 times that of `gtc_<n>_bias` after it.
+    the call plus 256 times that of `gtc_<n>_bias` after it; with uncertainties the bits of sigma, spread over a word,
+    are added to those of the bias.
     """
     status, bits = evaluate_map(table, vectors.map_inputs(table.numeric))
     maps = np.stack([status.astype(np.uint32), bits], axis=1)
@@ -134,6 +138,9 @@ def _step_answers(table: Table, calls: CallSequence, samples_per_block: int) -> 
         channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
     stream, steps = _followed(table, settings, channels, missed)
     status, bits = corrections(table, steps, stream, channels, samples_per_block)
+    sigma, _ = _uncertain(table, steps, stream, channels, samples_per_block, status)
+    if sigma is not None:
+        bits = bits + sigma * _SPREAD
     row = np.cumsum(~was_missed) - 1
     last = np.where(
         was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]

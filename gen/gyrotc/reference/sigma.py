@@ -20,7 +20,7 @@ from . import f32, q31
 from .squares import RULES, SQUARES
 from .table import ARRAYS, Table, Words
 
-__all__ = ["Circumstances", "Rule", "evidence_of", "sigma_bits", "variances"]
+__all__ = ["Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
 
 Numbers = NDArray[Any]
 Whole = NDArray[np.int64]
@@ -33,7 +33,7 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True)
-class Circumstances:
+class SigmaEvidence:
     """What a state knows of its corrections, one entry each, in numbers of the table's arithmetic.
 
     Attributes:
@@ -61,7 +61,7 @@ class Circumstances:
 
 def evidence_of(
     table: Table, steps: Steps, course: Course, outcome: TermOutcome, status: NDArray[np.int32]
-) -> Circumstances:
+) -> SigmaEvidence:
     """The evidence of every correction of a history.
 
     Args:
@@ -81,7 +81,7 @@ def evidence_of(
     kept = np.cumsum(~is_made)
     lost = int(table.guards[6]) + 1
     age = np.where(steps.kind == FALLEN, lost, np.minimum(kept - kept[made], lost))
-    return Circumstances(
+    return SigmaEvidence(
         status=status,
         at=outcome.temperature[made],
         slope=outcome.slope[made],
@@ -110,7 +110,7 @@ def _drift(table: Table, steps: Steps, began: Whole, blocks: Whole) -> tuple[NDA
     return ~warming | young, np.where(warming & young, estimate, steps.slope)
 
 
-def sigma_bits(table: Table, evidence: Circumstances, constant: Any = None) -> Words:
+def sigma_bits(table: Table, evidence: SigmaEvidence, constant: Any = None) -> Words:
     """Bits of 1 σ of every correction, the first one that before anything is believed.
 
     Args:
@@ -127,7 +127,7 @@ def sigma_bits(table: Table, evidence: Circumstances, constant: Any = None) -> W
     return roots.view(np.uint32) if table.numeric == "f32" else roots.astype(np.uint32)
 
 
-def variances(table: Table, evidence: Circumstances) -> Numbers:
+def variances(table: Table, evidence: SigmaEvidence) -> Numbers:
     """Variance of every correction without that of the constant of the power-on."""
     do, rules = SQUARES[table.numeric], _rules(table)
     total = _of_map(table, evidence) + _of_age(table, evidence)
@@ -148,7 +148,7 @@ def _rules(table: Table) -> Numbers:
     return table.numbers(table.sigma)[2 * cells :]
 
 
-def _of_map(table: Table, evidence: Circumstances) -> Numbers:
+def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
     low, high = table.numbers(table.envelope).reshape(2, 2).T
     x = np.clip(np.stack([evidence.at, evidence.slope], axis=1), low, high)
     if table.numeric == "f32":
@@ -161,28 +161,28 @@ def _of_map(table: Table, evidence: Circumstances) -> Numbers:
     return SQUARES[table.numeric].squared(table.numbers(table.sigma)[index])
 
 
-def _of_age(table: Table, evidence: Circumstances) -> Numbers:
+def _of_age(table: Table, evidence: SigmaEvidence) -> Numbers:
     do, rules = SQUARES[table.numeric], _rules(table)
     moved = do.limited(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.HOLD]))
     gone = do.squared(do.times(evidence.age, moved))
     return np.asarray(gone + do.squared(do.times(evidence.age, rules[Rule.REST])))
 
 
-def _of_start(table: Table, evidence: Circumstances) -> Numbers:
+def _of_start(table: Table, evidence: SigmaEvidence) -> Numbers:
     do, rules = SQUARES[table.numeric], _rules(table)
     known = do.squared(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.SLOPE]))
     square = np.where(evidence.sure, known, do.squared(rules[Rule.START]))
     return np.where((evidence.status & WARMING) != 0, square, np.zeros_like(square))
 
 
-def _beyond(table: Table, evidence: Circumstances, k: int) -> Numbers:
+def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> Numbers:
     do, rules = SQUARES[table.numeric], _rules(table)
     x = (evidence.at, evidence.slope)[k]
     low, high = table.numbers(table.envelope)[2 * k : 2 * k + 2]
     return do.squared(do.per_c(x, np.clip(x, low, high), rules[Rule.BEYOND + k]))
 
 
-def _of_terms(table: Table, evidence: Circumstances) -> Iterator[Numbers]:
+def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
     """What each term does not know of the time before it began, or of a channel that is lost."""
     do = SQUARES[table.numeric]
     words = _rules(table)[RULES:]

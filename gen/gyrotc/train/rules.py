@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..terms.operators import play
 from .data import TrainingData
 from .process import Process
 from .result import Fit, predict
@@ -93,12 +94,14 @@ def start_sigma(
 ) -> float:
     """What a term does not know of the time before it began, 1 σ: deg/h, for a play deg/h/C.
 
-    A memory may have been as far from the temperature as it was on average in training; a play's state lies anywhere
-    in its width; a channel that has never been there may differ from its reference as it did in training.
+    A memory or a play may have been as far from the temperature as it was on average in training; that of a play
+    falls with every degree of its width through which the temperature has moved; a channel that is lost may differ
+    from its reference as it did in training.
     """
     amplitude = abs(parameters.get("amplitude_dph_per_c", 0.0))
     if id == "hysteresis":
-        return amplitude / float(np.sqrt(12.0))
+        width = parameters["width_c"]
+        return amplitude * _played(samples, width) / (2.0 * width)
     if id in ("thermal_gradient", "cavity_lag"):
         apart = _apart(samples, parameters["tau_s"])
         if id == "cavity_lag":
@@ -111,6 +114,16 @@ def start_sigma(
         departure = channel[np.isfinite(channel)] - parameters["reference"]
         return abs(parameters["slope_dph_per_unit"]) * float(np.sqrt(np.mean(departure**2)))
     return 0.0
+
+
+def _played(samples: TrainingData, width_c: float) -> float:
+    """The same of a play; its width where training did not move it."""
+    squares = [
+        (play(width_c, samples.temperature_c[own]) - samples.temperature_c[own]) ** 2
+        for own in _runs(samples)
+    ]
+    found = float(np.sqrt(np.mean(np.concatenate(squares))))
+    return found if found > 0.0 else width_c
 
 
 def _apart(samples: TrainingData, tau_s: float) -> float:
