@@ -57,14 +57,16 @@ def test_trace_has_the_promised_columns_and_a_row_for_every_input_row(demo: Path
     rows = np.genfromtxt(demo / "data" / "run-07.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(trace["time_s"], rows["time_s"])
     np.testing.assert_allclose(trace["compensated_dph"], trace["rate_dph"] - trace["bias_dph"], atol=1e-12)
-    assert trace["status"][0] == 1 and trace["status"][-1] in (0, 4)
+    assert trace["status"][0] == 8 and trace["bias_dph"][0] == 0.0  # one reading alone is not believed
+    assert trace["status"][1] == 1 and trace["status"][-1] in (0, 4)
 
 
 def test_figures_follow_from_the_trace(demo: Path) -> None:
     """The exam RMS of a run, computed here from its trace alone."""
     evaluation = _json(demo / "result" / "evaluate.json")
     trace = np.genfromtxt(demo / "result" / "trace" / "run-09.csv", delimiter=",", names=True)
-    means = trace["compensated_dph"].reshape(-1, 10).mean(axis=1)
+    believed = np.where(trace["status"] == 8, np.nan, trace["compensated_dph"])  # nothing is corrected before
+    means = np.nanmean(believed.reshape(-1, 10), axis=1)
     entry = next(r for r in evaluation["runs"] if r["file"] == "run-09.csv")
     assert entry["after"]["rms_dph"] == pytest.approx(float(np.sqrt(np.mean(means**2))), rel=1e-9)
     assert entry["after"]["std_dph"] == pytest.approx(float(np.std(means)), rel=1e-9)

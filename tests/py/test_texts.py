@@ -131,7 +131,7 @@ def test_no_field_of_a_model_reaches_the_compiler(model_dict: dict[str, Any], tm
 
 _HEADER_WORDS = re.compile(
     r"ifndef|define|endif|ifdef|include|extern|const|C|__cplusplus|gtc|h|GTC_RLG_0042_[A-Z0-9_]{1,40}"
-    r"|gtc_(f32|q31)_table_t|gtc_rlg_0042_(f32|q31)|0x[0-9a-f]{8}UL|[0-9]{1,10}(F|UL|)|period_us|temperature_c"
+    r"|gtc_(f32|q31)_table_t|gtc_rlg_0042_(f32|q31)|0x[0-9a-f]{8}UL|[0-9]{1,12}(F|UL|)|period_us|temperature_c"
 )
 
 
