@@ -25,6 +25,7 @@ ORDER = [
     "advice",
     "pipeline",
     "extend",
+    "summary",
     "result",
 ]
 MODULES = sorted(p for p in DIAGNOSE.rglob("*.py") if p.name != "__init__.py")

@@ -26,7 +26,8 @@ def test_the_snippet_of_the_readme_compiles_links_and_corrects(tmp_path: Path) -
     main = (
         "int correction_start(void);\nint correct(float temperature_c, float *rate_dph);\n"
         f"{snippet[0]}\nint main(void)\n{{\n    float rate = 1.0F;\n"
-        f"    return (correction_start() == 0) && (correct({middle:.3f}F, &rate) == GTC_WARMING)"
+        f"    return (correction_start() == 0) && (correct({middle:.3f}F, &rate) == GTC_HELD)"
+        f" && (correct({middle:.3f}F, &rate) >= 0) && (rate = 0.0F, correct({middle:.3f}F, &rate) == GTC_WARMING)"
         " && (rate != 1.0F) ? 0 : 1;\n}\n"
     )
     (tmp_path / "c" / "user.c").write_text(main)
@@ -96,13 +97,14 @@ int main()
     gtc::f32::Angle angle(0.0F);
     gtc_word_t words[GTC_SAVE_WORDS];
     const bool started = gtc::f32::check(gtc_rlg_0042_f32).is_ok()
-        && fixed.init(gtc_rlg_0042_q31, 10U).is_ok() && !fixed.sample(gtc::q31::Celsius(20L * 65536L)).failed()
-        && correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok();
+        && fixed.init(gtc_rlg_0042_q31, 1000000UL).is_ok() && !fixed.sample(gtc::q31::Celsius(20L * 65536L)).failed()
+        && correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok()
+        && correction.sample(gtc::f32::Celsius(20.0F)).has(GTC_HELD); // one alone is not believed
     const bool went = correction.sample(gtc::f32::Celsius(20.0F)).has(GTC_WARMING)
         && correction.bias(bias).has(GTC_WARMING)
         && !gtc::f32::map(gtc_rlg_0042_f32, gtc::f32::Celsius(20.0F), gtc::f32::CelsiusPerBlock(0.0F), map).failed()
         && increments.angle(bias, gtc::f32::Time(1.0F), angle).is_ok() && correction.save(words).is_ok()
-        && correction.restore(gtc_rlg_0042_f32, 10U, words, 0U).is_ok();
+        && correction.restore(gtc_rlg_0042_f32, 1000000UL, words, 0U).is_ok();
     return (started && went && (bias.value() == map.value()) WRONG) ? 0 : 1;
 }
 """

@@ -44,7 +44,7 @@ def test_every_target_of_the_common_tools_agrees_in_every_bit(whole: Path) -> No
         assert entry["vectors"] >= 20000
         assert entry["ram_bytes"] == 0
         assert (
-            0 < entry["code_bytes"] < 30000
+            0 < entry["code_bytes"] < 45000
         )  # clang at -O3 on a host unrolls; what counts is measured for the cores
     for name in ("cortex-m0", "cortex-m4f"):
         for entry in (e for e in result["targets"] if e["name"] == name):
