@@ -1,0 +1,28 @@
+"""What a result says in words: a sentence for each verdict, and the step that would tell more."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+from gyrotc.dataset import load
+from gyrotc.diagnose.advice import VERDICTS, next_steps
+from gyrotc.diagnose.summary import not_testable
+from gyrotc.results.diagnosed import DiagnosisVerdict
+from gyrotc.train.fitting import FitOptions
+from recordings import ACCEPTED
+
+
+@pytest.mark.parametrize("verdict", get_args(DiagnosisVerdict))
+def test_each_verdict_has_a_sentence_and_all_but_ambiguous_a_step(verdict: DiagnosisVerdict) -> None:
+    assert VERDICTS[verdict].endswith(".")
+    steps = next_steps(verdict, [], [], shipped=True)
+    assert bool(steps) == (verdict != "ambiguous")
+
+
+def test_where_temperature_hardly_changes_nothing_is_decided(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    ACCEPTED["Parquet"](tmp_path / "RLG-1")
+    result = not_testable(load(tmp_path / "RLG-1"), FitOptions(), 0.25)
+    assert result.verdict == "not_testable"
+    assert "0.25 C" in result.text
+    assert not result.causes and result.extended is None
