@@ -23,13 +23,14 @@ def test_the_snippet_of_the_readme_compiles_links_and_corrects(tmp_path: Path) -
     model = random_model(1, serial="SIM-0001")
     emit(model, tmp_path)
     middle = sum(model.envelope.temperature_c) / 2.0
+    held = round(model.agree_s * 100.0)  # samples of 10 ms
     main = (
         "int correction_start(void);\nint correct(float temperature_c, float *rate_dph);\n"
         f"{snippet[0]}\nint main(void)\n{{\n    float rate = 1.0F;\n    int k, held = 0;\n"
         "    const int started = (correction_start() == 0);\n"
-        f"    for (k = 0; k < 100; k++) {{\n        held += (correct({middle:.3f}F, &rate) == GTC_HELD);\n    }}\n"
-        f"    return started && (held == 100) && (rate == 1.0F) && (correct({middle:.3f}F, &rate) == GTC_WARMING)"
-        " && (rate != 1.0F) ? 0 : 1; /* believed after a second of readings that agree */\n}\n"
+        f"    for (k = 0; k < {held}; k++) {{\n        held += (correct({middle:.3f}F, &rate) == GTC_HELD);\n    }}\n"
+        f"    return started && (held == {held}) && (rate == 1.0F) && (correct({middle:.3f}F, &rate) == GTC_WARMING)"
+        " && (rate != 1.0F) ? 0 : 1; /* believed once readings agree for the guard's time */\n}\n"
     )
     (tmp_path / "c" / "user.c").write_text(main)
     command = ["gcc", *C_FLAGS, "-Wmissing-declarations", "user.c", "gtc.c", "gtc_sim_0001.c", "-o", "user"]

@@ -7,11 +7,12 @@
 
 #include "gtc_rlg_0042.h"
 
-#define STEPS 20000
+#define STEPS 50000
 
 static gtc_f32_state_t state;
 static float bias_in_force;
 static int failed;
+static pthread_barrier_t together; /* none has ended before another begins */
 
 static void fail(void)
 {
@@ -22,6 +23,7 @@ static void *task(void *unused)
 {
     int i;
 
+    (void)pthread_barrier_wait(&together);
     for (i = 0; i < STEPS; i++) {
         const float temperature = 20.0F + (0.001F * (float)(i % 1000));
         gtc_word_t words[GTC_SAVE_WORDS];
@@ -41,6 +43,7 @@ static void *interrupt(void *unused)
     gtc_f32_angle_t sum = {{0.0F, 0.0F}};
     int i;
 
+    (void)pthread_barrier_wait(&together);
     for (i = 0; i < STEPS; i++) {
         float bias = 0.0F;
         float increment = 0.0F;
@@ -62,6 +65,7 @@ static void *reader(void *unused)
 {
     int i;
 
+    (void)pthread_barrier_wait(&together);
     for (i = 0; i < STEPS; i++) {
         float bias = 0.0F;
 
@@ -79,6 +83,9 @@ int main(void)
     int i;
 
     if (gtc_f32_init(&state, &gtc_rlg_0042_f32, 1000000UL) != GTC_OK) {
+        return 1;
+    }
+    if (pthread_barrier_init(&together, NULL, 3U) != 0) {
         return 1;
     }
     for (i = 0; i < 3; i++) {
