@@ -134,14 +134,16 @@ class Model:
         p, block = term["parameters"], self.raw["block_s"]
         channel = 1 + self.channels().index(term["channel"]) if term.get("channel") else 0
         gain = -math.expm1(-block / p["tau_s"]) if "tau_s" in p else 0.0
+        # Amplitudes belong to the middle of a block, records to its start or end: what fades was so much larger before.
+        half = math.exp(0.5 * block / p["tau_s"]) if "tau_s" in p else 1.0
         if term["id"] == "cavity_lag":
             return 1, channel, [gain, 0.0, block / p["tau_s"]]
         if term["id"] == "thermal_gradient":
-            return 1, channel, [gain, p["amplitude_dph_per_c"], 0.0]
+            return 1, channel, [gain, p["amplitude_dph_per_c"] * half, 0.0]
         if term["id"] == "hysteresis":
             return 2, channel, [p["width_c"], p["amplitude_dph_per_c"]]
         if term["id"] == "warm_up":
-            return 3, channel, [block / p["tau_s"] * math.log2(math.e), p["amplitude_dph"]]
+            return 3, channel, [block / p["tau_s"] * math.log2(math.e), p["amplitude_dph"] / half]
         if term["id"] == "path_length_periodicity":
             return 4, channel, [1.0 / p["period_c"], p["phase_rad"] / math.tau, p["amplitude_dph"]]
         return 5, channel, [p["slope_dph_per_unit"], p["reference"]]
