@@ -21,8 +21,10 @@ from .jobs import GYROTC, Case, command
 
 UNITS = ("A", "B", "C")
 _MANIFEST = 'schema = 1\ndatasets = ["gyros/*"]\nnumeric = ["f32"]\n[options]\nseed = {}\n'
-_ROW = re.compile(r"<td>([A-Z])</td><td class=\"[a-z]+\">([a-z]+)</td>(.*?)</tr>", re.DOTALL)
-_CELL = re.compile(r"<td(?: class=\"n\")?>(.*?)</td>")
+_ROW = re.compile(
+    r'<tr data-state="([a-z]+)"[^>]*><td class="name">(?:<a [^>]*>)?([A-Z])<(.*?)</tr>', re.DOTALL
+)
+_VALUE = re.compile(r'data-value="([^"]+)"')
 
 
 def fleet(root: Path, scenario: Path) -> Case:
@@ -114,7 +116,6 @@ def _figures(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _of_page(path: Path) -> Iterator[tuple[str, Row]]:
-    for name, status, rest in _ROW.findall(path.read_text()):
-        cells = _CELL.findall(rest)
-        figures = {"before_rms_dph": cells[1], "after_rms_dph": cells[2], "centers": cells[4]}
-        yield name, (status, {k: v for k, v in figures.items() if v})
+    for status, name, rest in _ROW.findall(path.read_text()):
+        values = [f"{float(value):.4g}" for value in _VALUE.findall(rest)]
+        yield name, (status, dict(zip(("before_rms_dph", "after_rms_dph"), values, strict=False)))
