@@ -146,7 +146,7 @@ def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path
     for entry in verify(copy, targets=names, dataset=dataset).content()["targets"]:
         assert entry["status"] == "pass"
         assert entry["replayed"] == {"runs": 2, "rows": 1714, "mismatches": 0, "first_mismatches": []}
-    spoil(copy / "c" / "gtc.c", r"#define NEW_TRUTH 3U", "#define NEW_TRUTH 2U", count=0)
+    spoil(copy / "c" / "gtc.c", r"#define GUARD_AGREE 4U", "#define GUARD_AGREE 5U", count=0)
     for entry in verify(copy, targets=[FAST], dataset=dataset, trust_code=True).content()["targets"]:
         assert entry["status"] == "fail" and entry["mismatches"] > 0
 
