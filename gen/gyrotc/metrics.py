@@ -41,13 +41,15 @@ class Averages:
     temperature_c: Array
 
 
-def _bins(time_s: Array, scored: NDArray[np.bool_], average_s: float) -> tuple[NDArray[np.int64], int]:
-    """Bin of every row (from the first row on) and their number; a bin less than half full gets -1."""
+def _bins(
+    time_s: Array, scored: NDArray[np.bool_], average_s: float, from_s: float | None
+) -> tuple[NDArray[np.int64], int]:
+    """Bin of every row (from `from_s` on; None: the first row) and their number; a bin less than half full gets -1."""
     if time_s.size == 0:
         return np.zeros(0, dtype=np.int64), 0
     period = float(np.median(np.diff(time_s), overwrite_input=True)) if time_s.size > 1 else average_s
     # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
-    passed = time_s - time_s[0]
+    passed = time_s - (time_s[0] if from_s is None else from_s)
     passed += 1e-3 * period
     passed /= max(average_s, period)
     raw = np.floor(passed, out=passed).astype(np.int64)
@@ -67,10 +69,14 @@ def average(
     *,
     scored: NDArray[np.bool_],
     average_s: float,
+    from_s: float | None = None,
 ) -> Averages:
-    """Averages the scored rows of one run over `average_s`; bins less than half full are left out."""
+    """Averages the scored rows of one run over `average_s`; bins less than half full are left out.
+
+    Bins begin at `from_s`, at or before the first row; None: at the first row.
+    """
     scored = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
-    bins, n = _bins(time_s, scored, average_s)
+    bins, n = _bins(time_s, scored, average_s, from_s)
     # Without copies where every row counts: a file of 100 Hz fills memory.
     used = slice(None) if np.all(bins >= 0) else bins >= 0
     bins = bins[used]

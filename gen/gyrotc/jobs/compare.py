@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..dataset import Dataset
 from ..errors import InputError
+from ..frontend import Blocks
 from ..metrics import Averages, average, pooled
 from ..results.comparison import Comparison, Group, Method
 from ..results.evaluation import Pooled
@@ -48,6 +49,7 @@ class _Held:
     environment: str
     samples: TrainingData
     seen: NDArray[np.bool_]
+    from_s: float | None = None  # where its means begin: with the run, also where nothing is believed yet
 
 
 def compare(
@@ -96,7 +98,8 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     if not training:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     front = front_end(training, options.block_s)
-    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(training)]
+    blocks = [front.blocks(run) for run in training]
+    parts = [samples_of(b, front.block_s, k) for k, b in enumerate(blocks)]
     data = joined(parts)
     if len(data) == 0:
         raise InputError(
@@ -106,8 +109,8 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     everything = np.ones(len(data), dtype=bool)
     if exam:
         held = [
-            _Held(run.environment or run.file, samples_of(front.blocks(run), front.block_s, k), everything)
-            for k, run in enumerate(exam)
+            _Held(run.environment or run.file, samples_of(b, front.block_s, k), everything, _start(b))
+            for k, (run, b) in enumerate((run, front.blocks(run)) for run in exam)
         ]
         return data, [h for h in held if len(h.samples)], "exam"
     spans = training_spans(training, data)
@@ -119,8 +122,17 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
             if mask.any()
         ]
     else:
-        held = [_Held(run.environment or run.file, parts[k], data.run != k) for k, run in enumerate(training)]
+        held = [
+            _Held(run.environment or run.file, parts[k], data.run != k, _start(blocks[k]))
+            for k, run in enumerate(training)
+        ]
     return data, [h for h in held if h.seen.any()], "left_out"
+
+
+def _start(blocks: Blocks) -> float | None:
+    """Start of the first block with rows of the run, s."""
+    starts = blocks.start_s[blocks.rows > 0]
+    return float(starts[0]) if starts.size else None
 
 
 def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions) -> Method:
@@ -163,7 +175,15 @@ def _averages(held: _Held, fitted: Fit, options: CompareOptions) -> Averages:
     s = held.samples
     after = s.bias_dph - predict(fitted, s.temperature_c, s.slope_c_per_min)
     scored = np.ones(len(s), dtype=bool)
-    return average(s.time_s, s.temperature_c, s.bias_dph, after, scored=scored, average_s=options.average_s)
+    return average(
+        s.time_s,
+        s.temperature_c,
+        s.bias_dph,
+        after,
+        scored=scored,
+        average_s=options.average_s,
+        from_s=held.from_s,
+    )
 
 
 def _group(environment: str, part: Pooled) -> Group:
