@@ -32,6 +32,4 @@ def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: 
     # compare judges the map in float64, evaluate the bits of the C code: the same within rounding.
     difference = by_id["mrbf"]["exam_rms_dph"] - evaluation["exam"]["after"]["rms_dph"]
     assert abs(difference) < 1e-6 * evaluation["exam"]["after"]["rms_dph"]
-    # Both networks reach the noise of this record, where chance orders them; the plane does not.
-    assert by_id["mrbf"]["exam_rms_dph"] < 1.01 * by_id["rbf_random"]["exam_rms_dph"]
-    assert max(by_id[i]["exam_rms_dph"] for i in ("mrbf", "rbf_random")) < by_id["mlr"]["exam_rms_dph"]
+    assert by_id["mrbf"]["exam_rms_dph"] < by_id["rbf_random"]["exam_rms_dph"] < by_id["mlr"]["exam_rms_dph"]
