@@ -48,6 +48,12 @@ class Blocks:
     settings: Settings
 
     @property
+    def begins_s(self) -> float | None:
+        """Start of the first block with rows of the run, s: means of it begin here, believed or not."""
+        starts = self.start_s[self.rows > 0]
+        return float(starts[0]) if starts.size else None
+
+    @property
     def used(self) -> NDArray[np.bool_]:
         """Which blocks are training samples."""
         return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..dataset import Dataset
 from ..errors import InputError
-from ..frontend import Blocks
 from ..metrics import Averages, average, pooled
 from ..results.comparison import Comparison, Group, Method
 from ..results.evaluation import Pooled
@@ -109,7 +108,7 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
     everything = np.ones(len(data), dtype=bool)
     if exam:
         held = [
-            _Held(run.environment or run.file, samples_of(b, front.block_s, k), everything, _start(b))
+            _Held(run.environment or run.file, samples_of(b, front.block_s, k), everything, b.begins_s)
             for k, (run, b) in enumerate((run, front.blocks(run)) for run in exam)
         ]
         return data, [h for h in held if len(h.samples)], "exam"
@@ -123,16 +122,10 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
         ]
     else:
         held = [
-            _Held(run.environment or run.file, parts[k], data.run != k, _start(blocks[k]))
+            _Held(run.environment or run.file, parts[k], data.run != k, blocks[k].begins_s)
             for k, run in enumerate(training)
         ]
     return data, [h for h in held if h.seen.any()], "left_out"
-
-
-def _start(blocks: Blocks) -> float | None:
-    """Start of the first block with rows of the run, s."""
-    starts = blocks.start_s[blocks.rows > 0]
-    return float(starts[0]) if starts.size else None
 
 
 def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions) -> Method:

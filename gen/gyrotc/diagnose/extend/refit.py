@@ -57,6 +57,7 @@ class Played:
         in_force: For each of them, the correction in force that the map made, shape (n,).
         course: Every correction of the run as terms see it.
         slope: C per block, of every correction.
+        begins_s: Where means of the run begin, s.
         on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
         day: Days since the first run, or None.
         channels: The channels at every correction.
@@ -68,6 +69,7 @@ class Played:
     in_force: NDArray[np.int64]
     course: Course
     slope: Array
+    begins_s: float | None
     on_s: Array
     day: float | None
     channels: Mapping[str, CourseChannel]
@@ -113,6 +115,7 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
         in_force=blocks.in_force[blocks.used],
         course=replace(course, temperature=course.temperature.astype(np.float64)),
         slope=blocks.steps.slope.astype(np.float64),
+        begins_s=blocks.begins_s,
         on_s=data.time_s - (run.power_on_s or 0.0),
         day=day,
         channels={name: _shown(blocks, rows.channels[name]) for name in dataset.channels},
@@ -237,6 +240,7 @@ def scored_means(
                 rest,
                 scored=chosen,
                 average_s=max(average_s, run.block_s),
+                from_s=run.begins_s,
             )
         )
     return out
