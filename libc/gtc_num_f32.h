@@ -510,10 +510,7 @@ static inline float FN(squared)(float x)
 
 static inline float FN(plus)(float a, float b)
 {
-    float sum;
-
-    sum = a + b;
-    return sum;
+    return FN(add)(a, b);
 }
 
 /* square / n */

@@ -1,6 +1,6 @@
 /* gtc_terms.inl - the kinds of extension terms, in the numbers included before.
  *
- * A table names the code of its terms, so that a program links the kinds that its table has. docs/numerics.md, section 5.
+ * A table names the code of its terms, so that a program links the kinds that its table has. docs/numerics.md, section 8.
  *
  * SPDX-License-Identifier: MIT
  */

@@ -69,31 +69,27 @@ class Runtime:
         self, table: Table, channels: Words, missed: np.ndarray, samples_per_block: int
     ) -> tuple[np.ndarray, Words]:
         """Statuses of `missed`, `sample`, `bias` for every row, shape (n, 3), and the bits of the biases."""
-        struct, _keep = self.struct(table)
-        size = self._shim(table, "state_size", ctypes.c_size_t)()
-        state = ctypes.create_string_buffer(size + 16)
-        started = self._function(table, "init")(
-            state, ctypes.byref(struct), ctypes.c_uint32(period_us(table.block_us, samples_per_block))
-        )
-        assert started == 0, started
-        channels = np.ascontiguousarray(channels, dtype=np.uint32)
-        missed = np.ascontiguousarray(missed, dtype=np.uint32)
-        status, bits = np.zeros((len(channels), 3), np.int32), np.zeros(len(channels), np.uint32)
-        self._shim(table, "steps")(
-            state,
-            _address(channels),
-            ctypes.c_long(channels.shape[1]),
-            _address(missed),
-            ctypes.c_long(len(channels)),
-            _address(status),
-            _address(bits),
-        )
-        return status, bits
+        bits = np.zeros(len(channels), np.uint32)
+        return self._driven("steps", table, channels, missed, samples_per_block, 3, bits), bits
 
     def snapshots(
         self, table: Table, channels: Words, missed: np.ndarray, samples_per_block: int
     ) -> tuple[np.ndarray, Words]:
         """What `sample` and `snapshot` return for every row, status, age, shape (n, 4); bits of bias, sigma, time."""
+        bits = np.zeros((len(channels), 3), np.uint32)
+        return self._driven("snapshots", table, channels, missed, samples_per_block, 4, bits), bits
+
+    def _driven(
+        self,
+        shim: str,
+        table: Table,
+        channels: Words,
+        missed: np.ndarray,
+        samples_per_block: int,
+        statuses: int,
+        bits: Words,
+    ) -> np.ndarray:
+        """A fresh state driven through every row: statuses, shape (n, statuses); the shim writes into `bits`."""
         struct, _keep = self.struct(table)
         size = self._shim(table, "state_size", ctypes.c_size_t)()
         state = ctypes.create_string_buffer(size + 16)
@@ -103,8 +99,8 @@ class Runtime:
         assert started == 0, started
         channels = np.ascontiguousarray(channels, dtype=np.uint32)
         missed = np.ascontiguousarray(missed, dtype=np.uint32)
-        status, bits = np.zeros((len(channels), 4), np.int32), np.zeros((len(channels), 3), np.uint32)
-        self._shim(table, "snapshots")(
+        status = np.zeros((len(channels), statuses), np.int32)
+        self._shim(table, shim)(
             state,
             _address(channels),
             ctypes.c_long(channels.shape[1]),
@@ -113,7 +109,7 @@ class Runtime:
             _address(status),
             _address(bits),
         )
-        return status, bits
+        return status
 
     def out_of_range(self) -> int:
         """Claims about ranges that did not hold so far, in a build with `libc_counted.h`."""

@@ -220,11 +220,7 @@ def change_lines(changes: Changes) -> Iterator[str]:
     for name, figure in changes.figures.items():
         if not isinstance(figure, str) and _plain(figure.before) != _plain(figure.after):
             yield f"  {name}: {_plain(figure.before)} -> {_plain(figure.after)}"
-    for kind, part in (
-        ("recordings", changes.recordings),
-        ("findings", changes.findings),
-        ("files", changes.files),
-    ):
+    for kind, part in changes.named:
         for what, names in part:
             if names:
                 yield f"  {kind}, {what.replace('_', ' ')}: {', '.join(names)}"

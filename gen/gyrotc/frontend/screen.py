@@ -15,6 +15,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from ..metrics import MAD_TO_SIGMA
+
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
 
@@ -25,7 +27,6 @@ Mask = NDArray[np.bool_]
 T = TypeVar("T", bound=np.generic)
 
 _SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
-_MAD_TO_SIGMA = 1.4826  # of a normal distribution, as `metrics` derives it
 _AROUND = 5  # blocks of a running median
 _GROUP = 200  # rows, at least, of one scale
 _GROUP_BLOCKS = 10  # blocks, at least, of one scale: the same where rows are few to a block
@@ -95,12 +96,12 @@ def _scale(rate: Floats, rest: Floats, n: int) -> Floats:
     moved = step[step > 0.0]
     if len(moved) == 0:
         return np.full(len(rate), np.inf)
-    least = _MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0)
+    least = MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0)
     group = min(max(_GROUP, _GROUP_BLOCKS * n), len(rate))
     whole = len(rate) // group * group
     of_steps = np.median(step[:whole].reshape(-1, group), axis=1) / np.sqrt(2.0)
     of_rest = np.median(rest[:whole].reshape(-1, group), axis=1)
-    sigma = np.maximum(_MAD_TO_SIGMA * _running(np.maximum(of_steps, of_rest)), 0.5 * least)
+    sigma = np.maximum(MAD_TO_SIGMA * _running(np.maximum(of_steps, of_rest)), 0.5 * least)
     return np.asarray(_spread(sigma, group, len(rate)), dtype=np.float64)
 
 

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import chdtri, ndtri, stdtrit
+
+from ..metrics import MAD_TO_SIGMA
 
 __all__ = ["Step", "steps_of"]
 
@@ -25,12 +27,11 @@ FALSE_ALARMS = 0.01  # records of which one has a step by chance
 _HALVES_S = (120.0, 600.0, 3000.0)  # half windows: short ones place a large step, long ones find a small one
 _CELLS = 20  # of a half window
 _LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what noise makes
-_MAD_TO_SIGMA = 1.4826  # of normal noise: 1 / 0.67449, the upper quartile of a standard normal
 _PLACES = 3.0  # independent places in a window
 _KNOWN = 0.4  # degrees of freedom of a scale from a median, for each independent place: its efficiency
 _EDGE = 2  # cells on either side of a place that its time may lie in
-_CHI2_95 = 3.841  # chi-squared of one degree of freedom, 95 %
-_NORMAL_95 = 1.96  # standard normal, 95 % on two sides
+_CHI2_95 = float(chdtri(1, 0.05))  # 95 % of one degree of freedom
+_NORMAL_95 = float(ndtri(0.975))  # 95 % on two sides
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ def steps_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Step]:
 
 
 def _noise(z: Floats) -> float:
-    return _MAD_TO_SIGMA * float(np.median(np.abs(z)))
+    return MAD_TO_SIGMA * float(np.median(np.abs(z)))
 
 
 def _largest(steps: list[tuple[Step, float]]) -> list[Step]:

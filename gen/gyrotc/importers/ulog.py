@@ -39,7 +39,8 @@ def open_ulog(path: Path) -> LoggerFile:
     """
     pyulog = library(path, "pyulog", "ulog", "a PX4 log")
     try:
-        log = pyulog.ULog(str(path), [name for name in _UNITS if name not in _NOT_RAW], True)
+        with path.open("rb") as file:
+            log = pyulog.ULog(file, [name for name in _UNITS if name not in _NOT_RAW], True)
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as ULog ({what})", "a whole PX4 log") from error

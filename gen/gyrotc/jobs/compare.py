@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..dataset import Dataset
+from ..dataset import Dataset, Run
 from ..errors import InputError
+from ..frontend import Blocks
 from ..metrics import Averages, average, pooled
 from ..results.comparison import Comparison, Group, Method
 from ..results.evaluation import Pooled
@@ -112,20 +113,26 @@ def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, l
             for k, (run, b) in enumerate((run, front.blocks(run)) for run in exam)
         ]
         return data, [h for h in held if len(h.samples)], "exam"
+    left_out = _left_out(training, data, parts, blocks)
+    return data, [h for h in left_out if h.seen.any()], "left_out"
+
+
+def _left_out(
+    training: Sequence[Run], data: TrainingData, parts: Sequence[TrainingData], blocks: Sequence[Blocks]
+) -> list[_Held]:
+    """Spans of the training runs, or whole runs where these are too short for spans."""
     spans = training_spans(training, data)
-    if spans:
-        masks = [(training[s.run].environment or str(s), s.contains(data.run, data.time_s), s) for s in spans]
-        held = [
-            _Held(name, data.select(mask), ~s.contains(data.run, data.time_s, guard=True))
-            for name, mask, s in masks
-            if mask.any()
-        ]
-    else:
-        held = [
+    if not spans:
+        return [
             _Held(run.environment or run.file, parts[k], data.run != k, blocks[k].begins_s)
             for k, run in enumerate(training)
         ]
-    return data, [h for h in held if h.seen.any()], "left_out"
+    masks = [(training[s.run].environment or str(s), s.contains(data.run, data.time_s), s) for s in spans]
+    return [
+        _Held(name, data.select(mask), ~s.contains(data.run, data.time_s, guard=True))
+        for name, mask, s in masks
+        if mask.any()
+    ]
 
 
 def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions) -> Method:

@@ -186,11 +186,7 @@ def _changes(changes: Changes) -> Iterator[tuple[str, str, str | None]]:
             yield words(name), plain(figure.before), plain(figure.after)
     for name, version in changes.versions.items():
         yield name, version.before or "–", version.after or "–"
-    for kind, part in (
-        ("recordings", changes.recordings),
-        ("findings", changes.findings),
-        ("files", changes.files),
-    ):
+    for kind, part in changes.named:
         for what, names in part:
             if names:
                 yield f"{kind}, {what.replace('_', ' ')}", ", ".join(names), None

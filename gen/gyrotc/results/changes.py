@@ -137,3 +137,8 @@ class Changes(Result):
         default=(),
         description="all calibrations that are known by their chain of `--previous`, this one last",
     )
+
+    @property
+    def named(self) -> tuple[tuple[str, NameChanges], ...]:
+        """What came, went or has other bytes, by what it is."""
+        return ("recordings", self.recordings), ("findings", self.findings), ("files", self.files)
