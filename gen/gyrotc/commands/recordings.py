@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from ..errors import InputError
 from .base import (
     AppliedOption,
     AxisOption,
@@ -25,7 +26,9 @@ from .base import (
 
 @app.command()
 def simulate(
-    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A built-in scenario (paper, ...), a scenario file, or lot: a lot of gyros.")
+    ],
     out: OutOption,
     seed: SeedOption = 1,
     row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
@@ -37,13 +40,37 @@ def simulate(
     noise: Annotated[
         str, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
     ] = "paper",
+    units: Annotated[
+        int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")
+    ] = None,
+    family: Annotated[
+        float | None,
+        typer.Option("--family", help="Of a lot: how much units share, 0 (nothing) ... 1; default 0.9."),
+    ] = None,
+    clusters: Annotated[
+        int | None, typer.Option("--clusters", help="Of a lot: groups with a center each; default 1.")
+    ] = None,
+    strangers: Annotated[
+        int | None, typer.Option("--strangers", help="Of a lot: units that belong to none; default 0.")
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option("--base", help="Of a lot: the scenario that its units run; default paper.")
+    ] = None,
 ) -> None:
-    """Make a data set from the physical simulation, and truth.json beside it.
+    """Make a data set from the physical simulation, and truth.json beside it; or a lot of gyros, a data set each.
 
     Example: gyrotc simulate paper --seed 1 --out demo-data
+    Example: gyrotc simulate lot --units 60 --family 0.94 --seed 1 --out lot-data
     """
     from ..simulate import simulate as run
 
+    of_lot = {"units": units, "family": family, "clusters": clusters, "strangers": strangers}
+    given = {name: value for name, value in of_lot.items() if value is not None}
+    if scenario == "lot":
+        _simulate_lot(given, base or "paper", seed, out, (row_s, raw_hz, pulses, format), noise)
+        return
+    if given or base:
+        raise InputError(f"--{next(iter(given), 'base')}", "is an option of lots", "gyrotc simulate lot")
     with progress() as say:
         run(
             scenario,
@@ -57,6 +84,34 @@ def simulate(
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: data set of scenario {scenario}, seed {seed}")
+
+
+def _simulate_lot(
+    given: dict[str, Any],
+    base: str,
+    seed: int,
+    out: Path,
+    rows: tuple[float, float | None, bool, str],
+    noise: str,
+) -> None:
+    """`gyrotc simulate lot`."""
+    from ..simulate.campaign import RowForm
+    from ..simulate.lot import LotOrder, simulate_lot
+
+    if "units" not in given:
+        raise InputError("--units", "is missing", "the number of gyros of the lot")
+    order = LotOrder(**given)
+    with progress() as say:
+        simulate_lot(
+            order,
+            seed=seed,
+            out=out,
+            scenario=base,
+            form=RowForm.of(*rows),  # type: ignore[arg-type]
+            noise=noise,  # type: ignore[arg-type]
+            progress=lambda share: say(f"simulating {share:.0%}"),
+        )
+    tell(f"{out}: {order.units} data sets of scenario {base}, family {order.family:g}, seed {seed}")
 
 
 @app.command()

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from .base import Numbered, Part
 
-__all__ = ["SimulatedTruth", "TrueRun"]
+__all__ = ["SimulatedTruth", "TrueLot", "TrueRun"]
 
 
 class TrueRun(Part):
@@ -18,6 +18,19 @@ class TrueRun(Part):
     noise: str = Field(description="file of its noise, mean of every step, deg/h, by its path in the folder")
     noise_step_s: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(description="length of a step, s")
     bias_dph: tuple[float, float] = Field(description="lowest and highest true bias, deg/h")
+
+
+class TrueLot(Part):
+    """Where a gyro of a simulated lot stands in it."""
+
+    units: int = Field(description="gyros in the lot")
+    family: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        description="correlation of each parameter between two units of one cluster"
+    )
+    clusters: int = Field(description="groups with a center of their own")
+    cluster: int = Field(description="number of the group, from 0; of a stranger that of none: -1")
+    stranger: bool = Field(description="whether it shares nothing with the lot but the scenario")
+    scores: dict[str, float] = Field(description="every parameter that was drawn, in standard deviations")
 
 
 class SimulatedTruth(Numbered):
@@ -33,3 +46,4 @@ class SimulatedTruth(Numbered):
     causes: tuple[dict[str, Any], ...] = Field(description="`id`, `channel` and parameters of each cause")
     plan: dict[str, Any] = Field(description="gyro, chamber, sensor and channels of the scenario")
     runs: tuple[TrueRun, ...] = Field(description="every run")
+    lot: TrueLot | None = Field(default=None, description="of a gyro of a lot")

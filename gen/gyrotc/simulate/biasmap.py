@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-__all__ = ["BiasMap", "draw"]
+__all__ = ["BiasMap", "draw", "made", "shape_over_range"]
 
 Array = NDArray[np.float64]
 
@@ -77,11 +77,24 @@ def draw(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
         "even": rng.uniform(-0.3, 0.3),
         "even_c_per_min": rng.uniform(1.5, 3.0),
     }
-    spline = CubicSpline(knots_c, values, bc_type="natural")
+    shape = shape_over_range(parameters)
+    low, high = range_dph
+    scale = (high - low) / float(np.ptp(shape))
+    return made(parameters, scale, low - scale * float(shape.min()))
+
+
+def made(parameters: dict[str, Any], scale_dph: float, offset_dph: float) -> BiasMap:
+    """The map of given parameters of the shape."""
+    return BiasMap(parameters, scale_dph, offset_dph, _spline(parameters))
+
+
+def shape_over_range(parameters: dict[str, Any]) -> Array:
+    """The shape on a grid over the operating range, shape (T, dT/dt)."""
     grid_c, grid_slope = np.meshgrid(
         np.linspace(*T_RANGE_C, 118), np.linspace(-R_LIMIT_C_PER_MIN, R_LIMIT_C_PER_MIN, 25), indexing="ij"
     )
-    shape = _shape(parameters, spline, grid_c, grid_slope)
-    low, high = range_dph
-    scale = (high - low) / float(np.ptp(shape))
-    return BiasMap(parameters, scale, low - scale * float(shape.min()), spline)
+    return _shape(parameters, _spline(parameters), grid_c, grid_slope)
+
+
+def _spline(parameters: dict[str, Any]) -> CubicSpline:
+    return CubicSpline(parameters["knots_c"], parameters["knots"], bc_type="natural")

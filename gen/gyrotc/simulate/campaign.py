@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +14,7 @@ import numpy as np
 from ..dataset.text import dataset_toml
 from ..errors import InputError
 from ..outputs import json_text, result_folder
-from ..results.truth import SimulatedTruth, TrueRun
+from ..results.truth import SimulatedTruth, TrueLot, TrueRun
 from .biasmap import BiasMap, draw
 from .instrument import SimulatedRecord, record
 from .noise import CELL_S
@@ -22,7 +23,18 @@ from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
 from .write import Format, SimulatedRunFile
 
-__all__ = ["NOISE", "Noise", "campaign", "gyro_map", "simulate", "with_noise"]
+__all__ = [
+    "NOISE",
+    "Noise",
+    "RowForm",
+    "SimulatedGyro",
+    "campaign",
+    "gyro_map",
+    "records",
+    "simulate",
+    "with_noise",
+    "write_gyro",
+]
 
 Noise = Literal["paper", "class"]
 
@@ -80,24 +92,66 @@ def simulate(
         InputError: scenario, seed, row length or folder cannot be.
     """
     name, plan = read(scenario)
-    length = RowLength.of(row_s, raw_hz)
+    rows = RowForm.of(row_s, raw_hz, pulses, format)
     plan = with_noise(plan, noise)
-    weight = _pulse_weight(plan.noise) if pulses else None
-    runs = _planned(plan)
+    gyro = SimulatedGyro(plan, _serial(plan, seed), gyro_map(plan, seed), seed, _seeds(seed)[1], name)
     report = progress or (lambda share: None)
-    truths = []
     with result_folder(Path(out), "simulate") as stage:
-        folder = stage.folder
-        stage.of(_serial(plan, seed))
-        (folder / "truth").mkdir()
-        for index, made in enumerate(campaign(plan, seed)):
-            file = f"run-{index + 1:02d}.{format}"
-            runs[index] = {"file": file, **runs[index], "power_on_s": made.power_on_s}
-            for share in _write_run(folder / file, format, made, length, weight):
-                report((index + share) / len(runs))
-            truths.append(_truth_of_run(folder, file, made, length, weight))
-        _write_texts(folder, name, plan, seed, weight, runs, truths)
+        stage.of(gyro.serial)
+        write_gyro(stage.folder, gyro, rows, report)
     report(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RowForm:
+    """How rows are written: their length, integer pulses or rates, the format of the files."""
+
+    length: RowLength
+    pulses: bool
+    format: Format
+
+    @classmethod
+    def of(cls, row_s: float, raw_hz: float | None, pulses: bool, format: Format) -> RowForm:
+        """Raises `InputError` for a length that cannot be."""
+        return cls(RowLength.of(row_s, raw_hz), pulses, format)
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedGyro:
+    """One gyro of a scenario: what it is, and what its noise is drawn from.
+
+    Attributes:
+        plan: The scenario, with this gyro's instrument in it.
+        serial: Its serial.
+        bias_map: Its static map.
+        seed: The number that the user gave.
+        seeds: What the noise of its runs is drawn from.
+        scenario: Name of the scenario.
+        lot: What `truth.json` says of its place in a lot.
+    """
+
+    plan: Scenario
+    serial: str
+    bias_map: BiasMap
+    seed: int
+    seeds: np.random.SeedSequence
+    scenario: str
+    lot: TrueLot | None = None
+
+
+def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, report: Callable[[float], None]) -> None:
+    """Writes recordings and truth of one gyro into a folder that is there."""
+    weight = _pulse_weight(gyro.plan.noise) if form.pulses else None
+    runs = _planned(gyro.plan)
+    truths = []
+    (folder / "truth").mkdir()
+    for index, made in enumerate(records(gyro.plan, gyro.bias_map, gyro.seeds)):
+        file = f"run-{index + 1:02d}.{form.format}"
+        runs[index] = {"file": file, **runs[index], "power_on_s": made.power_on_s}
+        for share in _write_run(folder / file, form.format, made, form.length, weight):
+            report((index + share) / len(runs))
+        truths.append(_truth_of_run(folder, file, made, form.length, weight))
+    _write_texts(folder, gyro, weight, runs, truths)
 
 
 def campaign(plan: Scenario, seed: int) -> Iterator[SimulatedRecord]:
@@ -106,10 +160,14 @@ def campaign(plan: Scenario, seed: int) -> Iterator[SimulatedRecord]:
     Raises:
         InputError: the seed is negative.
     """
-    bias_map = gyro_map(plan, seed)
+    return records(plan, gyro_map(plan, seed), _seeds(seed)[1])
+
+
+def records(plan: Scenario, bias_map: BiasMap, seeds: np.random.SeedSequence) -> Iterator[SimulatedRecord]:
+    """The runs of a scenario with a gyro's map, one after the other."""
     runs = _planned(plan)
     first = min(run["started"] for run in runs)
-    for run, child in zip(runs, _seeds(seed)[1].spawn(len(runs)), strict=True):
+    for run, child in zip(runs, seeds.spawn(len(runs)), strict=True):
         day = (run["started"] - first) / timedelta(days=1)
         yield record(plan, plan.profile[run["environment"]], bias_map, day, child)
 
@@ -181,16 +239,15 @@ def _truth_of_run(
 
 def _write_texts(
     folder: Path,
-    name: str,
-    plan: Scenario,
-    seed: int,
+    gyro: SimulatedGyro,
     weight: float | None,
     runs: list[dict[str, Any]],
     truths: list[TrueRun],
 ) -> None:
+    plan = gyro.plan
     head: dict[str, Any] = {
         "schema": 1,
-        "serial": _serial(plan, seed),
+        "serial": gyro.serial,
         "description": f"{plan.title} (simulated)",
         "earth_rate": "none",
     }
@@ -203,16 +260,17 @@ def _write_texts(
     }
     (folder / "dataset.toml").write_text(dataset_toml(head, tables, runs), "utf-8")
     truth = SimulatedTruth(
-        scenario=name,
-        seed=seed,
+        scenario=gyro.scenario,
+        seed=gyro.seed,
         noise=levels,
-        map=gyro_map(plan, seed).described(),
+        map=gyro.bias_map.described(),
         causes=tuple(
             {"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause
         ),
         plan=plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
         runs=tuple(truths),
     )
+    truth = truth.model_copy(update={"lot": gyro.lot}) if gyro.lot else truth
     (folder / TRUTH_FILE).write_text(json_text(truth.content()), "ascii")
 
 

@@ -187,7 +187,7 @@ def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, A
 
 def _readings(scenario: Scenario, sensed_c: Array, rng: np.random.Generator) -> Array:
     sensor = scenario.sensor
-    reading = sensed_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
+    reading = sensed_c + sensor.offset_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
     if not sensor.resolution_c:
         return np.asarray(reading)
     return np.asarray(sensor.resolution_c * np.round(reading / sensor.resolution_c))

@@ -101,6 +101,7 @@ class Sensor(_Strict):
     lag_s: NonNegative = 10.0
     noise_c: NonNegative = 0.01
     resolution_c: NonNegative = 0.01
+    offset_c: Annotated[float, Field(ge=-10.0, le=10.0)] = 0.0
 
 
 class NoiseLevels(_Strict):
