@@ -45,18 +45,18 @@ def planted_lots(draws: int, seed: int) -> dict[str, Any]:
             lot.write(folder / "data")
             (folder / "data" / "fleet.toml").write_text(_MANIFEST)
             entries = run_fleet(load_manifest(folder / "data" / "fleet.toml"), folder / "out", jobs=_JOBS)
-            found = {reason["name"]: reason for reason in summary_of(entries)["apart"]}
+            found = {reason.name: reason for reason in summary_of(entries).apart}
         concerned = set().union(*lot.planted.values())
         for fault, names in lot.planted.items():
-            named[fault] += all(found.get(name, {}).get("id") == fault for name in names)
             missed = {
-                name: found.get(name, {}).get("text")
+                name: reason.text if (reason := found.get(name)) else None
                 for name in names
-                if found.get(name, {}).get("id") != fault
+                if name not in found or found[name].id != fault
             }
+            named[fault] += not missed
             if missed:
                 print(f"draw {draw}: {fault} not named: {missed}", flush=True)
-        accused += [f"draw {draw}: {found[name]['text']} ({name})" for name in found if name not in concerned]
+        accused += [f"draw {draw}: {found[name].text} ({name})" for name in found if name not in concerned]
         healthy += 3 * _UNITS - len(concerned)
     for text in accused:
         print("accused:", text)

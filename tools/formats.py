@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gyrotc.emit.record import EmissionRecord
 from gyrotc.model import Model
-from gyrotc.results.base import Numbered
+from gyrotc.results.base import Part
 from gyrotc.results.changes import Changes
 from gyrotc.results.check import Checked
 from gyrotc.results.comparison import Comparison
@@ -20,8 +20,10 @@ from gyrotc.results.describe import schema_text, tables
 from gyrotc.results.diagnosed import Diagnosed
 from gyrotc.results.emission import Emitted
 from gyrotc.results.evaluation import Evaluation
+from gyrotc.results.fleet import FleetEntry, FleetSummary
 from gyrotc.results.limits import HeldLimits
 from gyrotc.results.manifest import Manifest
+from gyrotc.results.marker import Marker
 from gyrotc.results.planned import Plan
 from gyrotc.results.training import Training
 from gyrotc.results.truth import SimulatedTruth
@@ -32,17 +34,20 @@ ROOT = Path(__file__).resolve().parents[1]
 FORMAT = ROOT / "docs" / "FORMAT.md"
 SCHEMAS = ROOT / "gen" / "gyrotc" / "results" / "schemas"
 
-RESULTS: dict[str, type[Numbered]] = {
+RESULTS: dict[str, type[Part]] = {
     "changes": Changes,
     "check": Checked,
     "compare": Comparison,
     "diagnose": Diagnosed,
     "emission": EmissionRecord,
     "emit": Emitted,
+    "entry": FleetEntry,
     "evaluate": Evaluation,
+    "fleet": FleetSummary,
     "limits": HeldLimits,
     "manifest": Manifest,
     "plan": Plan,
+    "result": Marker,
     "training": Training,
     "truth": SimulatedTruth,
     "verify": Verification,
@@ -50,7 +55,7 @@ RESULTS: dict[str, type[Numbered]] = {
 }
 """Results whose tables stand in docs/FORMAT.md."""
 
-TOLD_ABOVE: dict[str, tuple[type[Numbered], ...]] = {"verify-axes": (Verification,)}
+TOLD_ABOVE: dict[str, tuple[type[Part], ...]] = {"entry": (FleetSummary,), "verify-axes": (Verification,)}
 """Results whose objects are those of a result above them."""
 
 KINDS: dict[str, type[BaseModel]] = {**RESULTS, "model": Model}

@@ -15,6 +15,7 @@ from gyrotc.jobs.fleet import load_manifest
 from gyrotc.jobs.fleet.fingerprint import program_of
 from gyrotc.jobs.fleet.unit import Task, do_unit
 from gyrotc.outputs import faults
+from gyrotc.results.fleet import FleetEntry
 
 from .driver import run
 from .jobs import GYROTC, Case, command
@@ -66,9 +67,9 @@ def _calls_of_a_unit(root: Path, manifest: Path) -> int:
     return end.calls
 
 
-def _refuse_failed(entry: Mapping[str, Any]) -> None:
-    if entry["status"] != "done":
-        raise SystemExit(str(entry["reason"]))
+def _refuse_failed(entry: FleetEntry) -> None:
+    if entry.status != "done":
+        raise SystemExit(str(entry.reason))
 
 
 def _disagreement(out: Path) -> list[str]:

@@ -18,6 +18,7 @@ from gyrotc.judge.advice import advice_of
 from gyrotc.judge.changes import earlier_models
 from gyrotc.judge.check import CheckResult, Doubt, check
 from gyrotc.judge.doubts import __file__ as doubts_file
+from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
 
@@ -225,6 +226,11 @@ def test_rows_and_what_to_do_next_stand_in_the_json(tmp_path: Path) -> None:
     assert "Look at the logger" in doubt["next"]
 
 
+def _entry(name: str, curve: list[float | None]) -> FleetEntry:
+    facts = Facts(curve=tuple(curve), runs=(), series=None)
+    return FleetEntry(name=name, axis=None, status="done", facts=facts)
+
+
 @pytest.mark.parametrize("reversed_unit", [None, 3])
 def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
     from gyrotc.jobs.fleet.turned import turned
@@ -239,7 +245,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
         curve = -curve if k == reversed_unit else curve
         inside = (t >= -40.0) & (t <= 60.0)
         held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
-        entries.append({"name": f"u{k}", "axis": None, "findings": [], "facts": {"curve": held}})
+        entries.append(_entry(f"u{k}", held))
     assert turned(entries) == ([] if reversed_unit is None else ["u3"])
 
 
@@ -248,10 +254,7 @@ def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
 
     g = np.random.default_rng(2)
     for _ in range(200):
-        entries = [
-            {"name": f"u{k}", "axis": None, "facts": {"curve": g.normal(0.0, 1.0, 38).cumsum().tolist()}}
-            for k in range(12)
-        ]
+        entries = [_entry(f"u{k}", g.normal(0.0, 1.0, 38).cumsum().tolist()) for k in range(12)]
         assert turned(entries) == []
 
 

@@ -20,6 +20,7 @@ from conftest import Command
 from gyrotc.errors import InputError
 from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
 from gyrotc.jobs.fleet.unit import Task, do_unit
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -73,8 +74,7 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
     fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
     [entry] = run_fleet(fleet, tmp_path / "quick", jobs=1)
     [whole] = run_fleet(fleet, tmp_path / "full", jobs=1, full=True)
-    names = set(entry) - {"key", "results", "seal"}
-    assert {name: entry[name] for name in names} == {name: whole[name] for name in names}
+    assert entry.model_copy(update={"key": None}) == whole.model_copy(update={"key": None})
     assert (tmp_path / "full" / "RLG-1" / "report.html").is_file()
     for name in ("model.json", "c/gtc_rlg_1.c", "c/gtc_rlg_1.bin"):
         assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (
@@ -96,8 +96,8 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     fleet = load_manifest(manifest)
     assert [unit.name for unit in fleet.units] == ["RLG-1", "IMU-x", "IMU-y"]
     entries = run_fleet(fleet, tmp_path / "out", jobs=2)
-    assert [entry["status"] for entry in entries] == ["failed"] * 3
-    assert "limit at_most.table_bytes = 8.0 is not met" in entries[0]["reason"]
+    assert [entry.status for entry in entries] == ["failed"] * 3
+    assert "limit at_most.table_bytes = 8.0 is not met" in (entries[0].reason or "")
     assert json.loads((tmp_path / "out" / "IMU-x" / "model.json").read_text())["block_s"] == 20.0
     assert json.loads((tmp_path / "out" / "IMU-y" / "limits.json").read_text())["met"] is False
 
@@ -136,8 +136,8 @@ def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         gyro(tmp_path / "d" / name, "RLG-1")
     entries = run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out")
-    assert [entry["status"] for entry in entries] == ["failed", "failed"]
-    assert "serial RLG-1 is also that of another" in entries[0]["reason"]
+    assert [entry.status for entry in entries] == ["failed", "failed"]
+    assert "serial RLG-1 is also that of another" in (entries[0].reason or "")
 
 
 def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) -> None:
@@ -174,7 +174,7 @@ def test_no_file_of_the_summary_outlives_what_it_says(
     manifest.write_text('schema = 1\ndatasets = ["d/*"]\n[options]\nseed = 1\n')
 
     def stopped(_jobs: int, tasks: Sequence[Task]) -> Iterator[Any]:
-        assert do_unit(tasks[0])["status"] == "done"
+        assert do_unit(tasks[0]).status == "done"
         raise KeyboardInterrupt
         yield
 
@@ -204,13 +204,22 @@ def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(t
     assert sorted(p.name for p in out.glob(".*.lock")) == [".thesis.lock"]
 
 
-def _entries(n: int, seed: int) -> list[dict[str, Any]]:
+def _entries(n: int, seed: int) -> list[FleetEntry]:
     draw = np.random.default_rng(seed)
     names = ("before_rms_dph", "after_rms_dph", "noise_floor_dph", "rms_over_floor", "sum_abs_weights_dph")
     return [
-        {"name": f"RLG-{k}"} | {name: float(np.exp(0.1 * draw.normal())) for name in names}
-        | {"bias_dph": draw.normal(), "after_mean_dph": 1e-5 * draw.normal()} for k in range(n)
-    ]  # fmt: skip
+        _entry(
+            f"RLG-{k}",
+            **{name: float(np.exp(0.1 * draw.normal())) for name in names},
+            bias_dph=draw.normal(),
+            after_mean_dph=1e-5 * draw.normal(),
+        )
+        for k in range(n)
+    ]
+
+
+def _entry(name: str, **figures: float) -> FleetEntry:
+    return FleetEntry(name=name, axis=None, status="done").model_copy(update=figures)
 
 
 def test_the_odd_gyro_is_named_and_an_even_fleet_has_none() -> None:
@@ -219,8 +228,8 @@ def test_the_odd_gyro_is_named_and_an_even_fleet_has_none() -> None:
     even = _entries(200, seed)
     far = outliers(even)
     assert len(far) <= 2, "5 robust standard deviations of 1400 normal figures"
-    even[7]["after_rms_dph"] *= 3.0
-    even[9]["bias_dph"] = 30.0
+    even[7] = even[7].model_copy(update={"after_rms_dph": 3.0 * (even[7].after_rms_dph or 0.0)})
+    even[9] = even[9].model_copy(update={"bias_dph": 30.0})
     assert {(o.name, o.figure) for o in outliers(even)} - {(o.name, o.figure) for o in far} == {
         ("RLG-7", "after_rms_dph"),
         ("RLG-9", "bias_dph"),
@@ -230,10 +239,10 @@ def test_the_odd_gyro_is_named_and_an_even_fleet_has_none() -> None:
 
 def test_alike_gyros_do_not_stand_apart_by_a_hair() -> None:
     """Figures that all agree to the last digits have no scatter to stand out of."""
-    entries = [{"name": f"{k}", "noise_floor_dph": 1e-3, "bias_dph": 1.0} for k in range(20)]
-    entries[3]["noise_floor_dph"] = 1.01e-3
+    entries = [_entry(f"{k}", noise_floor_dph=1e-3, bias_dph=1.0) for k in range(20)]
+    entries[3] = _entry("3", noise_floor_dph=1.01e-3, bias_dph=1.0)
     assert outliers(entries) == []
-    entries[3]["noise_floor_dph"] = 1.1e-3
+    entries[3] = _entry("3", noise_floor_dph=1.1e-3, bias_dph=1.0)
     assert [o.name for o in outliers(entries)] == ["3"]
 
 
@@ -259,7 +268,7 @@ def test_on_dask(tmp_path: Path) -> None:
         entries = run_fleet(
             load_manifest(tmp_path / "d"), tmp_path / "out", scheduler=cluster.scheduler_address
         )
-    assert [entry["status"] for entry in entries] == ["done"] * 3
+    assert [entry.status for entry in entries] == ["done"] * 3
 
 
 def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:

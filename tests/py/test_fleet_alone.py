@@ -25,6 +25,7 @@ from gyrotc.jobs.fleet.manifest import SUMMARY
 from gyrotc.jobs.fleet.unit import Task, do_unit, done_before
 from gyrotc.judge.limits import load_limits
 from gyrotc.outputs import MARKER, Lock, faults
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -51,7 +52,7 @@ def task(tmp_path: Path) -> Task:
 def test_done_is_done_until_a_byte_of_a_recording_changes(task: Task) -> None:
     assert done_before(task) is None
     made = do_unit(task)
-    assert made["status"] == "done", made
+    assert made.status == "done", made
     assert done_before(task) == made
     path = task.unit.dataset / "run-01.csv"
     data, facts = bytearray(path.read_bytes()), path.stat()
@@ -75,7 +76,7 @@ def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_pat
     assert done_before(replace(task, full=True)) is None
     assert done_before(replace(task, program="0" * 64)) is None
     stranger = do_unit(replace(task, program="0" * 64))
-    assert stranger["status"] == "failed" and "not the one that asks" in stranger["reason"]
+    assert stranger.status == "failed" and "not the one that asks" in (stranger.reason or "")
     assert done_before(task) is not None
 
 
@@ -122,12 +123,12 @@ def test_a_tampered_result_is_not_done(case: str, task: Task) -> None:
     damaged = {path.relative_to(task.out): path.read_bytes() for path in task.out.rglob("*.*")}
     again = do_unit(task)
     if case == "a list of the marker":  # model.json is then a file that gyrotc did not write
-        assert again["status"] == "failed" and "model.json" in again["reason"]
+        assert again.status == "failed" and "model.json" in (again.reason or "")
         return
-    assert again["status"] == "done"
+    assert again.status == "done"
     assert _stable(task.out) == before
-    if "aside" in again:  # nobody's file is lost
-        aside = task.out.with_name(again["aside"])
+    if again.aside:  # nobody's file is lost
+        aside = task.out.with_name(again.aside)
         assert {path.relative_to(aside): path.read_bytes() for path in aside.rglob("*.*")} == damaged
     else:
         assert case in ("half the files", "the evaluation")
@@ -140,8 +141,8 @@ def test_a_foreign_file_in_a_result_stays_and_stops_its_gyro_alone(task: Task) -
     assert done_before(task) is not None
     other = replace(task, fleet=replace(task.fleet, options=FitOptions(seed=1)))
     entry = do_unit(other)
-    assert entry["status"] == "failed" and "notes.txt" in entry["reason"]
-    assert "its folder holds an earlier result" in entry["reason"]
+    assert entry.status == "failed" and "notes.txt" in (entry.reason or "")
+    assert "its folder holds an earlier result" in (entry.reason or "")
     assert done_before(task) is not None and (task.out / "notes.txt").read_text() == "mine"
 
 
@@ -157,7 +158,7 @@ def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         yield 0, do_unit(tasks[0])
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
-    assert run_fleet(fleet, out)[0]["status"] == "done"
+    assert run_fleet(fleet, out)[0].status == "done"
     assert told and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
 
 
@@ -197,16 +198,16 @@ def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
     shutil.copytree(task.out, out / ".RLG-1.gyrotc-part-01234567")
     (out / ".RLG-1.lock").touch()
     busy = Lock(out / "RLG-1", "verify")
-    assert run_fleet(task.fleet, out)[0]["kept"]
+    assert run_fleet(task.fleet, out)[0].kept
     busy.release()
-    assert run_fleet(task.fleet, out)[0]["kept"]
+    assert run_fleet(task.fleet, out)[0].kept
     assert {path.name for path in out.iterdir()} == before
 
 
 def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:
     (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\ncenters = 20\n")
     limited = replace(task, fleet=replace(task.fleet, limits=load_limits(tmp_path / "limits.toml")))
-    assert do_unit(limited)["status"] == "done"
+    assert do_unit(limited).status == "done"
     (limited.out / "limits.json").unlink()
     assert done_before(limited) is None
 
@@ -225,7 +226,7 @@ def test_recordings_that_change_while_they_are_read_are_refused(
     whole = unit.load
     monkeypatch.setattr(unit, "load", load)
     entry = do_unit(task)
-    assert entry["status"] == "failed" and "changed while they were read" in entry["reason"]
+    assert entry.status == "failed" and "changed while they were read" in (entry.reason or "")
     assert not task.out.exists()
 
 
@@ -310,11 +311,11 @@ def test_wrong_types_in_a_manifest_are_refused(line: str, tmp_path: Path) -> Non
         load_manifest(tmp_path / "fleet.toml")
 
 
-def _dies(task: Any) -> dict[str, Any]:
+def _dies(task: Any) -> FleetEntry:
     """Stands in for a job: of those in `dying` the process is killed, as by a system out of memory."""
     if task.unit.name in task.fleet.numerics:
         os.kill(os.getpid(), signal.SIGKILL)
-    return {"name": task.unit.name, "axis": None, "status": "done"}
+    return FleetEntry(name=task.unit.name, axis=None, status="done")
 
 
 def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -322,10 +323,10 @@ def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch:
     units = tuple(Unit(tmp_path / f"RLG-{k}", None) for k in range(4))
     fleet = Fleet(units, FitOptions(), ("RLG-1",), None)
     entries = run_fleet(fleet, tmp_path / "out", jobs=1)
-    assert [entry["name"] for entry in entries] == [unit.name for unit in units]
-    died = {entry["name"] for entry in entries if "its process died" in entry.get("reason", "")}
+    assert [entry.name for entry in entries] == [unit.name for unit in units]
+    died = {entry.name for entry in entries if "its process died" in (entry.reason or "")}
     assert died == {"RLG-1"}
-    assert sum(entry["status"] == "done" for entry in entries) == 3
+    assert sum(entry.status == "done" for entry in entries) == 3
 
 
 def test_a_summary_never_speaks_of_what_is_being_done_again(

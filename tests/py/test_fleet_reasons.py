@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.jobs.fleet.copies import Copy
 from gyrotc.jobs.fleet.facts import facts_of, step_in
-from gyrotc.jobs.fleet.reasons import Reason, reasons
+from gyrotc.jobs.fleet.reasons import reasons
 from gyrotc.metrics import Averages
+from gyrotc.results.fleet import Copy, FleetEntry, Reason
 from lot import AXES, FAULTS, Lot
 
 MEANS = 5  # rows of a mean: 100 s
 
 
-def entries(lot: Lot) -> Iterator[dict[str, Any]]:
+def entries(lot: Lot) -> Iterator[FleetEntry]:
     """Entries as a fleet makes them; a cubic in T stands for the map."""
     for name, runs in lot.runs.items():
         means = [{k: v.reshape(-1, MEANS).mean(axis=1) for k, v in run.items()} for run in runs]
@@ -35,13 +34,14 @@ def entries(lot: Lot) -> Iterator[dict[str, Any]]:
             ]
             facts = facts_of([(f"run-{k:02d}.csv", a) for k, a in enumerate(told, 1)])
             spikes = sum(int((np.abs(np.diff(run[f"rate_{axis}_dph"])) > 0.04).sum()) // 2 for run in runs)
-            yield {
-                "name": f"{name}-{axis}",
-                "dataset": name,
-                "axis": axis,
-                "facts": facts,
-                "rows_left_out": spikes,
-            }
+            yield FleetEntry(
+                name=f"{name}-{axis}",
+                dataset=name,
+                axis=axis,
+                status="done",
+                facts=facts,
+                rows_left_out=spikes,
+            )
 
 
 def planted(seed: int, faults: tuple[str, ...]) -> tuple[Lot, dict[str, Reason]]:
@@ -51,7 +51,11 @@ def planted(seed: int, faults: tuple[str, ...]) -> tuple[Lot, dict[str, Reason]]
     copied = []
     if names := sorted(lot.planted.get("copy_of_other", ())):
         one, other = names[0], names[-1]
-        copied = [Copy(one[:-1] + a, one[:-2], other[:-1] + b, other[:-2], 1.0) for a in AXES for b in AXES]
+        copied = [
+            Copy(name=one[:-1] + a, serial=one[:-2], other=other[:-1] + b, other_serial=other[:-2], share=1.0)
+            for a in AXES
+            for b in AXES
+        ]
     return lot, {reason.name: reason for reason in reasons(list(entries(lot)), copied)}
 
 

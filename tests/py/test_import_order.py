@@ -13,9 +13,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
 ORDER = [
     "errors",
     "status",
-    "outputs",
     "inputs",
     "results",
+    "outputs",
     "texts",
     "metrics",
     "_core",

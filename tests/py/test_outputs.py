@@ -218,7 +218,10 @@ def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
 
 def _forged(folder: Path, *parts: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    text = {"schema": "gyrotc.result/1", "kind": "result", "command": "build", "serial": "A", "axis": None}
+    text = {
+        "schema": "gyrotc.result/1", "gyrotc_version": "0.1.0", "kind": "result", "command": "build",
+        "serial": "A", "axis": None,
+    }  # fmt: skip
     (folder / MARKER).write_text(json.dumps(text | {"files": {}, "parts": parts}))
 
 

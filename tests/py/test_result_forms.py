@@ -11,10 +11,13 @@ from types import ModuleType
 import pytest
 from conftest import ROOT, Command
 from gyrotc.errors import InputError
+from gyrotc.outputs.marker import marker_of, marker_text
 from gyrotc.results.base import checked_result
 from gyrotc.results.changes import Apart, At
 from gyrotc.results.describe import tables
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.limits import HeldLimits, Limit
+from gyrotc.results.marker import Marker
 
 
 def _tool() -> ModuleType:
@@ -77,6 +80,29 @@ def test_unknown_fields_are_let_through_and_wrong_ones_refused_by_name() -> None
         with pytest.raises(InputError) as caught:
             checked_result(content | change, HeldLimits, "limits.json")
         assert told in str(caught.value)
+
+
+def test_an_entry_of_a_fleet_tells_the_summary_what_it_may_know() -> None:
+    entry = FleetEntry(
+        name="A", dataset="d", axis=None, status="done", serial="1", bias_dph=None, findings=("large_weights",),
+        key="0" * 64, sketch="0" * 16,
+    )  # fmt: skip
+    assert entry.told().content() == {
+        "name": "A", "dataset": "d", "axis": None, "status": "done", "serial": "1", "bias_dph": None,
+        "findings": ["large_weights"],
+    }  # fmt: skip
+    assert entry.as_kept().kept and entry.as_kept() != entry and entry.as_kept().content() == entry.content()
+
+
+def test_a_marker_is_written_by_name_and_says_no_more_than_it_has_to() -> None:
+    marker = marker_of("result", "build").but(files={"b": "1", "a": "2"}, parts=("z", "y"))
+    assert list(json.loads(marker_text(marker))["files"]) == ["a", "b"]
+    assert json.loads(marker_text(marker))["parts"] == ["y", "z"]
+    assert not {"pending", "unfinished"} & set(
+        json.loads(marker_text(marker.but(pending={}, unfinished=False)))
+    )
+    again = checked_result(json.loads(marker_text(marker.but(unfinished=True))), Marker, "marker")
+    assert again.unfinished and again.known("a") == {"2"} and again.entries() == {"a", "b", "y", "z"}
 
 
 def test_a_result_that_is_no_number_cannot_be_made() -> None:

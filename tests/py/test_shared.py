@@ -12,6 +12,7 @@ from gyrotc.dataset.shared import fingerprints_of, windows_in_common, windows_th
 from gyrotc.errors import InputError
 from gyrotc.jobs.fleet.copies import copies
 from gyrotc.judge.check import check
+from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
 
@@ -108,11 +109,12 @@ def test_a_copy_under_another_serial_is_named() -> None:
     words = [f"{k:016x}" for k in range(300)]
     own = {"A": words[:100], "B": words[100:200], "C": words[200:280] + words[:20]}
     entries = [
-        {"name": name, "serial": name, "sketch": "".join(mine), "findings": []} for name, mine in own.items()
+        FleetEntry(name=name, axis=None, status="done", serial=name, sketch="".join(mine))
+        for name, mine in own.items()
     ]
     [found] = copies(entries)
     assert (found.name, found.other, found.share) == ("A", "C", 0.2)
-    assert copies([e | {"serial": "A"} for e in entries]) == []  # axes of one gyro
+    assert copies([e.model_copy(update={"serial": "A"}) for e in entries]) == []  # axes of one gyro
 
 
 def test_values_beyond_float32_are_no_trouble() -> None:

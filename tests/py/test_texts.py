@@ -25,6 +25,7 @@ from gyrotc.dataset.schema import parse_description
 from gyrotc.dataset.text import dataset_toml
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import InputError
+from gyrotc.inputs import checked
 from gyrotc.jobs.diagnosis import extended_scenario
 from gyrotc.jobs.fleet.manifest import load_manifest
 from gyrotc.jobs.fleet.page import write_summary
@@ -36,6 +37,7 @@ from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
 from gyrotc.results.base import checked_result
 from gyrotc.results.diagnosed import Diagnosed, Estimate
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.texts import (
@@ -424,7 +426,7 @@ def test_the_page_and_the_table_of_a_fleet(tmp_path: Path) -> None:
     ]
 
     def fleet(text: Callable[[], str]) -> str:
-        write_summary(tmp_path, _with(entries, text))
+        write_summary(tmp_path, [checked(FleetEntry, e, "entry") for e in _with(entries, text)])
         return (tmp_path / "fleet.html").read_text("utf-8")
 
     _same_page(fleet)

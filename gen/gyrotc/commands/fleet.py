@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import CheckFailed
 from .base import JsonOption, OutOption, app, progress, tell, time_left, write_json
+
+if TYPE_CHECKING:
+    from ..results.fleet import FleetEntry, FleetSummary
 
 
 @app.command()
@@ -35,31 +38,36 @@ def fleet(
     Example: gyrotc fleet recordings --out fleet
     """
     from ..jobs.fleet import load_manifest, run_fleet, summary_of
-    from ..pages.words import words
 
     wanted = load_manifest(manifest)
     with progress() as say:
         told = _Told(len(wanted.units), say)
         entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=told)
     summary = summary_of(entries)
-    write_json(json_file, summary)
-    for reason in summary["apart"]:
-        tell(f"stands apart: {reason['name']}: {reason['text']}")
-    named = {reason["name"] for reason in summary["apart"]}
-    for outlier in summary["outliers"]:
-        if outlier["name"] not in named:
-            tell(
-                f"stands apart: {outlier['name']}: {words(outlier['figure'])}: {outlier['value']:.3g}, median of its "
-                f"axis {outlier['median']:.3g} ({outlier['sigmas']:.0f} robust standard deviations)"
-            )
-    for copy in summary["copies"]:
+    write_json(json_file, summary.content())
+    _tell_comparison(summary)
+    tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
+    if summary.failed:
+        raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed")
+
+
+def _tell_comparison(summary: FleetSummary) -> None:
+    """A line for what each gyro was found by, when it was compared with the others."""
+    from ..pages.words import words
+
+    for reason in summary.apart:
+        tell(f"stands apart: {reason.name}: {reason.text}")
+    named = {reason.name for reason in summary.apart}
+    for outlier in (outlier for outlier in summary.outliers if outlier.name not in named):
         tell(
-            f"copy of another: {copy['name']} (serial {copy['serial']}) has about {copy['share']:.0%} of its rows in "
-            f"common with {copy['other']} (serial {copy['other_serial']}): one gyro under two serials"
+            f"stands apart: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
+            f"axis {outlier.median:.3g} ({outlier.sigmas:.0f} robust standard deviations)"
         )
-    tell(f"{summary['done']} of {summary['units']} done, {summary['failed']} failed: {out / 'fleet.html'}")
-    if summary["failed"]:
-        raise CheckFailed(f"{summary['failed']} of {summary['units']} gyros failed")
+    for copy in summary.copies:
+        tell(
+            f"copy of another: {copy.name} (serial {copy.serial}) has about {copy.share:.0%} of its rows in "
+            f"common with {copy.other} (serial {copy.other_serial}): one gyro under two serials"
+        )
 
 
 class _Told:
@@ -70,26 +78,26 @@ class _Told:
         self._seen, self._done = 0, 0
         say(f"{total} gyros")
 
-    def __call__(self, entry: dict[str, Any]) -> None:
+    def __call__(self, entry: FleetEntry) -> None:
         self._seen += 1
-        self._done += not entry.get("kept")  # what is kept takes no time
+        self._done += not entry.kept  # what is kept takes no time
         _tell_entry(entry)
         left = time_left(self._done, self._total - self._seen + self._done, time.monotonic() - self._start)
         self._say(f"{self._seen} of {self._total} gyros{left}")
 
 
-def _tell_entry(entry: dict[str, Any]) -> None:
+def _tell_entry(entry: FleetEntry) -> None:
     """One line a gyro."""
-    kept = " (done before)" if entry.get("kept") else ""
-    text = f"{entry['name']}: {entry['status']}{kept}"
-    if entry.get("after_rms_dph") is not None:
-        floor = "" if entry["rms_over_floor"] is None else f" = {entry['rms_over_floor']:.3f} x noise floor"
+    kept = " (done before)" if entry.kept else ""
+    text = f"{entry.name}: {entry.status}{kept}"
+    if entry.after_rms_dph is not None:
+        floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
         text += (
-            f"; RMS {entry['before_rms_dph']:.3e} -> {entry['after_rms_dph']:.3e} deg/h{floor}, "
-            f"{entry['centers']} centers, {entry['table_bytes']} bytes"
+            f"; RMS {entry.before_rms_dph:.3e} -> {entry.after_rms_dph:.3e} deg/h{floor}, "
+            f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
-    if entry["status"] != "done":
-        text += f"; {entry['reason']}"
-    if entry.get("aside"):
-        text += f"; its earlier result had been changed and is now {entry['aside']}"
+    if entry.status != "done":
+        text += f"; {entry.reason}"
+    if entry.aside:
+        text += f"; its earlier result had been changed and is now {entry.aside}"
     tell(text)

@@ -7,7 +7,6 @@ import secrets
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from ..errors import GyrotcError, InputError
@@ -15,7 +14,20 @@ from .exchange import can_exchange, exchange
 from .files import check_replaceable, sync_folder, unfinished, write_atomically
 from .interrupts import deferred
 from .lock import Lock
-from .marker import KINDS, MARKER, OWN, Marker, faults, is_inside, read_marker, remove_listed, sha256, walk
+from .marker import (
+    KINDS,
+    MARKER,
+    OWN,
+    Marker,
+    faults,
+    is_inside,
+    marker_of,
+    marker_text,
+    read_marker,
+    remove_listed,
+    sha256,
+    walk,
+)
 from .places import check_apart, check_contents, check_serial, final_place, prefix_of
 from .update import Update, write_marker
 
@@ -50,7 +62,7 @@ class Stage:
         if not self._job.any_serial and not self._part:
             check_serial(self._job.out, self._job.earlier, serial)
         parts = self._job.parts
-        parts[self._part] = replace(parts[self._part], serial=serial, axis=axis)
+        parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
 
     def stale(self) -> None:
         """Says that what else gyrotc wrote into the folder no longer holds: it is removed when the new files come.
@@ -149,7 +161,7 @@ class _Job:
             self._clean()
             self._clean_parts()
             self.earlier = check_contents(out, self.place, kind or None, entries)
-            self.parts = {"": Marker(kind or (self.earlier.kind if self.earlier else "result"), command)}
+            self.parts = {"": marker_of(kind or (self.earlier.kind if self.earlier else "result"), command)}
             self.work = self._begun = self._begin()
         except BaseException:
             self._lock.release()
@@ -162,7 +174,7 @@ class _Job:
         work = self.place.parent / f"{self._prefix}{secrets.token_hex(4)}"
         work.mkdir(mode=0o755)
         try:
-            (work / MARKER).write_text(replace(self.parts[""], unfinished=True).text(), encoding="utf-8")
+            (work / MARKER).write_text(marker_text(self.parts[""].but(unfinished=True)), encoding="utf-8")
         except BaseException:
             (work / MARKER).unlink(missing_ok=True)
             work.rmdir()
@@ -177,7 +189,7 @@ class _Job:
         name = path.resolve().relative_to(self.work).as_posix()
         name = "" if name == "." else name
         path.mkdir(parents=True, exist_ok=True)
-        self.parts.setdefault(name, Marker(kind, command))
+        self.parts.setdefault(name, marker_of(kind, command))
         return Stage(path, self, name)
 
     def whole(self) -> None:
@@ -324,7 +336,7 @@ def _described(folder: Path, marker: Marker, parts: tuple[str, ...]) -> Marker:
             _remove_empty_folders(folder, name)
         else:
             files[name] = sha256(folder / name, sync=True)
-    return replace(marker, files=files, parts=parts)
+    return marker.but(files=files, parts=parts)
 
 
 def _remove_empty_folders(folder: Path, name: str) -> None:

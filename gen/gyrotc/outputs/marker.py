@@ -12,21 +12,21 @@ import os
 import shutil
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from .. import __version__
 from ..errors import InputError
+from ..results.base import checked_result
+from ..results.marker import Marker
 from .jsontext import json_text
 
 __all__ = [
-    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "is_inside", "read_marker",
-    "remove_listed", "sha256", "survey", "walk",
+    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "is_inside", "marker_of", "marker_text",
+    "read_marker", "remove_listed", "sha256", "survey", "walk",
 ]  # fmt: skip
 
 MARKER = ".gyrotc-result.json"
-SCHEMA = "gyrotc.result/1"
+SCHEMA = Marker.schema_id()
 KINDS = {
     "build": "result",
     "fit": "result",
@@ -50,55 +50,16 @@ OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
 _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 
-@dataclass(frozen=True, slots=True)
-class Marker:
-    """The content of a marker file.
+def marker_of(kind: str = "", command: str = "") -> Marker:
+    """A marker of no files yet, of no one gyro."""
+    return Marker(
+        gyrotc_version=__version__, kind=kind, command=command, serial=None, axis=None, files={}, parts=()
+    )
 
-    Attributes:
-        kind: What the folder holds, see `KINDS`.
-        command: That wrote it last.
-        serial, axis: Whose it is, where that is known.
-        files: SHA-256 of each file, by its path in the folder. Files of parts stand in the parts' own markers.
-        parts: Folders inside that are results with a marker of their own.
-        pending: While entries of the folder change places one by one: for each the files it will have.
-        unfinished: A folder that is being written and has not got its name yet; all in it is gyrotc's.
-    """
 
-    kind: str
-    command: str
-    serial: str | None = None
-    axis: str | None = None
-    files: dict[str, str] = field(default_factory=dict)
-    parts: tuple[str, ...] = ()
-    pending: dict[str, dict[str, str]] = field(default_factory=dict)
-    unfinished: bool = False
-
-    def text(self) -> str:
-        """The marker as JSON."""
-        content: dict[str, Any] = {
-            "schema": SCHEMA,
-            "gyrotc_version": __version__,
-            "kind": self.kind,
-            "command": self.command,
-            "serial": self.serial,
-            "axis": self.axis,
-            "files": dict(sorted(self.files.items())),
-            "parts": sorted(self.parts),
-        }
-        for name in ("pending", "unfinished"):
-            if getattr(self, name):
-                content[name] = getattr(self, name)
-        return json_text(content)
-
-    def known(self, name: str) -> set[str]:
-        """SHA-256 that a file of this path may have."""
-        later = self.pending.get(name.split("/", 1)[0], {})
-        return {table[name] for table in (self.files, later) if name in table}
-
-    def entries(self) -> set[str]:
-        """Names in the folder itself that are gyrotc's."""
-        names = {name.split("/", 1)[0] for name in (*self.files, *self.parts)}
-        return names | {entry for entry, files in self.pending.items() if files}
+def marker_text(marker: Marker) -> str:
+    """The text of a marker's file; this gyrotc is its writer."""
+    return json_text(marker.model_copy(update={"gyrotc_version": __version__}).content())
 
 
 def read_marker(folder: Path) -> Marker | None:
@@ -112,23 +73,13 @@ def read_marker(folder: Path) -> Marker | None:
         facts = path.lstat()
         if not stat.S_ISREG(facts.st_mode) or facts.st_size > _MOST_BYTES:
             raise ValueError("no regular file of a likely size")
-        raw = json.loads(path.read_text(encoding="utf-8"))
-        if raw["schema"] != SCHEMA:
-            raise ValueError(f"schema {raw['schema']!r}")
-        return Marker(
-            str(raw["kind"]),
-            str(raw["command"]),
-            raw["serial"],
-            raw["axis"],
-            {str(k): str(v) for k, v in raw["files"].items()},
-            tuple(_checked_part(folder, str(part)) for part in raw["parts"]),
-            {str(k): {str(n): str(v) for n, v in f.items()} for k, f in raw.get("pending", {}).items()},
-            bool(raw.get("unfinished", False)),
-        )
+        marker = checked_result(json.loads(path.read_text(encoding="utf-8")), Marker, MARKER)
+        parts = tuple(_checked_part(folder, part) for part in marker.parts)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (InputError, ValueError, RecursionError) as error:
         raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {SCHEMA}") from error
+    return marker.but(parts=parts)
 
 
 def _checked_part(folder: Path, part: str) -> str:
@@ -210,7 +161,7 @@ def survey(
     for part in marker.parts:
         if not (folder / part).is_dir() or (entries is not None and part.split("/", 1)[0] not in entries):
             continue
-        own = read_marker(folder / part) or Marker("", "")
+        own = read_marker(folder / part) or marker_of()
         for found, more in zip((foreign, edited), survey(folder / part, own), strict=True):
             found.extend(f"{part}/{name}" for name in more)
     return sorted(foreign), sorted(edited)
@@ -252,9 +203,9 @@ def remove_listed(folder: Path) -> list[str]:
         Paths that are left because gyrotc did not write them, or not like this.
     """
     try:
-        marker = read_marker(folder) or Marker("", "")
+        marker = read_marker(folder) or marker_of()
     except InputError:
-        marker = Marker("", "")
+        marker = marker_of()
     if marker.unfinished:
         for path in folder.iterdir():
             if path.is_dir() and not path.is_symlink():

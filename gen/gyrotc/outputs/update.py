@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from .exchange import can_exchange, exchange
 from .files import sync_folder
-from .marker import MARKER, NEW, OWN, Marker, sha256, walk
+from .marker import MARKER, NEW, OWN, Marker, marker_text, sha256, walk
 
 __all__ = ["Update", "write_marker"]
 
@@ -19,7 +18,7 @@ def write_marker(work: Path, folder: Path, marker: Marker) -> None:
     """Writes a folder's marker, on disk; `work` is a folder of the job's own on the same file system."""
     new = work / NEW
     with new.open("w", encoding="utf-8") as stream:
-        stream.write(marker.text())
+        stream.write(marker_text(marker))
         stream.flush()
         os.fsync(stream.fileno())
     new.replace(folder / MARKER)
@@ -43,20 +42,18 @@ class Update:
         self, place: Path, work: Path, earlier: Marker | None, marker: Marker, entries: frozenset[str]
     ) -> None:
         self._place, self._work = place, work
-        self._before = _settled(place, earlier or replace(marker, files={}, parts=()))
+        self._before = _settled(place, earlier or marker.but(files={}, parts=()))
         self._marked = earlier is not None
         self._new = marker
         written = {path.name for path in work.iterdir()} - OWN
         self._changed = sorted(written | (entries & self._before.entries()))
         kept = {n: h for n, h in self._before.files.items() if _top(n) not in self._changed}
         parts = {part for part in self._before.parts if _top(part) not in self._changed}
-        self._after = replace(
-            marker, files=kept | marker.files, parts=tuple(sorted(parts | set(marker.parts)))
-        )
+        self._after = marker.but(files=kept | marker.files, parts=tuple(sorted(parts | set(marker.parts))))
         if earlier is not None:  # who made the folder, and of what gyro, unless this job says it anew
-            self._after = replace(self._after, kind=earlier.kind, command=earlier.command)
+            self._after = self._after.but(kind=earlier.kind, command=earlier.command)
         if marker.serial is None:
-            self._after = replace(self._after, serial=self._before.serial, axis=self._before.axis)
+            self._after = self._after.but(serial=self._before.serial, axis=self._before.axis)
 
     def commit(self, put: Callable[[], None]) -> None:
         """Puts the new entries into their places.
@@ -96,10 +93,8 @@ class Update:
         old, new = self._before, self._new
         later = {entry: _of(new, entry) for entry in self._changed}
         parts = tuple(sorted({*old.parts, *new.parts}))
-        write_marker(
-            self._work, self._work, replace(new, pending={e: _of(old, e) for e in later}, parts=parts)
-        )
-        write_marker(self._work, self._place, replace(old, pending=later, parts=parts))
+        write_marker(self._work, self._work, new.but(pending={e: _of(old, e) for e in later}, parts=parts))
+        write_marker(self._work, self._place, old.but(pending=later, parts=parts))
         for entry in self._changed:
             _swap(self._work / entry, self._place / entry)
         write_marker(self._work, self._place, self._after)
@@ -127,7 +122,7 @@ def _settled(place: Path, marker: Marker) -> Marker:
             found = sha256(place / name)
             if found in marker.known(name):
                 files[name] = found
-    return replace(marker, files=files, pending={})
+    return marker.but(files=files, pending={})
 
 
 def _of(marker: Marker, entry: str) -> dict[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -11,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..results.fleet import Facts, FleetEntry, Reason, ResidualSeries
 from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
@@ -20,22 +20,22 @@ _IN_TIME = ("step", "outliers", "noise")  # reasons that show over time, not ove
 _FIRST_C, _BIN_C = -90.0, 5.0  # of the curves of entries
 
 
-def lot_picture(entries: Sequence[Mapping[str, Any]], apart: set[str]) -> str | None:
+def lot_picture(entries: Sequence[FleetEntry], apart: set[str]) -> str | None:
     """RMS of every gyro before and after, those that stand apart ringed; None for fewer than two."""
     if len(entries) < 2:
         return None
-    ordered = sorted(entries, key=lambda e: float(e["after_rms_dph"]))
+    ordered = sorted(entries, key=lambda e: e.after_rms_dph or 0.0)
     place = np.arange(1, len(ordered) + 1)
-    ringed = [k for k, entry in enumerate(ordered) if entry["name"] in apart]
+    ringed = [k for k, entry in enumerate(ordered) if entry.name in apart]
     size = 4.0 if len(ordered) < 200 else 2.0
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 3.2), layout="constrained")
         ax = figure.subplots()
-        for key, color, label in (
-            ("before_rms_dph", BEFORE, "before"),
-            ("after_rms_dph", AFTER, "after"),
+        for figures, color, label in (
+            ([entry.before_rms_dph for entry in ordered], BEFORE, "before"),
+            ([entry.after_rms_dph for entry in ordered], AFTER, "after"),
         ):
-            values = np.array([entry[key] for entry in ordered])
+            values = np.array(figures, dtype=np.float64)
             ax.plot(place, values, "o", color=color, markersize=size, label=label)
             ax.plot(place[ringed], values[ringed], "o", mfc="none", mec=ACCENT, markersize=9.0)
         ax.set(yscale="log", xlabel="gyros", ylabel="RMS, deg/h")
@@ -43,47 +43,48 @@ def lot_picture(entries: Sequence[Mapping[str, Any]], apart: set[str]) -> str | 
         return svg(figure)
 
 
-def unit_apart(known: Mapping[str, Mapping[str, Any]], reason: Mapping[str, Any]) -> str:
+def unit_apart(known: Mapping[str, FleetEntry], reason: Reason) -> str:
     """What shows why a gyro stands apart.
 
     Args:
-        known: Entries with `facts` by name.
-        reason: One of `apart` of `fleet.json`.
+        known: Entries with facts by name.
+        reason: Of one of them.
     """
-    entry = known[reason["name"]]
+    entry = known[reason.name]
+    series = entry.facts.series if entry.facts else None
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.4, 2.1), layout="constrained")
         ax = figure.subplots()
-        if reason["id"] in _IN_TIME and entry["facts"]["series"]:
-            _draw_series(ax, entry["facts"]["series"], reason)
+        if reason.id in _IN_TIME and series:
+            _draw_series(ax, series, reason)
         else:
             _draw_curves(ax, known, entry)
         ax.legend(fontsize=8)
         return svg(figure)
 
 
-def _draw_series(ax: Axes, series: Mapping[str, Any], reason: Mapping[str, Any]) -> None:
-    time = np.array(series["time_s"])
+def _draw_series(ax: Axes, series: ResidualSeries, reason: Reason) -> None:
+    time = np.array(series.time_s)
     hours = (time - time[0]) / 3600.0
-    ax.plot(hours, series["rate_dph"], color=AFTER, linewidth=0.8, label=picture_text(series["file"]))
-    if reason["time_s"] is not None and reason["file"] == series["file"]:
-        ax.axvline(reason["time_s"] / 3600.0, color=BEFORE, linestyle="--", linewidth=1.0, label="step")
+    ax.plot(hours, series.rate_dph, color=AFTER, linewidth=0.8, label=picture_text(series.file))
+    if reason.time_s is not None and reason.file == series.file:
+        ax.axvline(reason.time_s / 3600.0, color=BEFORE, linestyle="--", linewidth=1.0, label="step")
     ax.set(xlabel="time, h", ylabel="compensated, deg/h")
 
 
-def _draw_curves(ax: Axes, known: Mapping[str, Mapping[str, Any]], entry: Mapping[str, Any]) -> None:
-    kin = [_curve(e) for e in known.values() if e["axis"] == entry["axis"]]
+def _draw_curves(ax: Axes, known: Mapping[str, FleetEntry], entry: FleetEntry) -> None:
+    kin = [_curve(e.facts) for e in known.values() if e.axis == entry.axis and e.facts]
     t = _FIRST_C + _BIN_C * (np.arange(len(kin[0])) + 0.5)
     rows = np.array(kin)
     seen = np.isfinite(rows).any(axis=0)
     low, middle, high = np.nanquantile(rows[:, seen], (0.05, 0.5, 0.95), axis=0)
     ax.fill_between(t[seen], low, high, color=COVERED, alpha=0.25, linewidth=0.0, label="90 % of its kind")
     ax.plot(t[seen], middle, color=COVERED, linewidth=1.0)
-    ax.plot(
-        t, _curve(entry), "o-", color=BEFORE, markersize=3.0, linewidth=1.0, label=picture_text(entry["name"])
-    )
+    if entry.facts:
+        own = _curve(entry.facts)
+        ax.plot(t, own, "o-", color=BEFORE, markersize=3.0, linewidth=1.0, label=picture_text(entry.name))
     ax.set(xlabel="temperature, C", ylabel="bias, deg/h")
 
 
-def _curve(entry: Mapping[str, Any]) -> NDArray[np.float64]:
-    return np.array([np.nan if v is None else v for v in entry["facts"]["curve"]])
+def _curve(facts: Facts) -> NDArray[np.float64]:
+    return np.array([np.nan if v is None else v for v in facts.curve])

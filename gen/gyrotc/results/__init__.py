@@ -1,5 +1,5 @@
 """The JSON results as typed objects: one class writes a result, and pages and lines read the same class.
 
-Third room of the house (errors → outputs → inputs → **results** → ...). docs/FORMAT.md and the JSON Schemas beside
+Third room of the house (errors → inputs → **results** → outputs → ...). docs/FORMAT.md and the JSON Schemas beside
 these modules are made from the classes (`make formats`).
 """

@@ -4,8 +4,8 @@ Each serial is a job of its own: one that fails does not stop the others, one th
 """
 
 from .manifest import Fleet, Unit, load_manifest
-from .outliers import FleetOutlier, outliers
+from .outliers import outliers
 from .page import summary_of
 from .run import run_fleet
 
-__all__ = ["Fleet", "FleetOutlier", "Unit", "load_manifest", "outliers", "run_fleet", "summary_of"]
+__all__ = ["Fleet", "Unit", "load_manifest", "outliers", "run_fleet", "summary_of"]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics import MAD_TO_SIGMA, Averages
+from ...results.fleet import ComparedRun, Facts, LikelyStep, ResidualSeries
 
 __all__ = ["BINS", "BIN_C", "FIRST_C", "facts_of", "step_in"]
 
@@ -21,36 +21,35 @@ _EDGE = 0.1  # of a run, on either side of which a step is not sought
 _POINTS = 160  # of the residual that a picture shows
 
 
-def facts_of(runs: Sequence[tuple[str, Averages]]) -> dict[str, Any]:
-    """Facts of a gyro from the means of its runs, each with its file.
-
-    Returns:
-        `curve`: mean bias (deg/h) over bins of `BIN_C` from `FIRST_C` on, None where there are few means; `runs`: of
-        each its mean temperature (C), noise of a mean (deg/h) and likeliest step; `series`: the residual of the run
-        whose step is the clearest.
-    """
+def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
+    """Facts of a gyro from the means of its runs, each with its file."""
     told = [(file, a) for file, a in runs if a.time_s.size]
     steps = [step_in(a.after_dph) for _, a in told]
-    found: dict[str, Any] = {"curve": _curve([a for _, a in told]), "runs": [], "series": None}
-    for (file, a), (index, size, score) in zip(told, steps, strict=True):
-        found["runs"].append(
-            {
-                "file": file,
-                "mean_c": float(a.temperature_c.mean()),
-                "noise_dph": _noise(a.after_dph),
-                "step": {"time_s": _edge_s(a, index), "size_dph": size, "score": score},
-            }
-        )
-    if told:
-        worst = int(np.argmax([score for _, _, score in steps]))
-        file, a = told[worst]
-        every = max(1, a.after_dph.size // _POINTS)
-        found["series"] = {
-            "file": file,
-            "time_s": [float(t) for t in a.time_s[::every]],
-            "rate_dph": [float(r) for r in a.after_dph[::every]],
-        }
-    return found
+    worst = int(np.argmax([score for _, _, score in steps])) if told else 0
+    return Facts(
+        curve=_curve([a for _, a in told]),
+        runs=tuple(_compared(file, a, step) for (file, a), step in zip(told, steps, strict=True)),
+        series=_series(*told[worst]) if told else None,
+    )
+
+
+def _compared(file: str, a: Averages, step: tuple[int, float, float]) -> ComparedRun:
+    index, size, score = step
+    return ComparedRun(
+        file=file,
+        mean_c=float(a.temperature_c.mean()),
+        noise_dph=_noise(a.after_dph),
+        step=LikelyStep(time_s=_edge_s(a, index), size_dph=size, score=score),
+    )
+
+
+def _series(file: str, a: Averages) -> ResidualSeries:
+    every = max(1, a.after_dph.size // _POINTS)
+    return ResidualSeries(
+        file=file,
+        time_s=tuple(float(t) for t in a.time_s[::every]),
+        rate_dph=tuple(float(r) for r in a.after_dph[::every]),
+    )
 
 
 def _edge_s(a: Averages, index: int) -> float:
@@ -59,13 +58,14 @@ def _edge_s(a: Averages, index: int) -> float:
     return float(0.5 * (a.time_s[index - 1] + a.time_s[index]) - start) if index else 0.0
 
 
-def _curve(runs: Sequence[Averages]) -> list[float | None]:
+def _curve(runs: Sequence[Averages]) -> tuple[float | None, ...]:
+    """Mean bias (deg/h) over cells of `BIN_C` from `FIRST_C` on."""
     t = np.concatenate([a.temperature_c for a in runs]) if runs else np.zeros(0)
     rate = np.concatenate([a.before_dph for a in runs]) if runs else np.zeros(0)
     number = np.clip(((t - FIRST_C) / BIN_C).astype(np.int64), 0, BINS - 1)
     count = np.bincount(number, minlength=BINS)
     total = np.bincount(number, weights=rate, minlength=BINS)
-    return [float(s / n) if n >= _LEAST_IN_BIN else None for s, n in zip(total, count, strict=True)]
+    return tuple(float(s / n) if n >= _LEAST_IN_BIN else None for s, n in zip(total, count, strict=True))
 
 
 def _noise(residual: Array) -> float:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...metrics import MAD_TO_SIGMA
+from ...results.fleet import FleetOutlier, FleetUnit, Spread
 
-__all__ = ["FIGURES", "FleetOutlier", "outliers", "spread"]
+__all__ = ["FIGURES", "outliers", "spread"]
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
@@ -28,43 +27,33 @@ _LEAST_OF_RMS = 0.1  # of the others, in shares of what usually remains: means o
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
 
 
-@dataclass(frozen=True, slots=True)
-class FleetOutlier:
-    """A figure of a serial, the fleet's median of it, and the distance in robust standard deviations."""
-
-    name: str
-    figure: str
-    value: float
-    median: float
-    sigmas: float
-
-
-def spread(entries: Sequence[dict[str, Any]], figure: str) -> dict[str, float] | None:
+def spread(entries: Sequence[FleetUnit], figure: str) -> Spread | None:
     """Median, least and largest value of a figure; None where no serial has it."""
-    values = [entry[figure] for entry in entries if entry.get(figure) is not None]
+    values = [float(value) for entry in entries if (value := getattr(entry, figure)) is not None]
     if not values:
         return None
-    return {"median": float(np.median(values)), "least": float(min(values)), "largest": float(max(values))}
+    return Spread(median=float(np.median(values)), least=min(values), largest=max(values))
 
 
-def outliers(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
+def outliers(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
     """Serials that stand apart from those of their axis, each with each figure that does, the farthest first."""
-    kinds: dict[str | None, list[dict[str, Any]]] = defaultdict(list)
+    kinds: dict[str | None, list[FleetUnit]] = defaultdict(list)
     for entry in entries:
-        kinds[entry.get("axis")].append(entry)
+        kinds[entry.axis].append(entry)
     found = [outlier for kind in kinds.values() for outlier in _of_kind(kind)]
     return sorted(found, key=lambda o: (-o.sigmas, o.name))
 
 
-def _of_kind(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
+def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
     found = []
     usual = spread(entries, "after_rms_dph")
-    usual_rms = usual["median"] if usual else 0.0
+    usual_rms = usual.median if usual else 0.0
     for figure, by_ratio in FIGURES.items():
-        known = [e for e in entries if e.get(figure) is not None and (e[figure] > 0.0 or not by_ratio)]
+        known = [(e.name, v) for e in entries if (v := getattr(e, figure)) is not None]
+        known = [(name, v) for name, v in known if v > 0.0 or not by_ratio]
         if len(known) < _LEAST:
             continue
-        values = np.array([entry[figure] for entry in known])
+        values = np.array([value for _, value in known])
         scaled = np.log(values) if by_ratio else values
         apart = np.abs(scaled - np.median(scaled))
         sigma = max(
@@ -75,9 +64,13 @@ def _of_kind(entries: Sequence[dict[str, Any]]) -> list[FleetOutlier]:
             continue
         found += [
             FleetOutlier(
-                entry["name"], figure, float(value), float(np.median(values)), float(distance / sigma)
+                name=name,
+                figure=figure,
+                value=float(value),
+                median=float(np.median(values)),
+                sigmas=float(distance / sigma),
             )
-            for entry, value, distance in zip(known, values, apart, strict=True)
+            for (name, value), distance in zip(known, apart, strict=True)
             if distance > _SIGMAS * sigma
         ]
     return found

@@ -6,18 +6,16 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from ... import __version__
 from ...outputs import json_text, result_folder, write_atomically
 from ...pages.lot_plots import lot_picture, unit_apart
 from ...pages.report import page_environment
+from ...results.fleet import FleetEntry, FleetSummary, FleetUnit
 from ...texts import csv_cell
 from .copies import copies, with_copies
-from .entry import INTERNAL
 from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
 from .reasons import reasons, with_reasons
@@ -33,61 +31,57 @@ _COLUMNS = (
 _PICTURES = 60  # of gyros that stand apart; of more, the words say enough
 
 
-def summary_of(entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The JSON object of `fleet.json`."""
-    counts = Counter(entry["status"] for entry in entries)
+def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
+    """What `fleet.json` says."""
+    counts = Counter(entry.status for entry in entries)
     copied = copies(entries)
     entries = with_copies(entries, copied)
-    figured = [entry for entry in entries if "model_hash" in entry]
+    figured = [entry for entry in entries if entry.model_hash is not None]
     named = reasons(figured, copied)
     entries = with_reasons(entries, named)
-    return {
-        "schema": "gyrotc.fleet/1",
-        "gyrotc_version": __version__,
-        "serial": None,
-        "axis": None,
-        "units": len(entries),
-        "done": counts["done"],
-        "failed": counts["failed"],
-        "unfinished": counts["unfinished"],
-        "figures": {
-            f: spread(figured, f) for f in (*FIGURES, "sum_abs_weights_dph", "centers", "table_bytes")
-        },
-        "outliers": [asdict(outlier) for outlier in outliers(figured)],
-        "apart": [asdict(reason) for reason in named],
-        "copies": [asdict(copy) for copy in copied],
-        "serials": [{k: v for k, v in entry.items() if k not in INTERNAL} for entry in entries],
-    }
+    return FleetSummary(
+        gyrotc_version=__version__,
+        serial=None,
+        axis=None,
+        units=len(entries),
+        done=counts["done"],
+        failed=counts["failed"],
+        unfinished=counts["unfinished"],
+        figures={f: spread(figured, f) for f in (*FIGURES, "sum_abs_weights_dph", "centers", "table_bytes")},
+        outliers=tuple(outliers(figured)),
+        apart=tuple(named),
+        copies=tuple(copied),
+        serials=tuple(entry.told() for entry in entries),
+    )
 
 
-def write_summary(out: Path, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns the object of the first.
+def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
+    """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns what the first says.
 
     Raises:
         InputError: There are files of these names that gyrotc did not write.
     """
     summary = summary_of(entries)
-    named = [reason["name"] for reason in summary["apart"]]
-    others = {outlier["name"] for outlier in summary["outliers"]} - set(named)
-    known = {entry["name"]: entry for entry in entries if entry.get("facts")}
+    apart = {reason.name for reason in summary.apart} | {outlier.name for outlier in summary.outliers}
+    known = {entry.name: entry for entry in entries if entry.facts}
     pictures = {
-        reason["name"]: unit_apart(known, reason)
-        for reason in summary["apart"][:_PICTURES]
-        if reason["name"] in known and reason["id"] != "copy_of_other"  # nothing to be seen in it
+        reason.name: unit_apart(known, reason)
+        for reason in summary.apart[:_PICTURES]
+        if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
     }
     page = (
         page_environment()
         .get_template("fleet.html.j2")
         .render(
             summary=summary,
-            apart={*named, *others},
-            picture=lot_picture([e for e in entries if e.get("after_rms_dph")], {*named, *others}),
+            apart=apart,
+            picture=lot_picture([e for e in entries if e.after_rms_dph], apart),
             pictures=pictures,
-            links={entry["name"]: _link(out, entry["name"]) for entry in summary["serials"]},
-            verdicts=Counter(entry.get("verdict") for entry in summary["serials"]),
+            links={entry.name: _link(out, entry.name) for entry in summary.serials},
+            verdicts=Counter(entry.verdict for entry in summary.serials),
         )
     )
-    texts = (json_text(summary), _table(summary["serials"]), page)
+    texts = (json_text(summary.content()), _table(summary.serials), page)
     with result_folder(out, "fleet", entries=SUMMARY) as stage:
         for name, text in zip(SUMMARY, texts, strict=True):
             write_atomically(stage.folder / name, text)
@@ -104,13 +98,13 @@ def _link(out: Path, name: str) -> str | None:
         return None
 
 
-def _table(entries: Sequence[dict[str, Any]]) -> str:
+def _table(entries: Sequence[FleetUnit]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for entry in entries:
-        cells = (entry.get(column) for column in _COLUMNS)
+        cells = (getattr(entry, column) for column in _COLUMNS)
         writer.writerow(
-            csv_cell(" ".join(c) if isinstance(c, list) else "" if c is None else c) for c in cells
+            csv_cell(" ".join(c) if isinstance(c, tuple) else "" if c is None else c) for c in cells
         )
     return text.getvalue()

@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from ...errors import InputError
-from .entry import Entry
+from ...results.fleet import FleetEntry
 from .unit import Task, do_unit, failed
 
 __all__ = ["on_dask", "on_processes"]
@@ -21,7 +21,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
 
 
-def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, Entry]]:
+def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
     """Every task's number with its entry, as they come.
 
     A process that dies takes its pool with it. Whose process it was is not told; the pool hands tasks out in their
@@ -39,10 +39,10 @@ def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, Entry]
                 yield number, _alone(waiting.pop(number))
 
 
-def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, Entry]]:
+def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry]]:
     pool = _pool(min(jobs, len(tasks)))
     try:
-        numbers: dict[Future[Entry], int] = {pool.submit(do_unit, task): n for n, task in tasks.items()}
+        numbers: dict[Future[FleetEntry], int] = {pool.submit(do_unit, task): n for n, task in tasks.items()}
         for future in as_completed(numbers):
             number = numbers[future]
             yield number, _entry_of(tasks[number], future)
@@ -56,9 +56,9 @@ def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, Entry]]:
         pool.shutdown(wait=True, cancel_futures=True)  # until nobody writes any more
 
 
-def _entry_of(task: Task, future: Any) -> Entry:
+def _entry_of(task: Task, future: Any) -> FleetEntry:
     try:
-        entry: Entry = future.result()
+        entry: FleetEntry = future.result()
     except BrokenProcessPool:
         raise
     except Exception as error:  # it could not be sent there or back
@@ -66,7 +66,7 @@ def _entry_of(task: Task, future: Any) -> Entry:
     return entry
 
 
-def _alone(task: Task) -> Entry:
+def _alone(task: Task) -> FleetEntry:
     try:
         [(_, entry)] = _pooled(1, {0: task})
     except BrokenProcessPool:
@@ -95,7 +95,7 @@ def _end_with_parent() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[tuple[int, Entry]]:
+def on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
     """As `on_processes`, on the workers of a cluster.
 
     Raises:

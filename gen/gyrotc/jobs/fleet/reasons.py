@@ -7,19 +7,16 @@ from the median of its kind is beyond five robust standard deviations; the reaso
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...metrics import MAD_TO_SIGMA
-from .copies import Copy
-from .entry import Entry
+from ...results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
 from .turned import turned
 
-__all__ = ["Reason", "reasons", "with_reasons"]
+__all__ = ["reasons", "with_reasons"]
 
 Array = NDArray[np.float64]
 
@@ -37,26 +34,13 @@ _LEAST_SPIKES = 5  # rows
 _PER_H = 3600.0  # s in an hour
 
 
-@dataclass(frozen=True, slots=True)
-class Reason:
-    """Why a gyro stands apart: a stable id, words, and the run and its time (s) where it shows."""
-
-    name: str
-    id: str
-    text: str
-    file: str | None = None
-    time_s: float | None = None
-
-
-_NOTHING = Reason("", "", "")
-
-
 class _Kind:
     """Gyros of one axis, and what is usual among them."""
 
-    def __init__(self, entries: Sequence[Entry]) -> None:
-        self.entries = entries
-        self.curves = np.array([_numbers(e["facts"]["curve"]) for e in entries])
+    def __init__(self, known: Sequence[tuple[FleetEntry, Facts]]) -> None:
+        self.entries = entries = [entry for entry, _ in known]
+        self.facts = [facts for _, facts in known]
+        self.curves = np.array([_numbers(facts.curve) for facts in self.facts])
         seen = np.isfinite(self.curves).sum(axis=0) >= max(_LEAST, len(entries) // 2)
         self.seen = seen
         with np.errstate(all="ignore"):
@@ -85,55 +69,60 @@ class _Kind:
         return np.asarray(np.where(power > 0.0, product / np.where(power > 0.0, power, 1.0), 0.0))
 
 
-def reasons(entries: Sequence[Entry], copied: Sequence[Copy] = ()) -> list[Reason]:
+def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[Reason]:
     """The likeliest reason of every gyro that stands apart, in the order of the entries."""
     found: dict[str, Reason] = {}
-    axis = {entry["name"]: entry["axis"] for entry in entries}
+    by_name = {entry.name: entry for entry in entries}
+    axis = {entry.name: entry.axis for entry in entries}
     for copy in sorted(copied, key=lambda c: axis.get(c.name) != axis.get(c.other)):  # x with x first
         for name, other in ((copy.name, copy.other), (copy.other, copy.name)):
             text = f"copy of another unit: it has about {100.0 * copy.share:.0f} % of its rows in common with {other}"
-            found.setdefault(name, Reason(name, "copy_of_other", text))
+            if name in by_name:
+                found.setdefault(name, _reason(by_name[name], "copy_of_other", text))
     kinds = _kinds(entries)
     mirrored = set(turned(entries))
     for reason in (*_exchanged(kinds), *(r for kind in kinds.values() for r in _of_kind(kind))):
         found.setdefault(reason.name, reason)
     for entry in entries:
-        if entry["name"] in mirrored and found.get(entry["name"], _NOTHING).id in ("", "bias_apart"):
+        known = found.get(entry.name)
+        if entry.name in mirrored and (known is None or known.id == "bias_apart"):
             text = "sign reversed: its bias over temperature has the shape of that of its kind turned over"
-            found[entry["name"]] = Reason(entry["name"], "sign_reversed", text)
-    return [found[e["name"]] for e in entries if e["name"] in found]
+            found[entry.name] = _reason(entry, "sign_reversed", text)
+    return [found[e.name] for e in entries if e.name in found]
 
 
-def with_reasons(entries: Sequence[Entry], named: Sequence[Reason]) -> list[Entry]:
+def _reason(
+    entry: FleetEntry, id_: str, text: str, file: str | None = None, time_s: float | None = None
+) -> Reason:
+    return Reason(name=entry.name, id=id_, text=text, file=file, time_s=time_s)
+
+
+def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:
     """The entries with their reasons' words; where the sign is reversed, with the finding too."""
     told = {reason.name: reason for reason in named}
-    found = []
-    for entry in entries:
-        reason = told.get(entry["name"])
-        if reason is not None:
-            more = ["sign_reversed"] if reason.id == "sign_reversed" else []
-            findings = [*entry["findings"], *(f for f in more if f not in entry["findings"])]
-            found.append(entry | {"apart": reason.text, "findings": findings})
-        else:
-            found.append(entry)
-    return found
+    return [_with_reason(entry, told[entry.name]) if entry.name in told else entry for entry in entries]
 
 
-def _kinds(entries: Sequence[Entry]) -> dict[str | None, _Kind]:
-    by_axis: dict[str | None, list[Entry]] = defaultdict(list)
+def _with_reason(entry: FleetEntry, reason: Reason) -> FleetEntry:
+    more = {"sign_reversed"} & {reason.id} - set(entry.findings)
+    return entry.model_copy(update={"apart": reason.text, "findings": (*entry.findings, *more)})
+
+
+def _kinds(entries: Sequence[FleetEntry]) -> dict[str | None, _Kind]:
+    by_axis: dict[str | None, list[tuple[FleetEntry, Facts]]] = defaultdict(list)
     for entry in entries:
-        if entry.get("facts"):
-            by_axis[entry["axis"]].append(entry)
+        if entry.facts is not None:
+            by_axis[entry.axis].append((entry, entry.facts))
     return {axis: _Kind(found) for axis, found in by_axis.items() if len(found) >= _LEAST}
 
 
 def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
     """Two axes of a unit that show each what the other's kind shows."""
-    units: dict[str, dict[str, tuple[Entry, Array]]] = defaultdict(dict)
+    units: dict[str, dict[str, tuple[FleetEntry, Array]]] = defaultdict(dict)
     for axis, kind in kinds.items():
         for entry, curve in zip(kind.entries, kind.curves, strict=True):
-            if axis is not None:
-                units[entry["dataset"]][axis] = (entry, curve)
+            if axis is not None and entry.dataset is not None:
+                units[entry.dataset][axis] = (entry, curve)
     for axes in units.values():
         for a in axes:
             for b in axes:
@@ -142,7 +131,7 @@ def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
                     continue
                 if kinds[b].distance(one) < _NEAR and kinds[a].distance(other) < _NEAR:
                     text = f"axes exchanged: {a} shows what {b} axes show, and {b} what {a} axes show"
-                    yield Reason(axes[a][0]["name"], "axes_exchanged", text)
+                    yield _reason(axes[a][0], "axes_exchanged", text)
 
 
 def _of_kind(kind: _Kind) -> Iterator[Reason]:
@@ -157,7 +146,7 @@ def _of_kind(kind: _Kind) -> Iterator[Reason]:
 
 def _thermometers(kind: _Kind) -> Iterator[Reason]:
     """The programme is the same for all: mean temperatures of the runs say which thermometer is apart."""
-    temperatures = _run_figures(kind.entries, lambda run: run["mean_c"])
+    temperatures = _run_figures(kind.facts, lambda run: run.mean_c)
     shifts = np.nanmedian(temperatures - np.nanmedian(temperatures, axis=0), axis=1)
     _, scatter = _usual(shifts)
     for entry, shift in zip(kind.entries, shifts, strict=True):
@@ -166,45 +155,45 @@ def _thermometers(kind: _Kind) -> Iterator[Reason]:
             text = (
                 f"thermometer apart: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
             )
-            yield Reason(entry["name"], "thermometer_apart", text)
+            yield _reason(entry, "thermometer_apart", text)
 
 
 def _steps(kind: _Kind) -> Iterator[Reason]:
-    scores = _run_figures(kind.entries, lambda run: run["step"]["score"])
+    scores = _run_figures(kind.facts, lambda run: run.step.score)
     best = np.log(np.maximum(np.nanmax(scores, axis=1), 1e-9))
     usual, scatter = _usual(best)
     for k, entry in enumerate(kind.entries):
         if best[k] > usual + max(_FAR_LOG * scatter, np.log(_LEAST_STEP)):
-            run = entry["facts"]["runs"][int(np.nanargmax(scores[k]))]
-            time_s, size = run["step"]["time_s"], run["step"]["size_dph"]
+            run = kind.facts[k].runs[int(np.nanargmax(scores[k]))]
+            hours = run.step.time_s / _PER_H
             text = (
-                f"step in {run['file']} at {time_s / _PER_H:.1f} h: the residual moved by {size:+.2g} deg/h"
+                f"step in {run.file} at {hours:.1f} h: the residual moved by {run.step.size_dph:+.2g} deg/h"
             )
-            yield Reason(entry["name"], "step", text, run["file"], time_s)
+            yield _reason(entry, "step", text, run.file, run.step.time_s)
 
 
 def _spikes(kind: _Kind) -> Iterator[Reason]:
-    rows = np.array([float(entry.get("rows_left_out") or 0) for entry in kind.entries])
+    rows = np.array([float(entry.rows_left_out or 0) for entry in kind.entries])
     usual, scatter = _usual(rows)
     for entry, count in zip(kind.entries, rows, strict=True):
         if count >= max(_LEAST_SPIKES, usual + _FAR * scatter):
             text = f"spikes or bursts: {count:.0f} rows of training were outliers"
-            yield Reason(entry["name"], "outliers", text)
+            yield _reason(entry, "outliers", text)
 
 
 def _noise(kind: _Kind) -> Iterator[Reason]:
-    noise = _run_figures(kind.entries, lambda run: run["noise_dph"])
+    noise = _run_figures(kind.facts, lambda run: run.noise_dph)
     ratios = noise / np.maximum(np.nanmedian(noise, axis=0), 1e-300)  # to the same run of the others
     levels = np.log(np.maximum(np.nanmedian(ratios, axis=1), 1e-9))
     usual, scatter = _usual(levels)
-    for entry, level, of_runs in zip(kind.entries, levels, ratios, strict=True):
-        file = entry["facts"]["runs"][int(np.nanargmax(of_runs))]["file"]
+    for entry, facts, level, of_runs in zip(kind.entries, kind.facts, levels, ratios, strict=True):
+        file = facts.runs[int(np.nanargmax(of_runs))].file
         if level - usual > max(_FAR * scatter, np.log(_LEAST_NOISE)):
             text = f"noise: {np.exp(level - usual):.1f} times that of the others, most in {file}"
-            yield Reason(entry["name"], "noise", text, file)
+            yield _reason(entry, "noise", text, file)
         elif np.nanmax(of_runs) > _LEAST_NOISY_RUN:
             text = f"noise: in {file} {np.nanmax(of_runs):.1f} times that of the others"
-            yield Reason(entry["name"], "noise", text, file)
+            yield _reason(entry, "noise", text, file)
 
 
 def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
@@ -217,10 +206,10 @@ def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
         scaled = abs(log - usual) > max(_FAR_LOG * scatter, np.log(_LEAST_SCALE))
         if _FAR < far < np.inf and kind.distance(-curve) < min(_NEAR, far / 2.0):
             text = f"sign reversed: its bias over temperature is the mirror image of that of {kin}"
-            yield Reason(entry["name"], "sign_reversed", text)
+            yield _reason(entry, "sign_reversed", text)
         elif factor > 0.0 and scaled and kind.distance(curve / factor) < _NEAR:
             text = f"scale: its rates are {factor:.3g} times those of {kin}"
-            yield Reason(entry["name"], "scale", text)
+            yield _reason(entry, "scale", text)
 
 
 def _bias_apart(kind: _Kind) -> Iterator[Reason]:
@@ -229,17 +218,17 @@ def _bias_apart(kind: _Kind) -> Iterator[Reason]:
         far = kind.distance(curve)
         if _FAR < far < np.inf:
             text = f"bias over temperature apart from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
-            yield Reason(entry["name"], "bias_apart", text)
+            yield _reason(entry, "bias_apart", text)
 
 
-def _kin(entry: Entry) -> str:
-    return f"the other {entry['axis']} axes" if entry["axis"] else "the others"
+def _kin(entry: FleetEntry) -> str:
+    return f"the other {entry.axis} axes" if entry.axis else "the others"
 
 
-def _run_figures(entries: Sequence[Entry], figure: Any) -> Array:
+def _run_figures(facts: Sequence[Facts], figure: Callable[[ComparedRun], float]) -> Array:
     """A figure of every run by its place, NaN where a gyro has fewer runs than others."""
-    most = max(len(e["facts"]["runs"]) for e in entries)
-    rows = [[figure(run) for run in e["facts"]["runs"]] for e in entries]
+    most = max(len(of_one.runs) for of_one in facts)
+    rows = [[figure(run) for run in of_one.runs] for of_one in facts]
     return np.array([row + [np.nan] * (max(most, 1) - len(row)) for row in rows], dtype=np.float64)
 
 

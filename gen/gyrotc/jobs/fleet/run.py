@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ...outputs import KINDS, Lock, deferred
 from ...outputs.places import check_apart, check_contents, final_place
+from ...results.fleet import FleetEntry
 from .aside import clean_units
-from .entry import Entry
 from .fingerprint import program_of
 from .manifest import SUMMARY, Fleet
 from .page import write_summary
@@ -19,7 +19,7 @@ from .unit import Task, done_before
 
 __all__ = ["run_fleet"]
 
-Told = Callable[[Entry], None]
+Told = Callable[[FleetEntry], None]
 
 
 def run_fleet(
@@ -30,7 +30,7 @@ def run_fleet(
     scheduler: str | None = None,
     full: bool = False,
     told: Told | None = None,
-) -> list[Entry]:
+) -> list[FleetEntry]:
     """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
 
     Args:
@@ -60,14 +60,16 @@ def run_fleet(
                 lock.release()
 
 
-def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told) -> list[Entry]:
+def _run(
+    fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told
+) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
     program = program_of()
     tasks = [Task(unit, fleet, out / unit.folder, full, program) for unit in fleet.units]
-    entries: dict[int, Entry] = {}
+    entries: dict[int, FleetEntry] = {}
     for number, task in enumerate(tasks):
         if known := done_before(task):
-            entries[number] = known | {"kept": True}
+            entries[number] = known.as_kept()
             say(entries[number])
     waiting = [number for number in range(len(tasks)) if number not in entries]
     if waiting and any((out / name).exists() for name in SUMMARY):
@@ -82,22 +84,22 @@ def _run(fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, 
     return found
 
 
-def _unfinished(task: Task) -> Entry:
-    return {
-        "name": task.unit.name,
-        "axis": task.unit.axis,
-        "status": "unfinished",
-        "reason": "the fleet was stopped before it: give the command again",
-    }
+def _unfinished(task: Task) -> FleetEntry:
+    return FleetEntry(
+        name=task.unit.name,
+        axis=task.unit.axis,
+        status="unfinished",
+        reason="the fleet was stopped before it: give the command again",
+    )
 
 
-def _one_of_each_serial(entries: Sequence[Entry]) -> Iterator[Entry]:
+def _one_of_each_serial(entries: Sequence[FleetEntry]) -> Iterator[FleetEntry]:
     """Two gyros under one serial: a table would fly on the wrong one, so both have failed."""
-    counts = Counter((e["serial"], e["axis"]) for e in entries if "serial" in e)
+    counts = Counter((e.serial, e.axis) for e in entries)
     for entry in entries:
-        if counts[(entry.get("serial"), entry["axis"])] < 2:
+        if entry.serial is None or counts[(entry.serial, entry.axis)] < 2:
             yield entry
             continue
-        reason = f"serial {entry['serial']} is also that of another data set"
-        others = f"; {entry['reason']}" if "reason" in entry else ""
-        yield entry | {"status": "failed", "reason": reason + others}
+        reason = f"serial {entry.serial} is also that of another data set"
+        others = f"; {entry.reason}" if entry.reason else ""
+        yield entry.model_copy(update={"status": "failed", "reason": reason + others})

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .entry import Entry
+from ...results.fleet import FleetEntry
 
 __all__ = ["turned"]
 
@@ -22,19 +22,17 @@ _SWING = 3.0  # how much more or less than the median it may swing
 _KNOWN = 0.8  # share of the lot that knows a temperature
 
 
-def turned(entries: Sequence[Entry]) -> list[str]:
+def turned(entries: Sequence[FleetEntry]) -> list[str]:
     """Names of gyros whose curve is the lot's turned over, axis by axis; none where the lot has no common one."""
     names: list[str] = []
-    for axis in dict.fromkeys(entry.get("axis") for entry in entries):
-        lot = [e for e in entries if e.get("axis") == axis and e.get("facts")]
+    for axis in dict.fromkeys(entry.axis for entry in entries):
+        lot = [(e.name, e.facts.curve) for e in entries if e.axis == axis and e.facts is not None]
         names += _turned_of(lot) if len(lot) >= _LEAST else []
     return names
 
 
-def _turned_of(lot: Sequence[Entry]) -> list[str]:
-    curves = np.array(
-        [[np.nan if b is None else b for b in entry["facts"]["curve"]] for entry in lot], dtype=np.float64
-    )
+def _turned_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]:
+    curves = np.array([[np.nan if b is None else b for b in curve] for _, curve in lot], dtype=np.float64)
     known = np.mean(np.isfinite(curves), axis=0) >= _KNOWN
     curves = curves[:, known]
     if curves.shape[1] < _LEAST_PLACES:
@@ -50,4 +48,4 @@ def _turned_of(lot: Sequence[Entry]) -> list[str]:
     if float(np.median(alike)) < _ALIKE:
         return []
     even = (swing < _SWING * size) & (swing > size / _SWING)
-    return [str(lot[whole[k]]["name"]) for k in np.flatnonzero((alike < -_ALIKE) & even)]
+    return [lot[whole[k]][0] for k in np.flatnonzero((alike < -_ALIKE) & even)]

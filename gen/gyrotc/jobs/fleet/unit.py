@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -12,10 +13,10 @@ from ...metrics import Averages
 from ...model import Model
 from ...outputs import KINDS, result_folder
 from ...results.evaluation import Evaluation
-from ...results.verification import Verification
+from ...results.fleet import FleetEntry
 from ..build import Built, build_into
 from .aside import set_aside
-from .entry import Entry, kept_entry, write_entry
+from .entry import kept_entry, write_entry
 from .facts import facts_of
 from .fingerprint import digest_of, inputs_of, program_of
 from .manifest import Fleet, Unit, printable
@@ -40,7 +41,7 @@ class Task:
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 
-def done_before(task: Task) -> Entry | None:
+def done_before(task: Task) -> FleetEntry | None:
     """The entry of an earlier call that still holds; None if the job must be done.
 
     It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
@@ -49,10 +50,11 @@ def done_before(task: Task) -> Entry | None:
         entry = None if task.unit.refused else kept_entry(task.out, task.key())
     except OSError:
         return None
-    return entry and entry | _who(task)
+    now = {"name": task.unit.name, "dataset": _shown(task), "axis": task.unit.axis}
+    return entry and entry.model_copy(update=now)
 
 
-def do_unit(task: Task) -> Entry:
+def do_unit(task: Task) -> FleetEntry:
     """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
     try:
         if task.unit.refused:
@@ -68,24 +70,26 @@ def do_unit(task: Task) -> Entry:
         return failed(task, f"{type(error).__name__}: {error}")
 
 
-def failed(task: Task, reason: str) -> Entry:
+def failed(task: Task, reason: str) -> FleetEntry:
     """The entry of a job that came to nothing; an earlier result of the gyro stays as it was."""
     try:
         stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
     except OSError:
         stays = ""
-    return _who(task) | {"status": "failed", "reason": printable(reason) + stays}
+    return FleetEntry(
+        name=task.unit.name,
+        dataset=_shown(task),
+        axis=task.unit.axis,
+        status="failed",
+        reason=printable(reason) + stays,
+    )
 
 
-def _who(task: Task) -> Entry:
-    return {
-        "name": task.unit.name,
-        "dataset": printable(str(task.unit.dataset)),
-        "axis": task.unit.axis,
-    }
+def _shown(task: Task) -> str:
+    return printable(str(task.unit.dataset))
 
 
-def _built(task: Task) -> Entry:
+def _built(task: Task) -> FleetEntry:
     """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
     key = task.key()
     dataset = load(task.unit.dataset, axis=task.unit.axis)
@@ -105,49 +109,57 @@ def _built(task: Task) -> Entry:
         )
         if task.key() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        failed_checks = "; ".join(built.failures)
-        status = {"status": "failed", "reason": failed_checks} if failed_checks else {"status": "done"}
-        figures: Entry = {"serial": dataset.serial} | _figures(
-            built.model, built.evaluation, built.verification
-        )
-        figures |= _judgement(built, dataset) | {"facts": facts_of(runs)}
-        figures["sketch"] = "".join(f"{word:016x}" for word in dataset.sketch)
-        entry = write_entry(stage.folder, _who(task) | status | {"key": key} | figures)
-    return entry | {"aside": aside} if aside else entry
+        entry = _entry_of(task, key, dataset, built, runs)
+        write_entry(stage.folder, entry)
+    return entry.model_copy(update={"aside": aside}) if aside else entry
 
 
-def _figures(model: Model, evaluation: Evaluation, verification: Verification) -> Entry:
-    """What the summary shows and outliers are sought in."""
-    role, judged = evaluation.judged() or (None, None)
-    floor = evaluation.noise_floor_dph
-    after = judged.after.rms_dph if judged else None
-    return {
-        "judged_on": role,
-        "before_rms_dph": judged.before.rms_dph if judged else None,
-        "after_rms_dph": after,
-        "after_mean_dph": judged.after.mean_dph if judged else None,
-        "rms_over_floor": after / floor if floor and after is not None else None,
-        "noise_floor_dph": floor,
-        "bias_dph": model.fallback_dph,
-        "centers": model.n_centers,
-        "table_bytes": evaluation.model.table_bytes,
-        "sum_abs_weights_dph": evaluation.model.sum_abs_weights_dph,
-        "error_bound_dph": verification.error_bound_dph,
-        "findings": [finding.id for finding in evaluation.findings],
-        "model_hash": model.hash,
-    }
+def _entry_of(  # long: a field a line
+    task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]
+) -> FleetEntry:
+    """What the summary says of the gyro, and what it is compared with others by."""
+    role, judged = built.evaluation.judged() or (None, None)
+    floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None
+    held = built.limits
+    entry = FleetEntry(
+        name=task.unit.name,
+        dataset=_shown(task),
+        axis=task.unit.axis,
+        status="failed" if built.failures else "done",
+        serial=dataset.serial,
+        judged_on=role,
+        before_rms_dph=judged.before.rms_dph if judged else None,
+        after_rms_dph=after,
+        after_mean_dph=judged.after.mean_dph if judged else None,
+        rms_over_floor=after / floor if floor and after is not None else None,
+        noise_floor_dph=floor,
+        bias_dph=built.model.fallback_dph,
+        centers=built.model.n_centers,
+        table_bytes=built.evaluation.model.table_bytes,
+        sum_abs_weights_dph=built.evaluation.model.sum_abs_weights_dph,
+        error_bound_dph=built.verification.error_bound_dph,
+        findings=tuple(finding.id for finding in built.evaluation.findings),
+        model_hash=built.model.hash,
+        verdict=held.verdict if held else None,
+        limits_met=sum(limit.met for limit in held.limits) if held else None,
+        limits_held=len(held.limits) if held else None,
+        expanded_uncertainty_dph=_expanded(built.evaluation),
+        date=_date_of(built.model, dataset),
+        rows_left_out=built.evaluation.rows_left_out,
+        facts=facts_of(runs),
+        sketch="".join(f"{word:016x}" for word in dataset.sketch),
+        key=key,
+    )
+    return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry
 
 
-def _judgement(built: Built, dataset: Dataset) -> Entry:
-    """Verdict, uncertainty and date, as the page of the unit states them."""
-    held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
-    stated = built.model.meta.get("calibrated_on")
+def _expanded(evaluation: Evaluation) -> float | None:
+    """Uncertainty of the RMS as the page of the unit states it, deg/h."""
+    known = (evaluation.uncertainty or {}).get("rms_dph")
+    return coverage_factor(known.freedom) * known.standard if known else None
+
+
+def _date_of(model: Model, dataset: Dataset) -> str | None:
+    stated = model.meta.get("calibrated_on")
     days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
-    return {
-        "verdict": held.verdict if held else None,
-        "limits_met": sum(limit.met for limit in held.limits) if held else None,
-        "limits_held": len(held.limits) if held else None,
-        "expanded_uncertainty_dph": coverage_factor(known.freedom) * known.standard if known else None,
-        "date": str(stated) if stated is not None else max(days, default=None),
-        "rows_left_out": built.evaluation.rows_left_out,
-    }
+    return str(stated) if stated is not None else max(days, default=None)

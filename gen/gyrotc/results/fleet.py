@@ -1,0 +1,202 @@
+"""`fleet.json`, and the `entry.json` of each gyro: many serials at once."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr
+
+from .base import Amount, Axis, Count, Figure, Part, Result
+from .limits import Verdict
+
+__all__ = [
+    "ComparedRun",
+    "Copy",
+    "Facts",
+    "FleetEntry",
+    "FleetOutlier",
+    "FleetSummary",
+    "FleetUnit",
+    "LikelyStep",
+    "Reason",
+    "ResidualSeries",
+    "Spread",
+]  # fmt: skip
+
+
+class FleetUnit(Part):
+    """One gyro; figures are absent where no table was made, and null where they were not measured."""
+
+    name: str = Field(description="of its folder in the fleet")
+    dataset: str | None = Field(
+        default=None, description="its recordings; absent where the fleet was stopped before it"
+    )
+    axis: Axis = Field(description="null where the recordings have one axis")
+    status: Literal["done", "failed", "unfinished"] = Field(
+        description="`done`: its table was made and passed every check; `unfinished`: the fleet was stopped before it"
+    )
+    reason: str | None = Field(default=None, description="why it is not done")
+    serial: str | None = Field(default=None, description="gyro serial")
+    judged_on: Literal["exam", "left_out", "train"] | None = Field(
+        default=None, description="runs that the figures are of"
+    )
+    before_rms_dph: Figure = Field(default=None, description="RMS before compensation, deg/h")
+    after_rms_dph: Figure = Field(default=None, description="RMS after compensation, deg/h")
+    after_mean_dph: Figure = Field(default=None, description="mean after compensation, deg/h")
+    rms_over_floor: Figure = Field(default=None, description="`after_rms_dph` over the noise floor")
+    noise_floor_dph: Figure = Field(default=None, description="noise floor of the model, deg/h")
+    bias_dph: Figure = Field(default=None, description="mean bias of the training samples, deg/h")
+    centers: Count | None = Field(default=None, description="of all networks")
+    table_bytes: Count | None = Field(default=None, description="size of the table, bytes (section 3)")
+    sum_abs_weights_dph: Figure = Field(default=None, description="largest sum of a network's weights, deg/h")
+    error_bound_dph: Figure = Field(default=None, description="of the tables for any input, deg/h")
+    findings: tuple[str, ...] = Field(
+        default=(),
+        description="ids of findings; `copy_of_other` and `sign_reversed` come from the comparison with the fleet",
+    )
+    model_hash: str | None = Field(default=None, description="hash of the model")
+    verdict: Verdict | None = Field(default=None, description="the worst of all limits; null without limits")
+    limits_met: Count | None = Field(default=None, description="limits that are met; null without limits")
+    limits_held: Count | None = Field(default=None, description="limits in all; null without limits")
+    expanded_uncertainty_dph: Figure = Field(
+        default=None, description="U of `after_rms_dph` (95.45 %), deg/h"
+    )
+    date: str | None = Field(
+        default=None, description="`calibrated_on` of the data set, else the day of its last run"
+    )
+    rows_left_out: Count | None = Field(default=None, description="rows of training that were outliers")
+    aside: str | None = Field(
+        default=None, description="folder of an earlier result of the gyro that somebody had changed"
+    )
+    copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows")
+    apart: str | None = Field(default=None, description="why it stands apart, as in `apart` of the fleet")
+
+
+class LikelyStep(Part):
+    """The likeliest step in what compensation leaves of a run."""
+
+    time_s: float = Field(description="from the start of the run, s")
+    size_dph: float = Field(description="how far the mean moves, deg/h")
+    score: Amount = Field(description="in standard deviations of the move for white noise")
+
+
+class ComparedRun(Part):
+    """Facts about one run."""
+
+    file: str = Field(description="as in `dataset.toml`")
+    mean_c: float = Field(description="mean temperature, C")
+    noise_dph: Amount = Field(description="noise of a mean, deg/h")
+    step: LikelyStep = Field(description="its likeliest step, however small")
+
+
+class ResidualSeries(Part):
+    """What compensation leaves of a run, for its picture."""
+
+    file: str = Field(description="as in `dataset.toml`")
+    time_s: tuple[float, ...] = Field(description="on the file's clock, s")
+    rate_dph: tuple[float, ...] = Field(description="after compensation, deg/h")
+
+
+class Facts(Part):
+    """What a gyro is compared with others by."""
+
+    curve: tuple[Figure, ...] = Field(
+        description="mean bias in cells of 5 C from -90 C to 200 C, deg/h; null where there are few means"
+    )
+    runs: tuple[ComparedRun, ...] = Field(description="every run")
+    series: ResidualSeries | None = Field(description="of the run whose step is the clearest")
+
+
+class FleetEntry(FleetUnit):
+    """One gyro as in `fleet.json`, and what it was made of and is compared by."""
+
+    facts: Facts | None = Field(default=None, description="what it is compared with others by")
+    sketch: Annotated[str, Field(pattern="^([0-9a-f]{16})*$")] = Field(
+        default="", description="the 16-digit hashes of some rows, chosen by their value: copies share them"
+    )
+    key: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = Field(
+        default=None, description="SHA-256 over recordings, options, limits and program"
+    )
+    _kept: bool = PrivateAttr(default=False)
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is of an earlier call; not written."""
+        return self._kept
+
+    def as_kept(self) -> FleetEntry:
+        """The same, of an earlier call."""
+        found = self.model_copy()
+        found._kept = True
+        return found
+
+    def told(self) -> FleetUnit:
+        """What a summary says of it."""
+        known = self.model_fields_set & set(FleetUnit.model_fields)
+        return FleetUnit(**{name: getattr(self, name) for name in FleetUnit.model_fields if name in known})
+
+
+class Spread(Part):
+    """A figure over the fleet."""
+
+    median: float = Field(description="of the gyros that have it")
+    least: float = Field(description="of the gyros that have it")
+    largest: float = Field(description="of the gyros that have it")
+
+
+class FleetOutlier(Part):
+    """A figure of a gyro that stands apart from those of its axis."""
+
+    name: str = Field(description="of the gyro")
+    figure: str = Field(description="name of the figure, a field of `FleetUnit`")
+    value: float = Field(description="of this gyro")
+    median: float = Field(description="of the gyros of its axis")
+    sigmas: float = Field(description="distance in robust standard deviations")
+
+
+class Reason(Part):
+    """The likeliest reason why a gyro stands apart from those of its axis."""
+
+    name: str = Field(description="of the gyro")
+    id: str = Field(
+        description="`copy_of_other`, `axes_exchanged`, `thermometer_apart`, `sign_reversed`, `scale`, `outliers`, "
+        "`step`, `noise`, or `bias_apart` where nothing known explains it"
+    )
+    text: str = Field(description="the reason in words")
+    file: str | None = Field(default=None, description="run in which it shows; null: in all")
+    time_s: float | None = Field(
+        default=None, description="from the start of that run, s; null: all the time"
+    )
+
+
+class Copy(Part):
+    """Two gyros of different serials that have the same rows: the recordings are of one of them."""
+
+    name: str = Field(description="of a gyro")
+    serial: str = Field(description="its serial")
+    other: str = Field(description="name of the other")
+    other_serial: str = Field(description="the other's serial")
+    share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        description="of the rows of the one with fewer, estimated from the hashes that both have"
+    )
+
+
+class FleetSummary(Result):
+    """Many gyros (`gyrotc fleet`)."""
+
+    schema_: Annotated[Literal["gyrotc.fleet/1"], Field(alias="schema")] = "gyrotc.fleet/1"
+    serial: None = Field(description="a fleet is of no single gyro")
+    axis: None = Field(description="and of no single axis")
+    units: Count = Field(description="gyros")
+    done: Count = Field(description="gyros that are `done`")
+    failed: Count = Field(description="gyros that `failed`")
+    unfinished: Count = Field(description="gyros that are `unfinished`")
+    figures: dict[str, Spread | None] = Field(
+        description="figures over the fleet by their names; null where no gyro has it"
+    )
+    outliers: tuple[FleetOutlier, ...] = Field(description="figures that stand apart, the farthest first")
+    apart: tuple[Reason, ...] = Field(description="gyros that stand apart, in the order of the manifest")
+    copies: tuple[Copy, ...] = Field(
+        description="pairs of gyros of different serials with the same rows, in the order of the manifest"
+    )
+    serials: tuple[FleetUnit, ...] = Field(description="every gyro, in the order of the manifest")
