@@ -18,6 +18,11 @@ class TrueRun(Part):
     noise: str = Field(description="file of its noise, mean of every step, deg/h, by its path in the folder")
     noise_step_s: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(description="length of a step, s")
     bias_dph: tuple[float, float] = Field(description="lowest and highest true bias, deg/h")
+    states: dict[str, str] | None = Field(
+        default=None,
+        description="of a gyro with further thermometers, differences of nodes or a laser: files of its true states by "
+        "name (temperatures of the nodes, C; losses and gain, 1e-6; stroke, half wavelengths), mean of every step",
+    )
 
 
 class TrueLot(Part):
@@ -44,6 +49,8 @@ class SimulatedTruth(Numbered):
         description="the bias of the gyro over temperature and its rate, as it was drawn"
     )
     causes: tuple[dict[str, Any], ...] = Field(description="`id`, `channel` and parameters of each cause")
-    plan: dict[str, Any] = Field(description="gyro, chamber, sensor and channels of the scenario")
+    plan: dict[str, Any] = Field(
+        description="gyro, chamber, sensor and what is recorded of the scenario: thermometers, laser, channels"
+    )
     runs: tuple[TrueRun, ...] = Field(description="every run")
     lot: TrueLot | None = Field(default=None, description="of a gyro of a lot")

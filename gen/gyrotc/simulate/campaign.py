@@ -57,6 +57,7 @@ _DECLARED = (
     "rate_random_walk_dph_per_sqrt_h",
     "quantum_arcsec",
 )
+_SHOWN = {"gyro", "chamber", "sensor", "channel"}
 _DEFAULT_PULSE_ARCSEC = 0.01  # finer than the noise of any row, so that only a declared quantum shows
 _PULSES_PER_QUANTUM = 16  # a power of 2, so that pulses and quantum are exact multiples
 
@@ -234,7 +235,19 @@ def _truth_of_run(
     path = f"truth/{Path(file).stem}.noise.npy"
     np.save(folder / path, noise.astype(np.float32))
     bias = float(made.bias_dph.min()), float(made.bias_dph.max())
-    return TrueRun(file=file, noise=path, noise_step_s=step_s, bias_dph=bias)
+    true = TrueRun(file=file, noise=path, noise_step_s=step_s, bias_dph=bias)
+    if not made.states:
+        return true
+    return true.model_copy(update={"states": _written_states(folder, file, made, length.cells)})
+
+
+def _written_states(folder: Path, file: str, made: SimulatedRecord, cells: int) -> dict[str, str]:
+    """Writes the means of the true states over the steps of the noise; names of the files."""
+    paths = {name: f"truth/{Path(file).stem}.{name}.npy" for name in made.states}
+    for name, values in made.states.items():
+        whole = values[: len(values) - len(values) % cells]
+        np.save(folder / paths[name], whole.reshape(-1, cells).mean(axis=1).astype(np.float32))
+    return paths
 
 
 def _write_texts(
@@ -267,7 +280,9 @@ def _write_texts(
         causes=tuple(
             {"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause
         ),
-        plan=plan.model_dump(mode="json", include={"gyro", "chamber", "sensor", "channel"}),
+        plan=plan.model_dump(
+            mode="json", include=_SHOWN | ({"thermometer", "difference", "laser"} & plan.model_fields_set)
+        ),
         runs=tuple(truths),
     )
     truth = truth.model_copy(update={"lot": gyro.lot}) if gyro.lot else truth

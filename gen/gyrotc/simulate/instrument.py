@@ -12,8 +12,10 @@ from ..terms import CATALOGUE, Scene
 from ..terms.operators import first_order
 from . import chamber, channels, noise, profile, thermal
 from .biasmap import BiasMap
+from .internal import internal_of, internal_readings
 from .noise import CELL_S
 from .scenario import Gyro, Profile, Scenario, ScenarioCause
+from .thermometers import quantised_c
 
 __all__ = ["SimulatedRecord", "record", "thermal_network"]
 
@@ -27,7 +29,8 @@ class SimulatedRecord:
 
     Attributes:
         reading_c: Temperature readings, one at the start of every cell, C, shape (cells,).
-        channels: Readings of the auxiliary channels, the same.
+        channels: Readings of the auxiliary channels, further thermometers and the laser's signals first, the same.
+        states: True temperatures of the nodes, C, and states of the laser, where a scenario asks for such, the same.
         air_c: Air in the chamber at the cells' edges, C, shape (cells + 1,).
         cavity_c: Temperature that the bias acts on, the same.
         bias_dph: Bias at the cells' edges, deg/h, shape (cells + 1,).
@@ -42,6 +45,7 @@ class SimulatedRecord:
 
     reading_c: Array
     channels: dict[str, Array]
+    states: dict[str, Array]
     air_c: Array
     cavity_c: Array
     bias_dph: Array
@@ -62,24 +66,25 @@ def record(
     What is drawn for the chamber, the sensor, the noise and each cause has its own seed: switching one of
     them on changes nothing else.
     """
-    world, sensing, noisy, fine, causal = seeds.spawn(5)
+    world, sensing, noisy, fine, causal, inner = seeds.spawn(6)
     first, cells = _cells(run.record_from_min), _cells(run.record_min)
-    arrays = _ARRAYS + len(scenario.gyro.node) + 2 * len(scenario.channel)
-    need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
+    _need_room(scenario, first, cells)
     inside = slice(first, first + cells + 1)
-    air_c, scene, true_channels = _scene(scenario, run, first + cells + 1, day, world)
+    air_c, nodes_c, scene, true_channels = _scene(scenario, run, first + cells + 1, day, world)
     scene, bias = _bias(scenario, scene, true_channels, bias_map, causal)
+    internal = internal_of(scenario, nodes_c, scene, np.random.default_rng(inner.spawn(1)[0]))
+    bias = bias + internal.bias_dph
     sensor_seeds, channel_seeds = sensing.spawn(2)
     reading = _readings(scenario, scene.sensed_c, np.random.default_rng(sensor_seeds))
-    readings = _channel_readings(scenario, true_channels, channel_seeds)
+    of_channels = _channel_readings(scenario, true_channels, channel_seeds)
     cavity = scene.cavity_c[inside]
-    slope = 60.0 * np.diff(cavity) / CELL_S
-    rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], slope)
+    rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], 60.0 * np.diff(cavity) / CELL_S)
     true = _integral(bias[inside])
     gathered = true + np.concatenate(([0.0], np.cumsum(rough.angle_arcsec)))
     return SimulatedRecord(
         reading_c=reading[inside][:-1],
-        channels={name: values[inside][:-1] for name, values in readings.items()},
+        channels=_of_record(internal_readings(scenario, internal, air_c, scene, inner) | of_channels, inside),
+        states=_of_record(internal.states, inside),
         air_c=air_c[inside],
         cavity_c=cavity,
         bias_dph=bias[inside],
@@ -91,6 +96,16 @@ def record(
         power_on_s=CELL_S * (_cells(run.power_on_min) - first),
         seeds=fine,
     )
+
+
+def _need_room(scenario: Scenario, first: int, cells: int) -> None:
+    """Refuses a run that would not fit into memory."""
+    arrays = _ARRAYS + 3 * len(scenario.gyro.node) + 2 * len(scenario.columns())
+    need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
+
+
+def _of_record(columns: dict[str, Array], inside: slice) -> dict[str, Array]:
+    return {name: values[inside][:-1] for name, values in columns.items()}
 
 
 def thermal_network(gyro: Gyro) -> thermal.ThermalNetwork:
@@ -130,8 +145,8 @@ def _read_angle(angle: Array, quantum_arcsec: float, seeds: np.random.SeedSequen
 
 def _scene(
     scenario: Scenario, run: Profile, points: int, day: float, seeds: np.random.SeedSequence
-) -> tuple[Array, Scene, dict[str, Array]]:
-    """Air, nodes and channels from the start of the programme on."""
+) -> tuple[Array, dict[str, Array], Scene, dict[str, Array]]:
+    """Air, nodes, what causes see of them, and channels from the start of the programme on."""
     chamber_seeds, channel_seeds = seeds.spawn(2)
     time_s: Array = CELL_S * np.arange(points, dtype=np.float64)
     limit = scenario.chamber.max_c_per_min
@@ -141,7 +156,8 @@ def _scene(
     on_s = time_s - CELL_S * _cells(run.power_on_min)
     network = thermal_network(scenario.gyro)
     nodes_c = network.respond(air_c, (on_s >= 0.0).astype(np.float64), CELL_S)
-    node_c = nodes_c[network.names.index(scenario.sensor.node)]
+    by_name = dict(zip(network.names, nodes_c, strict=True))
+    node_c = by_name[scenario.sensor.node]
     true_channels = {
         channel.name: channels.true_values(channel, air_c, CELL_S, np.random.default_rng(child))
         for channel, child in zip(scenario.channel, channel_seeds.spawn(len(scenario.channel)), strict=True)
@@ -150,12 +166,12 @@ def _scene(
         time_s=time_s,
         on_s=on_s,
         node_c=node_c,
-        cavity_c=nodes_c[network.names.index(scenario.gyro.cavity_node)],
+        cavity_c=by_name[scenario.gyro.cavity_node],
         sensed_c=first_order(scenario.sensor.lag_s, time_s, node_c),
         channel=None,
         day=day,
     )
-    return air_c, scene, true_channels
+    return air_c, by_name, scene, true_channels
 
 
 def _bias(
@@ -188,9 +204,7 @@ def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, A
 def _readings(scenario: Scenario, sensed_c: Array, rng: np.random.Generator) -> Array:
     sensor = scenario.sensor
     reading = sensed_c + sensor.offset_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
-    if not sensor.resolution_c:
-        return np.asarray(reading)
-    return np.asarray(sensor.resolution_c * np.round(reading / sensor.resolution_c))
+    return quantised_c(reading, sensor.resolution_c)
 
 
 def _channel_readings(

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..inputs import read_toml, refuse_above
 from ..terms import CATALOGUE
 from .profile import Step
+from .signals import Laser, NodeDifference, Thermometer
 
 __all__ = ["Chamber", "Channel", "NoiseLevels", "Profile", "Scenario", "ScenarioCause", "names", "read"]
 
@@ -187,6 +188,9 @@ class Scenario(_Strict):
     chamber: Chamber = Field(default_factory=Chamber)
     sensor: Sensor = Field(default_factory=Sensor)
     noise: NoiseLevels = Field(default_factory=NoiseLevels)
+    thermometer: list[Thermometer] = []
+    difference: list[NodeDifference] = []
+    laser: Laser | None = None
     channel: list[Channel] = []
     cause: list[ScenarioCause] = []
     profile: Annotated[dict[str, Profile], Field(min_length=1)]
@@ -197,15 +201,34 @@ class Scenario(_Strict):
         for index, run_set in enumerate(self.set):
             if unknown := [name for name in run_set.profiles if name not in self.profile]:
                 raise ValueError(f"set {index + 1} runs {unknown}, which are no profiles")
-        if self.sensor.node not in self.gyro.node:
-            raise ValueError(f"sensor.node {self.sensor.node!r} is no node of the gyro")
+        for place, node in self._places():
+            if node not in self.gyro.node:
+                raise ValueError(f"{place} {node!r} is no node of the gyro")
         channels = [channel.name for channel in self.channel]
-        if len(set(channels)) < len(channels) or _OWN_COLUMNS & set(channels):
-            raise ValueError(f"channel names {channels} repeat, or are columns of every recording")
+        columns = self.columns()
+        if len(set(columns)) < len(columns) or _OWN_COLUMNS & set(columns):
+            raise ValueError(f"names of channels {columns} repeat, or are columns of every recording")
         for cause in self.cause:
             if cause.channel is not None and cause.channel not in channels:
                 raise ValueError(f"{cause.id} follows {cause.channel!r}, which is no channel")
         return self
+
+    def columns(self) -> list[str]:
+        """Names of the recorded channels: thermometers, signals of the laser, what else is recorded."""
+        of_laser = [self.laser.intensity, self.laser.path_voltage] if self.laser else []
+        return [t.name for t in self.thermometer] + of_laser + [channel.name for channel in self.channel]
+
+    def _places(self) -> list[tuple[str, str]]:
+        """Where nodes are named, and the names."""
+        named = [("sensor.node", self.sensor.node)]
+        named += [(f"node of thermometer {t.name}", t.node) for t in self.thermometer]
+        named += [("node of a difference", n) for d in self.difference for n in (d.node, d.against)]
+        if self.laser:
+            laser = self.laser
+            named += [
+                ("a node of the laser", n) for n in (laser.mirror_node, laser.gas_node, laser.path_node)
+            ]
+        return named
 
 
 def names() -> list[str]:

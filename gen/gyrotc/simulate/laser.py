@@ -1,0 +1,106 @@
+"""What the laser knows of itself: losses and gain in the beam's intensity, the block's length in the path voltage.
+
+    loss = loss_ppm + loss_ppm_per_c (T_mirror − 20) + contamination + 4 walk_ppm s²
+    gain = gain_ppm (1 + gain_per_c (T_gas − gas_c)) exp(−day/depletion_day)
+    intensity = level (gain/loss − 1)/(gain_ppm/loss_ppm − 1)
+    fringes = (path (α (T_path − 20) + β (T_path − 20)²) + mirror_nm_per_c (T_mirror − T_path))/(λ/2)
+    s = fringes less a whole number; voltage = stroke_v s
+    bias += null_dph_per_ppm (loss − loss_ppm) (1 + null_growth_per_c (T_path − 20)) + stroke_dph sin(π s)
+
+Above threshold the intensity of a gas laser goes with gain over loss less 1, and the gain with the density of what
+the discharge excites (Aronowitz, "Fundamentals of the Ring Laser Gyro", RTO AGARDograph 339, 1999). The null shift
+follows the losses and their change (Di Virgilio et al., "Analysis of ring laser gyroscopes including laser dynamics",
+Eur. Phys. J. C 79, 573, 2019). The control of the path length moves a mirror by at most `reset_share` of half a
+wavelength to either side; beyond it jumps by a whole half wavelength to the next mode, so where it stands depends on
+where it came from. A moved mirror walks the beam against its aperture: 4 walk_ppm s² and the sine. The levels are
+rules of thumb and parameters for this reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .signals import Laser
+
+__all__ = ["LaserStates", "laser_bias", "laser_readings", "laser_states"]
+
+Array = NDArray[np.float64]
+
+_REFERENCE_C = 20.0  # at which the parameters of a scenario hold
+
+
+@dataclass(frozen=True, slots=True)
+class LaserStates:
+    """True states of the laser in one run, shape (n,) each.
+
+    Attributes:
+        loss_ppm: Losses of a round trip, 1e-6.
+        gain_ppm: Gain of a round trip, the same.
+        stroke: Place of the moving mirror, half wavelengths from the middle.
+        path_c: Temperature of the node whose length counts, C.
+    """
+
+    loss_ppm: Array
+    gain_ppm: Array
+    stroke: Array
+    path_c: Array
+
+
+def laser_states(
+    laser: Laser, mirror_c: Array, gas_c: Array, path_c: Array, day: float, contamination_ppm: Array
+) -> LaserStates:
+    """States of the laser from the true temperatures of its nodes, C, shape (n,).
+
+    `contamination_ppm`: losses that come and go with no temperature, 1e-6, the same shape.
+    """
+    stroke = _stroke(_fringes(laser, mirror_c, path_c), laser.reset_share)
+    loss = laser.loss_ppm + laser.loss_ppm_per_c * (mirror_c - _REFERENCE_C) + contamination_ppm
+    gain = laser.gain_ppm * (1.0 + laser.gain_per_c * (gas_c - laser.gas_c))
+    return LaserStates(
+        loss_ppm=np.maximum(loss + 4.0 * laser.walk_ppm * stroke**2, 1.0),
+        gain_ppm=gain * float(np.exp(-day / laser.depletion_day)),
+        stroke=stroke,
+        path_c=path_c,
+    )
+
+
+def _fringes(laser: Laser, mirror_c: Array, path_c: Array) -> Array:
+    """How much longer the path is than at 20 C, half wavelengths."""
+    warmer = path_c - _REFERENCE_C
+    longer = laser.expansion_ppm_per_c * warmer + laser.expansion_ppm_per_c2 * warmer**2
+    path_nm = laser.path_mm * longer + laser.mirror_nm_per_c * (mirror_c - path_c)  # mm times 1e-6 is nm
+    return np.asarray(path_nm / (0.5 * laser.wavelength_nm))
+
+
+def _stroke(fringes: Array, reset_share: float) -> Array:
+    """Fringes less the mode that the control holds; it takes the nearest mode at the start and where it must jump."""
+    order = float(np.round(fringes[0]))
+    orders = np.empty(len(fringes))
+    begin = 0
+    while begin < len(fringes):
+        beyond = np.flatnonzero(np.abs(fringes[begin:] - order) > reset_share)
+        end = begin + int(beyond[0]) if beyond.size else len(fringes)
+        orders[begin:end] = order
+        begin = end
+        if end < len(fringes):
+            order = float(np.round(fringes[end]))
+    return fringes - orders
+
+
+def laser_bias(laser: Laser, states: LaserStates) -> Array:
+    """What losses and mirror add to the bias, deg/h, shape (n,)."""
+    growth = 1.0 + laser.null_growth_per_c * (states.path_c - _REFERENCE_C)
+    null = laser.null_dph_per_ppm * (states.loss_ppm - laser.loss_ppm) * growth
+    return np.asarray(null + laser.stroke_dph * np.sin(np.pi * states.stroke))
+
+
+def laser_readings(laser: Laser, states: LaserStates, rng: np.random.Generator) -> dict[str, Array]:
+    """Readings of intensity and path-length voltage, V, by the names of their columns."""
+    n = len(states.stroke)
+    above = (states.gain_ppm / states.loss_ppm - 1.0) / (laser.gain_ppm / laser.loss_ppm - 1.0)
+    intensity = laser.intensity_level_v * above + rng.normal(0.0, laser.intensity_noise_v, n)
+    voltage = laser.stroke_v * states.stroke + rng.normal(0.0, laser.stroke_noise_v, n)
+    return {laser.intensity: intensity, laser.path_voltage: voltage}
