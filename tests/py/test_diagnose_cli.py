@@ -72,7 +72,7 @@ def test_the_page_shows_verdict_pictures_and_limits(built: Path) -> None:
     for text in (
         "What the simulation gets wrong",
         "What could still hide",
-        "Who else was considered",
+        "What else was considered",
         "next",
     ):
         assert text in page

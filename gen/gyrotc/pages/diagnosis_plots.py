@@ -1,5 +1,5 @@
 # long: one function for each picture of a page
-"""Pictures of a diagnosis: what the simulation does not do, what the named cause does, who else was considered.
+"""Pictures of a diagnosis: what the simulation does not do, what the named cause does, what else was considered.
 
 Draws; computes nothing but running means. `draw` gives all pictures of a diagnosis by name, each one `<svg>` element.
 """

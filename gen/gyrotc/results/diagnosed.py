@@ -98,7 +98,7 @@ class NamedCause(Part):
     separate_by: str | None = Field(description="the experiment that would tell them apart")
     gain: GainOnUnseen | None = Field(description="null for noise")
     signature: str = Field(description="how it shows")
-    remedy: str = Field(description="what stands against it")
+    remedy: str = Field(description="what helps against it")
     separable_from_d: dict[str, float] | None = Field(
         default=None, description="size, in standard deviations, from which each other cause is ruled out"
     )
