@@ -149,8 +149,12 @@ odd: setup
 cycles: setup
 	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/test_diagnose_cycle.py -k clean_cycles
 
+## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
+packages: setup
+	@$(PYTHON) tools/packages.py build/packages
+
 ## remove what was built (not .venv)
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot kills blind odd cycles clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot kills blind odd cycles packages clean

@@ -88,6 +88,18 @@ def test_cmake_finds_it(prefix: Path, user: Path) -> None:
     _run(user / "build" / "user")
 
 
+def test_a_project_takes_the_sources_in(user: Path) -> None:
+    """FetchContent, with a folder in place of a URL: no installation, the options as in any build."""
+    taken = f"""include(FetchContent)
+set(GTC_MAX_TERMS 2)
+FetchContent_Declare(gyrotc SOURCE_DIR "{ROOT}")
+FetchContent_MakeAvailable(gyrotc)"""
+    (user / "CMakeLists.txt").write_text(PROJECT.replace("find_package(gyrotc 0.1 REQUIRED)", taken))
+    _run("cmake", "-S", user, "-B", user / "build", "-DGTC_MAX_TERMS=2")
+    _run("cmake", "--build", user / "build")
+    _run(user / "build" / "user")
+
+
 def test_pkg_config_finds_it(prefix: Path, user: Path) -> None:
     (folder,) = prefix.glob("lib*/**/pkgconfig")
     found = ["env", f"PKG_CONFIG_PATH={folder}", "pkg-config"]
