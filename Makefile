@@ -129,6 +129,10 @@ bench-import:
 lot: setup
 	@$(PYTHON) -m bench.lot docs
 
+## does the uncertainty that the page states hold, on 200 simulated units: docs/results.md
+uncertainty: setup
+	@$(PYTHON) -m bench.budget docs
+
 ## a thousand gyros through gyrotc fleet: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
@@ -157,4 +161,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot kills blind odd cycles packages clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills blind odd cycles packages clean

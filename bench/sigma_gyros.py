@@ -23,7 +23,7 @@ from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
 from gyrotc.train.rules import start_sigma
 from numpy.typing import NDArray
 
-__all__ = ["BLOCK_S", "Gyro", "Recording", "gyro"]
+__all__ = ["BLOCK_S", "Gyro", "Recording", "exam_of", "gyro"]
 
 Floats = NDArray[np.float64]
 
@@ -59,11 +59,12 @@ def gyro(scenario: str, seed: int, *, terms: Sequence[Term] = (), numeric: str =
             plan.write_text(scenario, "utf-8")
         simulate(plan, seed=seed, out=Path(place) / "data", format="parquet")
         model = _model(Path(place) / "data", terms)
-        exam = tuple(_exam(plan, seed))
+        exam = tuple(exam_of(plan, seed))
     return Gyro(seed, model, quantise(model, numeric), exam)
 
 
-def _exam(plan: str | Path, seed: int) -> Iterator[Recording]:
+def exam_of(plan: str | Path, seed: int) -> Iterator[Recording]:
+    """The exam runs of a simulated gyro, with their true bias."""
     content = with_noise(read(plan)[1], "paper")
     runs = [(s.role, name) for s in content.set for name in s.profiles]
     n = round(BLOCK_S)

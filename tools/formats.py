@@ -13,6 +13,7 @@ from pathlib import Path
 from gyrotc.emit.record import EmissionRecord
 from gyrotc.model import Model
 from gyrotc.results.base import Part
+from gyrotc.results.budget import Budget
 from gyrotc.results.changes import Changes
 from gyrotc.results.check import Checked
 from gyrotc.results.comparison import Comparison
@@ -35,6 +36,7 @@ FORMAT = ROOT / "docs" / "FORMAT.md"
 SCHEMAS = ROOT / "gen" / "gyrotc" / "results" / "schemas"
 
 RESULTS: dict[str, type[Part]] = {
+    "budget": Budget,
     "changes": Changes,
     "check": Checked,
     "compare": Comparison,

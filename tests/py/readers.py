@@ -21,6 +21,7 @@ from gyrotc.emit.record import RECORD, read_options
 from gyrotc.errors import InputError
 from gyrotc.frontend import run_blocks
 from gyrotc.jobs.fleet import load_manifest
+from gyrotc.judge.budget import budget_of
 from gyrotc.judge.changes import Earlier, changes_since
 from gyrotc.judge.check import check
 from gyrotc.judge.evaluate import evaluate
@@ -137,9 +138,11 @@ def make_seeds(folder: Path) -> None:
         units=DeclaredUnits(declared={}, trusted=()), sources=(), versions={"numpy": "2"}, files={"c/gtc.h": "00"},
     )  # fmt: skip
     changes = changes_since(Earlier(out), fitted.model, evaluation, manifest)
+    budget = budget_of(fitted.model, fitted.training, evaluation, verification)
     for name, content in (
         ("verify", verification.content()), ("evaluate", evaluation.content()), ("limits", held.content()),
         ("manifest", manifest.content()), ("changes", changes.content()),
+        ("budget", budget.content()),
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))
     (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min").content()))
@@ -149,7 +152,8 @@ def make_seeds(folder: Path) -> None:
 
 READERS = (
     "csv", "parquet", "dataset.toml", "model.json", "limits.toml", "fleet.toml", "scenario.toml", "evaluate.json",
-    "training.json", "verify.json", "manifest.json", "limits.json", "changes.json", "plan.json", "diagnose.json",
+    "training.json", "verify.json", "manifest.json", "limits.json", "changes.json", "budget.json",
+    "plan.json", "diagnose.json",
     "truth.json", "noise.npy", "trace.csv", "board.log", "bank", "record",
 )  # fmt: skip
 
@@ -181,7 +185,7 @@ def seeds_in(seeds: Path, folder: Path) -> dict[str, Reader]:
         "bank": Reader(_bank(seeds, folder), "bytes", [_bank_bytes(seeds, folder)]),
         "record": Reader(_record(folder), "json", [(result / "c" / RECORD).read_bytes()]),
     }  # fmt: skip
-    for name in ("evaluate", "training", "verify", "manifest", "limits", "changes"):
+    for name in ("evaluate", "training", "verify", "manifest", "limits", "changes", "budget"):
         readers[f"{name}.json"] = Reader(
             _report(result, folder, name), "json", [(result / f"{name}.json").read_bytes()]
         )

@@ -13,6 +13,7 @@ from .. import __version__
 from ..dataset import Dataset, axes_of, load
 from ..emit import emit
 from ..errors import InputError
+from ..judge.budget import budget_of
 from ..judge.changes import changes_since, load_earlier
 from ..judge.evaluate import Watch, evaluate
 from ..judge.limits import Limits, held_against, load_limits
@@ -185,6 +186,10 @@ def _build_axis(
     )
     if changes:
         _write(work / "changes.json", changes.content())
+    budget = budget_of(
+        fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes
+    )
+    _write(work / "budget.json", budget.content())
     if order.compiled:
         say("drawing the report")
         write_report(work)

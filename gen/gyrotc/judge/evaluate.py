@@ -40,7 +40,7 @@ from ..verify.footprint import Footprint, footprint
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
-from .uncertainty import figure_uncertainties
+from .uncertainty import figure_uncertainties, root_mean, squares_of
 
 __all__ = ["ReplayedRun", "Watch", "evaluate", "trace_name"]
 
@@ -56,23 +56,25 @@ class ReplayedRun:
     """One run replayed, every row of the file.
 
     Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps (None: not
-    compared).
+    compared), 1 sigma of the correction (deg/h; None: the table states none).
     """
 
     bias_dph: NDArray[np.float64]
     status: NDArray[np.int32]
     scored: NDArray[np.bool_]
     mismatches: int | None
+    sigma_dph: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A run, its averaged samples, the steps that differ from the reference, and plain facts about it."""
+    """A run, its averaged samples, the steps that differ from the reference, plain facts, squares of its 1 sigma."""
 
     run: Run
     averages: Averages
     mismatches: int | None
     facts: RunFacts
+    squares: tuple[float, int]
 
 
 def evaluate(
@@ -127,13 +129,22 @@ def evaluate(
     training = training or _training_of(folder, dataset, model)
     if result.exam is None and training:
         result = result.model_copy(update={"left_out": training.left_out})
-    generalises = training.generalises if training else None
-    outliers = training.outliers if training else None
-    left_out = outliers.rows if outliers else None
-    result = result.model_copy(update={"generalises": generalises, "rows_left_out": left_out})
-    result = result.model_copy(update={"uncertainty": _uncertainties(result, parts)})
+    result = _with_what_is_known(result, parts, training)
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
+
+
+def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Training | None) -> Evaluation:
+    """The result with what training says of it, and with uncertainties."""
+    outliers = training.outliers if training else None
+    role = "exam" if result.exam else "train"
+    update = {
+        "generalises": training.generalises if training else None,
+        "rows_left_out": outliers.rows if outliers else None,
+        "uncertainty": _uncertainties(result, parts),
+        "sigma_rms_dph": root_mean(p.squares for p in parts if p.run.role == role),
+    }
+    return result.model_copy(update=update)
 
 
 def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, FigureUncertainty] | None:
@@ -178,9 +189,11 @@ def replay_run(
 ) -> ReplayedRun:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
     history = history_of(rows, run, model, table)
+    stated = history.reference.sigma
+    sigma = None if stated is None else table.decode_bias(stated)
     if program is None:
         known = history.reference
-        return ReplayedRun(table.decode_bias(known.bits), known.status, known.block_valid, None)
+        return ReplayedRun(table.decode_bias(known.bits), known.status, known.block_valid, None, sigma)
     try:
         replayed = replay_on(*program, history)
     except CheckFailed as error:
@@ -190,6 +203,7 @@ def replay_run(
         status=replayed.status,
         scored=history.reference.block_valid,
         mismatches=replayed.mismatches,
+        sigma_dph=sigma,
     )
 
 
@@ -217,7 +231,9 @@ def _one_run(
     )
     if trace is not None:
         _write_trace(trace / trace_name(run, all_runs), rows, replayed, span)
-    return _Part(run, averages, replayed.mismatches, facts_of(run, rows))
+    plain = (replayed.status[span] == 0) & replayed.scored[span]
+    squares = squares_of(None if replayed.sigma_dph is None else replayed.sigma_dph[span][plain])
+    return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares)
 
 
 def trace_name(run: Run, all_runs: Sequence[Run]) -> str:

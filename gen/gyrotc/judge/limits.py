@@ -22,6 +22,7 @@ from ..results.limits import DecisionRule, HeldLimits, Limit, Value, Verdict
 from ..results.verification import Verification
 from ..verify.toolchain import all_targets
 from .conformity import decided, worst_of
+from .instruments import StatedInstrument
 
 __all__ = ["Limits", "held_against", "load_limits"]
 
@@ -100,6 +101,13 @@ class Required(_Part):
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
 
 
+class Interval(_Part):
+    """How long a calibration is meant to hold, and what the bias of the type does in that time."""
+
+    days: Annotated[float, Field(gt=0.0, le=36525.0)]
+    drift_dph_per_year: Amount = None  # the most that units of the type do
+
+
 class Limits(_Part):
     """The content of a limits file."""
 
@@ -110,6 +118,8 @@ class Limits(_Part):
     at_least: AtLeast = AtLeast()
     covers: Covers = Covers()
     needs: Required = Required()
+    interval: Interval | None = None
+    instrument: Annotated[tuple[StatedInstrument, ...], BeforeValidator(_as_tuple)] = ()
     sha256: str = ""  # of the file
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..metrics import Averages
 from ..results.evaluation import EvaluatedRun, FigureUncertainty
 
-__all__ = ["figure_uncertainties"]
+__all__ = ["figure_uncertainties", "root_mean", "squares_of"]
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,17 @@ def figure_uncertainties(
         rms_dph = scale * float(np.sqrt(np.mean(after**2)))
         found["rms_over_floor"] = _over_floor(found["rms_dph"], rms_dph, *floor)
     return found | dict(_of_windows(judged, runs, average_s))
+
+
+def squares_of(sigma_dph: Array | None) -> tuple[float, int]:
+    """Sum of squares and number of the 1 sigma of corrections; nothing where a table states none."""
+    return (0.0, 0) if sigma_dph is None else (float(np.sum(sigma_dph**2)), sigma_dph.size)
+
+
+def root_mean(squares: Iterable[tuple[float, int]]) -> float | None:
+    """RMS of several such sums; None where there is no correction."""
+    total, number = np.sum([(0.0, 0), *squares], axis=0)
+    return float(np.sqrt(total / number)) if number else None
 
 
 def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[Array, Array]]:

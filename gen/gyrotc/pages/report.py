@@ -28,6 +28,7 @@ from .words import (
     limit_words,
     measured_words,
     plain,
+    rounded,
     sci,
     with_uncertainty,
     words,
@@ -88,8 +89,9 @@ def page_environment() -> jinja2.Environment:
     Filters print figures and words (`words`); the test `moved_input` tells causes that change what the map sees.
     """
     environment = html_environment(
-        sci=sci, number=_number, times=_times, chance=_chance, known=with_uncertainty, plain=plain, words=words,
-        rung=words_of_rung, limit_words=limit_words, bound_words=bound_words, measured_words=measured_words,
+        sci=sci, number=_number, times=_times, chance=_chance, known=with_uncertainty, plain=plain, rounded=rounded,
+        words=words, rung=words_of_rung, limit_words=limit_words, bound_words=bound_words,
+        measured_words=measured_words,
     )  # fmt: skip
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
     return environment

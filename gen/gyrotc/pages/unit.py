@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
+from ..results.budget import Budget
 from ..results.changes import Changes
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Evaluation, Pooled
@@ -30,6 +31,7 @@ _RULES = {
     "guard_band_binary": "a guard band of w = U; PASS up to the limit less w, else FAIL (ILAC-G8:09/2019, binary)",
     "simple_acceptance": "simple acceptance, w = 0 (ILAC-G8:09/2019, binary)",
 }
+_TOLD_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # entries of `[meta]`
 _GRAVEST = ("FAIL", "CONDITIONAL PASS", "PASS")
 _COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
 
@@ -49,6 +51,7 @@ def unit_in(folder: Path) -> UnitResults:
         diagnosis=read_optional(folder / "diagnosis" / "diagnose.json", Diagnosed),
         limits=read_optional(folder / "limits.json", HeldLimits),
         changes=read_optional(folder / "changes.json", Changes),
+        budget=read_optional(folder / "budget.json", Budget),
     )
 
 
@@ -65,10 +68,11 @@ class UnitResults:
         diagnosis: Diagnosed | None,
         limits: HeldLimits | None,
         changes: Changes | None,
+        budget: Budget | None,
     ) -> None:
         self.model, self.evaluation, self.training = model, evaluation, training
         self.verification, self.manifest, self.diagnosis = verification, manifest, diagnosis
-        self.limits, self.changes = limits, changes
+        self.limits, self.changes, self.budget = limits, changes, budget
         judged = evaluation.judged()
         self.judged = judged[1] if judged else None
         self.judged_on = _JUDGED_ON[judged[0]] if judged else "nothing"
@@ -131,9 +135,7 @@ class UnitResults:
     @property
     def who(self) -> list[tuple[str, str]]:
         """Who, what and when, of what is known."""
-        meta = {
-            k: v for k, v in self.model.meta.items() if k not in ("warnings", "environments", "description")
-        }
+        meta = {k: v for k, v in self.model.meta.items() if k not in _TOLD_ELSEWHERE}
         product = self.limits.product if self.limits else ""
         date = meta.pop("calibrated_on", None)
         train = sum(run.role == "train" for run in self.evaluation.runs)

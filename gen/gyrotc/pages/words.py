@@ -8,7 +8,8 @@ from typing import Any
 from ..results.limits import Limit
 
 __all__ = [
-    "bound_words", "limit_words", "measured_words", "plain", "sci", "with_uncertainty", "words", "words_of_rung",
+    "bound_words", "limit_words", "measured_words", "plain", "rounded", "sci", "with_uncertainty", "words",
+    "words_of_rung",
 ]  # fmt: skip
 
 _UNITS = (
@@ -122,6 +123,15 @@ def with_uncertainty(value: float | None, expanded: float | None) -> str:
     digits = max(0, 1 - math.floor(math.log10(spread)))
     text = f"{scaled:.{digits}f} ± {spread:.{digits}f}"
     return text if exponent == 0 else f"({text})·{_power(exponent)}"
+
+
+def rounded(expanded: float) -> str:
+    """An expanded uncertainty to two digits, rounded up where a third would say more (JCGM 100:2008, 7.2.6)."""
+    if not expanded:
+        return "0"
+    exponent = math.floor(math.log10(expanded))
+    scaled = math.ceil(round(expanded / 10.0 ** (exponent - 1), 6))
+    return sci(scaled * 10.0 ** (exponent - 1), 1)
 
 
 def plain(value: Any) -> str:

@@ -108,6 +108,11 @@ class Evaluation(Result):
     rows_left_out: Count | None = Field(
         default=None, description="rows of training runs that were outliers; null: not known"
     )
+    sigma_rms_dph: Amount | None = Field(
+        default=None,
+        description="RMS of the 1 sigma that the table states, over the rows that the model is judged by and where the "
+        "correction is neither held nor clamped, deg/h; null where the table states none",
+    )
     uncertainty: dict[str, FigureUncertainty] | None = Field(
         default=None,
         description="of the figures that the model is judged by, by the names of limits; without those that the "

@@ -1,0 +1,164 @@
+"""`python -m bench.budget docs [UNITS]`: does the uncertainty that the page states hold? (`make uncertainty`)
+
+Units that nothing was tuned on are calibrated as `gyrotc build` does it, with a thermometer and a reference whose
+errors are drawn from what their certificates state, and used at the end of the interval of a drift drawn from what
+the limits file states. Covered is a block of their exam where |true bias − correction| ≤ U.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.dataset import load
+from gyrotc.jobs.build import build_into
+from gyrotc.judge.limits import load_limits
+from gyrotc.quantise import quantise
+from gyrotc.reference import replay
+from gyrotc.results.base import read_result
+from gyrotc.results.budget import Budget
+from gyrotc.simulate import simulate
+from gyrotc.train.fitting import FitOptions
+
+from .sigma import CAMPAIGNS
+from .sigma_gyros import exam_of
+
+__all__ = ["Covered", "coverage_of", "section", "units_of"]
+
+FIRST_SEED = 300_000  # of gyros that nothing was tuned on
+UNITS = 200
+_SHARES = (0.4, 0.2, 0.2, 0.2)  # of the first four campaigns, which have no terms
+_THERMOMETER_C, _REFERENCE_DPH, _DRIFT_DPH = 0.05, 3e-5, 1e-4  # 1 sigma, 1 sigma, most in the interval
+_LIMITS = f"""schema = 1
+[interval]
+days = 365.25
+drift_dph_per_year = {_DRIFT_DPH}
+[[instrument]]
+name = "thermometer"
+certificate = "T-1"
+quantity = "temperature"
+expanded_uncertainty = {2.0 * _THERMOMETER_C}
+[[instrument]]
+name = "levelled base"
+certificate = "R-1"
+quantity = "rate"
+expanded_uncertainty = {2.0 * _REFERENCE_DPH}
+"""
+_SECTION = """## Does the stated uncertainty hold? (`make uncertainty`)
+
+{units} simulated units that nothing was tuned on (seeds from {seed} on), calibrated as `gyrotc build` does it, with
+a thermometer ({thermometer} C), a reference ({reference} deg/h; both 1 sigma) and a drift to the end of the interval
+(up to {drift} deg/h) drawn from what certificates and limits file state. Covered: |true bias − correction| ≤ U of the
+unit's budget, over all blocks of 10 s of its exam whose correction has no remark. ± is one standard error, units
+counted as independent.
+
+| campaign | units | covered, % | U, median, deg/h | k, median |
+| --- | --- | --- | --- | --- |
+{rows}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Covered:
+    """Of one unit: its share of blocks within U, U (deg/h) and k."""
+
+    campaign: str
+    share: float
+    expanded_dph: float
+    factor: float
+
+
+def units_of(units: int) -> list[tuple[int, int]]:
+    """Campaign and seed of each unit."""
+    counts = [round(share * units) for share in _SHARES]
+    return [(c, FIRST_SEED + 1000 * c + k) for c, count in enumerate(counts) for k in range(count)]
+
+
+def coverage_of(number: int, seed: int) -> Covered:
+    """One unit calibrated, and used at the end of its interval."""
+    campaign = CAMPAIGNS[number]
+    draw = np.random.default_rng(seed)
+    with tempfile.TemporaryDirectory(prefix="gyrotc-budget-") as place:
+        work = Path(place)
+        plan: str | Path = campaign.scenario
+        if "\n" in campaign.scenario:
+            plan = work / "scenario.toml"
+            plan.write_text(campaign.scenario, "utf-8")
+        (work / "limits.toml").write_text(_LIMITS, "utf-8")
+        (work / "out").mkdir()
+        simulate(plan, seed=seed, out=work / "data", format="parquet")
+        limits = load_limits(work / "limits.toml")
+        built = build_into(work / "out", load(work / "data"), FitOptions(), limits=limits, compiled=False)
+        budget = read_result(work / "out" / "budget.json", Budget)
+        exam = list(exam_of(plan, seed))
+    table = quantise(built.model, "f32")
+    wrong_c = draw.normal(0.0, _THERMOMETER_C)
+    moved_dph = draw.normal(0.0, _REFERENCE_DPH) + draw.uniform(-_DRIFT_DPH, _DRIFT_DPH)
+    within, blocks = 0, 0
+    for run in exam:
+        words = table.encode_inputs((run.temperature_c + wrong_c)[:, None])
+        steps = replay(table, words, missed=np.zeros(len(words), dtype=np.int64), samples_per_block=1)
+        error = run.bias_dph + moved_dph - table.decode_bias(steps.bits)
+        plain = steps.status == 0
+        within += int(np.count_nonzero(np.abs(error[plain]) <= budget.expanded_dph))
+        blocks += int(np.count_nonzero(plain))
+    return Covered(campaign.name, within / blocks, budget.expanded_dph, budget.coverage_factor)
+
+
+def figures(units: int, say: Callable[[str], None]) -> dict[str, Any]:
+    """Coverage of each campaign and of all."""
+    found = []
+    for number, seed in units_of(units):
+        found.append(coverage_of(number, seed))
+        say(f"{found[-1].campaign}, {seed}: {100.0 * found[-1].share:.1f} %")
+    names = dict.fromkeys(one.campaign for one in found)
+    rows = [_row(name, [one for one in found if one.campaign == name]) for name in names]
+    return {"units": len(found), "rows": [*rows, _row("together", found)]}
+
+
+def _row(name: str, found: list[Covered]) -> dict[str, Any]:
+    shares = np.array([one.share for one in found])
+    return {
+        "campaign": name,
+        "units": len(found),
+        "covered": float(shares.mean()),
+        "error": float(shares.std(ddof=1) / np.sqrt(len(shares))) if len(shares) > 1 else 0.0,
+        "expanded_dph": float(np.median([one.expanded_dph for one in found])),
+        "factor": float(np.median([one.factor for one in found])),
+    }
+
+
+def section(result: dict[str, Any]) -> str:
+    """The section of docs/results.md."""
+    rows = "\n".join(
+        f"| {r['campaign']} | {r['units']} | {100.0 * r['covered']:.1f} ± {100.0 * r['error']:.1f} "
+        f"| {r['expanded_dph']:.2e} | {r['factor']:.2f} |"
+        for r in result["rows"]
+    )
+    return _SECTION.format(
+        units=result["units"], seed=FIRST_SEED, rows=rows, thermometer=_THERMOMETER_C, reference=_REFERENCE_DPH,
+        drift=_DRIFT_DPH,
+    )  # fmt: skip
+
+
+def main(arguments: list[str]) -> int:
+    """Status 1 where U does not hold 93 to 97 % together."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
+    from results import write
+
+    units = int(arguments[1]) if len(arguments) > 1 else UNITS
+    result = figures(units, lambda text: print(text, file=sys.stderr, flush=True))
+    print(json.dumps(result["rows"][-1]))
+    if units == UNITS:
+        write(Path(arguments[0]), "budget", result, section)
+    return int(not 0.93 <= result["rows"][-1]["covered"] <= 0.97)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
