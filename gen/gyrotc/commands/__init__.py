@@ -1,6 +1,8 @@
 """The subcommands of `gyrotc`, a module for each group; importing a module registers its commands."""
 
-from . import fleet, importing, jobs, plans, recordings, release, schemas, shell, steps
+from . import certificates, fleet, importing, jobs, plans, recordings, release, schemas, shell, steps
 from .base import app
 
-__all__ = ["app", "fleet", "importing", "jobs", "plans", "recordings", "release", "schemas", "shell", "steps"]
+__all__ = [
+    "app", "certificates", "fleet", "importing", "jobs", "plans", "recordings", "release", "schemas", "shell", "steps",
+]  # fmt: skip

@@ -249,6 +249,8 @@ def _write(path: Path, result: dict[str, Any]) -> None:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
+    from .fleet.fingerprint import program_of  # the package of fleets imports this module
+
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return Manifest(
         gyrotc_version=__version__,
@@ -260,5 +262,6 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         meta=dict(dataset.meta),
         units=units_of(dataset),
         sources=tuple(dataset.sources),
+        program=program_of(),
         files={p.relative_to(folder).as_posix(): sha256(p) for p in files},
     )

@@ -101,7 +101,7 @@ class Required(_Part):
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
 
 
-class Interval(_Part):
+class Recalibration(_Part):
     """How long a calibration is meant to hold, and what the bias of the type does in that time."""
 
     days: Annotated[float, Field(gt=0.0, le=36525.0)]
@@ -118,7 +118,7 @@ class Limits(_Part):
     at_least: AtLeast = AtLeast()
     covers: Covers = Covers()
     needs: Required = Required()
-    interval: Interval | None = None
+    interval: Recalibration | None = None
     instrument: Annotated[tuple[StatedInstrument, ...], BeforeValidator(_as_tuple)] = ()
     sha256: str = ""  # of the file
 

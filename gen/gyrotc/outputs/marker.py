@@ -39,6 +39,7 @@ KINDS = {
     "compare": "comparison",
     "simulate": "data set",
     "import": "data set",
+    "certificate": "certificate",
     "fleet": "fleet",
 }
 """Kind of folder that a command writes."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..results.limits import Limit
 
 __all__ = [
-    "bound_words", "limit_words", "measured_words", "plain", "rounded", "sci", "with_uncertainty", "words",
-    "words_of_rung",
+    "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",
+    "with_uncertainty", "words", "words_of_rung",
 ]  # fmt: skip
 
 _UNITS = (
@@ -112,26 +112,48 @@ def _power(exponent: int) -> str:
     return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def with_uncertainty(value: float | None, expanded: float | None) -> str:
-    """A figure and its expanded uncertainty to the same digit, two of the uncertainty: (7.21 ± 0.25)·10⁻⁴."""
-    if value is None or not expanded or not math.isfinite(expanded):
-        return sci(value)
+class Digits(NamedTuple):
+    """A figure and its expanded uncertainty as they are printed: both times a power of ten, to the same digit."""
+
+    value: str
+    spread: str
+    exponent: int
+
+    @property
+    def page(self) -> str:
+        """(7.21 ± 0.25)·10⁻⁴."""
+        text = f"{self.value} ± {self.spread}"
+        return text if self.exponent == 0 else f"({text})·{_power(self.exponent)}"
+
+    def decimal(self, mantissa: str) -> str:
+        """The value or the spread as machines read it: 7.21e-4."""
+        return mantissa if self.exponent == 0 else f"{mantissa}e{self.exponent}"
+
+
+def digits_of(value: float, expanded: float) -> Digits:
+    """A figure to the digit that its expanded uncertainty, to two digits and rounded up, says something of."""
     exponent = math.floor(math.log10(max(abs(value), expanded)))
     if -3 < exponent < 4:
         exponent = 0
     scaled, spread = value / 10.0**exponent, expanded / 10.0**exponent
     digits = max(0, 1 - math.floor(math.log10(spread)))
-    text = f"{scaled:.{digits}f} ± {spread:.{digits}f}"
-    return text if exponent == 0 else f"({text})·{_power(exponent)}"
+    spread = math.ceil(round(spread * 10.0**digits, 6)) / 10.0**digits
+    return Digits(f"{scaled:.{digits}f}", f"{spread:.{digits}f}", exponent)
+
+
+def with_uncertainty(value: float | None, expanded: float | None) -> str:
+    """A figure and its expanded uncertainty to the same digit, two of the uncertainty: (7.21 ± 0.25)·10⁻⁴."""
+    if value is None or not expanded or not math.isfinite(expanded):
+        return sci(value)
+    return digits_of(value, expanded).page
 
 
 def rounded(expanded: float) -> str:
-    """An expanded uncertainty to two digits, rounded up where a third would say more (JCGM 100:2008, 7.2.6)."""
+    """An expanded uncertainty to two digits, rounded up (JCGM 100:2008, 7.2.6)."""
     if not expanded:
         return "0"
-    exponent = math.floor(math.log10(expanded))
-    scaled = math.ceil(round(expanded / 10.0 ** (exponent - 1), 6))
-    return sci(scaled * 10.0 ** (exponent - 1), 1)
+    found = digits_of(0.0, expanded)
+    return found.spread if found.exponent == 0 else f"{found.spread}·{_power(found.exponent)}"
 
 
 def plain(value: Any) -> str:

@@ -24,4 +24,7 @@ class Manifest(Result):
     meta: dict[str, Any] = Field(description="`[meta]` of the data set")
     units: DeclaredUnits = Field(description="of the recordings")
     sources: tuple[Any, ...] = Field(description="`[source]` of recordings that were imported")
+    program: str = Field(
+        default="", description="SHA-256 of the program; empty: of a gyrotc that did not state it"
+    )
     files: dict[str, str] = Field(description="SHA-256 of every file, by its path in the folder")
