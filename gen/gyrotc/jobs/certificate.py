@@ -23,7 +23,7 @@ from ..results.budget import Budget
 from ..results.manifest import Manifest
 from .axes import axes_in
 
-__all__ = ["Certified", "Facts", "certificate", "facts_of"]
+__all__ = ["Certified", "LaboratoryFacts", "certificate", "facts_of"]
 
 _EXPECTED = "a facts file (docs/certificate.md)"
 Line = Annotated[str, Field(min_length=1, max_length=300)]
@@ -53,7 +53,7 @@ Day = Annotated[str, BeforeValidator(_day), Field(pattern=r"^\d{4}-\d{2}-\d{2}")
 Country = Annotated[str, Field(pattern="^[A-Z]{2}$")]
 
 
-class Facts(BaseModel):
+class LaboratoryFacts(BaseModel):
     """What a laboratory states, in its facts file or in `[meta]` of the data set; None: not stated."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -85,13 +85,13 @@ class Certified:
     pdf: bool
 
 
-def facts_of(meta: Mapping[str, Any], path: Path | None, number: str | None) -> Facts:
+def facts_of(meta: Mapping[str, Any], path: Path | None, number: str | None) -> LaboratoryFacts:
     """What is known: the facts file before `[meta]`, the number of the command line before both.
 
     Raises:
         InputError: The file cannot be read, or a field is wrong or not known.
     """
-    known = {key: value for key, value in meta.items() if key in Facts.model_fields and value != ""}
+    known = {key: value for key, value in meta.items() if key in LaboratoryFacts.model_fields and value != ""}
     where = "dataset.toml, [meta]"
     if path is not None:
         stated = read_toml(path, _EXPECTED)
@@ -101,7 +101,7 @@ def facts_of(meta: Mapping[str, Any], path: Path | None, number: str | None) -> 
         where = str(path)
     if number is not None:
         known["number"] = number
-    return checked(Facts, known, where)
+    return checked(LaboratoryFacts, known, where)
 
 
 def certificate(
@@ -147,7 +147,7 @@ def certificate(
     return Certified(tuple(out / name for name in names), printed)
 
 
-def _missing(facts: Facts, units: list[UnitResults]) -> Iterator[str]:
+def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:
     for name, what in _NEEDED.items():
         if getattr(facts, name) is None:
             yield f"{name} ({what})"
