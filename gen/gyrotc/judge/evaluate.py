@@ -55,8 +55,8 @@ _TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensate
 class ReplayedRun:
     """One run replayed, every row of the file.
 
-    Correction in force (deg/h), status bits, whether the row's block is valid, number of differing steps (None: not
-    compared), 1 sigma of the correction (deg/h; None: the table states none).
+    Correction in force (deg/h), status bits, whether the row is judged (its block is valid, and a correction has been
+    made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None: the table states none).
     """
 
     bias_dph: NDArray[np.float64]
@@ -189,11 +189,11 @@ def replay_run(
 ) -> ReplayedRun:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
     history = history_of(rows, run, model, table)
-    stated = history.reference.sigma
-    sigma = None if stated is None else table.decode_bias(stated)
+    known = history.reference
+    scored = known.block_valid & known.begun
+    sigma = None if known.sigma is None else table.decode_bias(known.sigma)
     if program is None:
-        known = history.reference
-        return ReplayedRun(table.decode_bias(known.bits), known.status, known.block_valid, None, sigma)
+        return ReplayedRun(table.decode_bias(known.bits), known.status, scored, None, sigma)
     try:
         replayed = replay_on(*program, history)
     except CheckFailed as error:
@@ -201,7 +201,7 @@ def replay_run(
     return ReplayedRun(
         bias_dph=table.decode_bias(replayed.bits),
         status=replayed.status,
-        scored=history.reference.block_valid,
+        scored=scored,
         mismatches=replayed.mismatches,
         sigma_dph=sigma,
     )

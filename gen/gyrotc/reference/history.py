@@ -51,6 +51,7 @@ class Replay:
     bits: Words  # of the bias that it writes
     missed_status: NDArray[np.int32]  # what `missed` returns before the row (0 where nothing was missed)
     block_valid: NDArray[np.bool_]  # the row's own block has enough believed samples
+    begun: NDArray[np.bool_]  # a correction has been made; before it bias is 0, and says so by HELD
     sigma: Words | None  # bits of 1 σ that `snapshot` writes; None: the table has no uncertainties
     age: NDArray[np.int64]  # blocks that it writes
 
@@ -72,6 +73,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     position = stream.position
     valid = steps.valid[position // samples_per_block]
     in_force = steps.in_force(position)
+    begun = in_force >= 0
     in_force += 1
     gaps = np.flatnonzero(stream.missed)
     missed_status = np.zeros(position.size, dtype=np.int32)
@@ -84,6 +86,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         bits=bits[in_force],
         missed_status=missed_status,
         block_valid=valid,
+        begun=begun,
         sigma=None if sigma is None else sigma[in_force],
         age=age[in_force],
     )

@@ -4,9 +4,11 @@ Rungs: nothing, constant, linear, cubic in T, cubic with a slope in dT/dt, map o
 with every stretch of history left out in turn (`spans.history_folds`) and judged on that stretch by means over
 `average_s`. Two questions decide:
 
-1. *Which is the simplest that is not clearly worse than the best?* The one-standard-error rule (Hastie, Tibshirani,
-   Friedman, The Elements of Statistical Learning, 7.10) over all stretches, on paired differences of the score and
-   of the mean square: a richer rung has to gain on stretches as they come and on what they add up to.
+1. *Which rung?* The yardstick is the best of what anyone would fit: a constant, a cubic in T, a cubic with a slope in
+   dT/dt. Another rung has to be clearly better than that, by one standard error (Hastie, Tibshirani, Friedman, The
+   Elements of Statistical Learning, 7.10) of paired differences over all stretches, of the score and of the mean
+   square: it has to gain on stretches as they come and on what they add up to. The simplest is taken of those that do,
+   of equally good ones, and of those that leave no more than noise on any stretch.
 2. *Is that one better than a constant?* Paired over independent pieces of history, by a t test at 5 %. Pieces are
    power-ons, runs of one power-on, or, of fewer than three runs, the stretches themselves: a sample beside a sample
    that was seen proves nothing about another day, and three runs have two degrees of freedom. Where the rung leaves
@@ -37,7 +39,7 @@ from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .simple import SIMPLE, design, solve
 from .spans import Fold, history_folds
 
-__all__ = ["MAPS", "RUNGS", "Ladder", "climb"]
+__all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb"]
 
 Floats = NDArray[np.float64]
 Correction = Callable[[Floats, Floats], Floats]
@@ -45,7 +47,10 @@ Correction = Callable[[Floats, Floats], Floats]
 MAPS = ("mrbf_t", "mrbf")
 RUNGS = ("nothing", *SIMPLE, *MAPS)
 """From the simplest to the richest."""
+YARDSTICKS = ("constant", "cubic", "cubic_slope")
+"""What anyone would fit: least squares on few columns, the commonest corrections of such gyros."""
 _SIGNIFICANCE = 0.05  # of the t test against the constant: docs/training.md, section 2
+_EQUAL = 0.01  # of a score, so 1 % of RMS: half of what "no worse than trivial" allows (docs/real.md)
 _LEAST_PIECES = 3  # runs or power-ons: with fewer their scatter says nothing
 _LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by rounding only
 
@@ -77,9 +82,21 @@ class Ladder:
         ]
         if len(self.folds) < 2 or len(able) < 2:
             return "constant"
-        best = min(able, key=lambda k: float(self.score[:, k].mean()))
-        name = RUNGS[next(k for k in able if not self._clearly_worse(k, best))]
+        yardstick = self._best([k for k in able if RUNGS[k] in YARDSTICKS])
+        better = [k for k in able if RUNGS[k] not in YARDSTICKS and self._clearly_worse(yardstick, k)]
+        best = self._best(better) if better else yardstick
+        rivals = [k for k in able if k in better or self._leaves_noise(k)]
+        name = RUNGS[next(k for k in [*rivals, best] if not self._clearly_worse(k, best))]
         return name if self.beats_constant(name) else "constant"
+
+    def _leaves_noise(self, k: int) -> bool:
+        """Whether a rung leaves less than the noise on every stretch, beside the noise."""
+        return bool(np.max(self.rms_dph[:, k] ** 2) < 2.0 * self.noise_dph**2)
+
+    def _best(self, rungs: Sequence[int]) -> int:
+        """By the mean score; of those that are equal to within 1 % the simplest."""
+        score = {k: float(self.score[:, k].mean()) for k in rungs}
+        return next(k for k in rungs if score[k] <= min(score.values()) + _EQUAL)
 
     def beats_constant(self, name: str) -> bool:
         """Whether a rung is better than a constant: by a t test at 5 % over independent pieces of history.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .data import Scaling, TrainingData
 from .guard import objection
-from .ladder import MAPS, RUNGS, Ladder, climb
+from .ladder import MAPS, RUNGS, YARDSTICKS, Ladder, climb
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .process import Process, TrainingFailed, fit_process
 from .result import Outcome
@@ -108,7 +108,11 @@ def _reason(ladder: Ladder, name: str, misses: bool) -> str:
         return f"nothing is shown to be better than a constant on history that was not seen ({tried})"
     if name == "constant":
         return f"what varies is hardly more than noise ({tried})"
-    return f"the simplest within one standard error of the best, and better than a constant ({tried})"
+    if name in YARDSTICKS:
+        text = "the best of a constant and cubics, than which nothing else is better by a standard error"
+    else:
+        text = "better than a constant and cubics by more than a standard error, or simpler where only noise is left"
+    return f"{text} ({tried})"
 
 
 def _does_not_generalise(ladder: Ladder) -> dict[str, Any]:
