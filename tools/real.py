@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import sys
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,32 +18,23 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
-from gyrotc.dataset import Dataset, axes_of, load
+from gyrotc.dataset import axes_of, load
 from gyrotc.emit import emit
 from gyrotc.judge.evaluate import evaluate
 from gyrotc.metrics import average
 from gyrotc.pages.plots import AFTER, BEFORE, svg
 from gyrotc.paper.page import filled
-from gyrotc.train import TrainingData
-from gyrotc.train.data import average as means_of
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.spans import training_spans
 from matplotlib.figure import Figure
+from real_peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others
 
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
 SPANS = (CYCLE, ISOTHERMAL, "pan-lsm6dsm-cold")  # one run each: its branches, or parts, are left out
 RUNS = ("atoms3-mpu6886-heating",)  # runs are left out whole
 PICTURED = (CYCLE, ISOTHERMAL)  # with the last span left out
-BLOCK_S = 10.0
-AVERAGE_S = 100.0
 PICTURE_S = 20.0  # shorter than the 100 s of the table, so that eleven minutes show something
 ALLOWED = 1.02
-TRIVIAL = {
-    "constant": ((0, 0),),
-    "cubic": ((0, 0), (1, 0), (2, 0), (3, 0)),
-    "cubic + dT/dt": ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1)),
-}
-GPR = "GPR"
 
 
 @dataclass(frozen=True)
@@ -146,65 +136,9 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         trace = out / "trace" if case.pictured else None
         result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()
         said = tuple(finding["id"] for finding in result["findings"])
-        yield Result(case, axis, fitted.model.method, said, result, _of_others(dataset), out)
-
-
-def _of_others(dataset: Dataset) -> dict[str, float]:
-    """RMS on the exam of what is fitted to the same block samples, deg/h."""
-    train, exam = (_samples(dataset, role) for role in ("train", "exam"))
-    found = {name: _rms(exam, _least_squares(train, powers, exam)) for name, powers in TRIVIAL.items()}
-    return found | {GPR: _rms(exam, _gaussian_process(train, exam))}
-
-
-def _samples(dataset: Dataset, role: str) -> TrainingData:
-    runs = [run for run in dataset.runs if run.role == role]
-    front = front_end([run for run in dataset.runs if run.role == "train"], BLOCK_S)
-    parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(runs)]
-    names = TrainingData.__dataclass_fields__
-    return TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
-
-
-def _inputs(train: TrainingData, at: TrainingData) -> tuple[np.ndarray, np.ndarray]:
-    """Standardised temperature and rate, held at the ends of what was trained on, as the runtime does."""
-    columns = []
-    for known, asked in (
-        (train.temperature_c, at.temperature_c),
-        (train.slope_c_per_min, at.slope_c_per_min),
-    ):
-        spread = float(known.std()) or 1.0
-        columns.append((np.clip(asked, known.min(), known.max()) - known.mean()) / spread)
-    return columns[0], columns[1]
-
-
-def _least_squares(train: TrainingData, powers: Sequence[tuple[int, int]], exam: TrainingData) -> np.ndarray:
-    def columns(at: TrainingData) -> np.ndarray:
-        t, r = _inputs(train, at)
-        return np.stack([t**a * r**b for a, b in powers], axis=1)
-
-    root = np.sqrt(train.weight)
-    found = np.linalg.lstsq(columns(train) * root[:, None], train.bias_dph * root, rcond=None)[0]
-    return np.asarray(columns(exam) @ found)
-
-
-def _gaussian_process(train: TrainingData, exam: TrainingData) -> np.ndarray:
-    """scikit-learn with a kernel of two length scales and noise, on means over 50 s."""
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-
-    means = means_of(train, 50.0)
-    x = np.stack(_inputs(train, means), axis=1)
-    kernel = ConstantKernel(1.0) * RBF([1.0, 1.0]) + WhiteKernel(0.1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        model = GaussianProcessRegressor(kernel, normalize_y=True).fit(x, means.bias_dph)
-    return np.asarray(model.predict(np.stack(_inputs(train, exam), axis=1)))
-
-
-def _rms(exam: TrainingData, correction: np.ndarray) -> float:
-    """Of means over 100 s."""
-    values = {n: getattr(exam, n) for n in TrainingData.__dataclass_fields__}
-    left = means_of(TrainingData(**values | {"bias_dph": exam.bias_dph - correction}), AVERAGE_S)
-    return float(np.sqrt(np.average(left.bias_dph**2, weights=left.weight)))
+        yield Result(
+            case, axis, fitted.model.method, said, result, of_others(dataset, result["exam"]["samples"]), out
+        )
 
 
 def table(results: Sequence[Result]) -> str:
@@ -217,13 +151,14 @@ def table(results: Sequence[Result]) -> str:
         "ours",
         *TRIVIAL,
         GPR,
+        LSTM,
         "ours ÷ best trivial",
         "noise floor",
         "findings",
     )
     lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
     for r in results:
-        others = [f"{r.others[name]:.1f}" for name in (*TRIVIAL, GPR)]
+        others = [f"{r.others[n]:.1f}" if n in r.others else "-" for n in (*TRIVIAL, GPR, LSTM)]
         cells = [
             *(r.case.name, r.case.left_out, r.axis, r.method, f"{r.rms:.1f}"),
             *others,
@@ -241,14 +176,25 @@ def summary(results: Sequence[Result]) -> str:
     constant = [r for r in results if r not in good and r.method == "constant"]
     harmed = [r for r in results if r not in good and r not in constant]
     worse = [r for r in results if r.rms > ALLOWED * r.others["constant"]]
-    beaten = [r for r in results if r.others[GPR] > ALLOWED * r.best_trivial]
     return (
         f"Each axis of each set is judged with each part left out: {len(results)} in all. On {len(good)} ours is at "
         f"most {ALLOWED} × the best of constant, cubic, and cubic with dT/dt; on {len(constant)} more a constant is "
         f"emitted, and said. Neither holds on {len(harmed)}{_list(harmed, 'best trivial')}. Worse than a constant by "
-        f"more than 2 %: {len(worse)}{_list(worse, 'constant')}.\nThe Gaussian process is worse than the best trivial "
-        f"correction on {len(beaten)} of the {len(results)}, at worst "
-        f"{max(r.others[GPR] / r.best_trivial for r in results):.1f} times."
+        f"more than 2 %: {len(worse)}{_list(worse, 'constant')}.\n"
+        + "\n".join(_of_peer(results, peer) for peer in (GPR, LSTM))
+    )
+
+
+def _of_peer(results: Sequence[Result], peer: str) -> str:
+    """How a peer does beside the best trivial correction and beside ours."""
+    known = [r for r in results if peer in r.others]
+    if not known:
+        return f"{peer}: not run, PyTorch is absent (`pip install -e 'gen[lstm]'`)."
+    worse = sum(r.others[peer] > ALLOWED * r.best_trivial for r in known)
+    than_ours = sum(r.others[peer] > r.rms for r in known)
+    return (
+        f"{peer} is worse than the best trivial correction by more than 2 % on {worse} of {len(known)}, at worst "
+        f"{max(r.others[peer] / r.best_trivial for r in known):.1f} times; worse than ours on {than_ours}."
     )
 
 
