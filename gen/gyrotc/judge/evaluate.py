@@ -56,7 +56,7 @@ class ReplayedRun:
     """One run replayed, every row of the file.
 
     Correction in force (deg/h), status bits, whether the row is judged (its block is valid, and a correction has been
-    made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None: the table states none).
+    made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None: none is stated).
     """
 
     bias_dph: NDArray[np.float64]
