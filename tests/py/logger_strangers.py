@@ -327,6 +327,24 @@ def imar(t: Truth) -> list[str]:
     ]
 
 
+@text("ascii")
+def hexadecimal(t: Truth) -> list[str]:
+    """Milliseconds of a counter as a debugger prints them; the unit of the rate behind a blank."""
+    return [
+        "tick_ms,Temp C,Rate deg/hr",
+        *_rows(t, lambda k, s, c, r: f"0x{round(1000 * s):08X},{c!r},{r[0]!r}"),
+    ]
+
+
+@text()
+def pipes(t: Truth) -> list[str]:
+    return [
+        "|time s|T degC|rate deg / h|",
+        "|---|---|---|",
+        *_rows(t, lambda k, s, c, r: f"|{s!r}|{c!r}|{r[0]!r}|"),
+    ]
+
+
 STRANGERS = [
     Case("Campbell Scientific TOA5", "toa5.dat", campbell),
     Case(
@@ -410,4 +428,6 @@ STRANGERS = [
         temperature_tolerance=1e-8,
     ),
     Case("Keithley DMM6500", "dmm.csv", keithley, ("--column", "time=Relative Time (s)")),
+    Case("a counter in hexadecimal digits", "ticks.csv", hexadecimal, tolerance=1e-3),
+    Case("a table between bars, out of a report", "bars.txt", pipes),
 ]

@@ -135,6 +135,42 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
         ("no column that a time is told from", "--rate-hz"),
         ("--rate-hz", "0.1"),
     ),
+    "the hours of deg/hr taken for a time": (
+        lines("Excel date,Temp C,Rate deg/hr", lambda k, t, r: f"{46100 + k / 8640:.9f},{t},{r}"),
+        (),
+        ("no unit of the time in column 'Excel date'", "--time-unit"),
+        ("--time-unit", "d"),
+    ),
+    "no line of names": (
+        lines("0,20,10", lambda k, t, r: f"{10 * k + 10},{t},{r}"),
+        (),
+        ("column 1, column 2, column 3", '--column time="column ..." --time-unit', "--rate-unit"),
+        (
+            "--column",
+            "time=column 1",
+            "--time-unit",
+            "s",
+            "--column",
+            "temperature=column 2",
+            "--temperature-unit",
+            "degC",
+            "--column",
+            "rate=column 3",
+            "--rate-unit",
+            "deg/h",
+        ),
+    ),
+    "points between thousands of a whole number": (
+        lines(
+            "Zeit [ms];T [C];rate [deg/h]",
+            lambda k, t, r: (
+                f"{10000 * k:,};{t:.4f};{r:.6f}".replace(",", "#").replace(".", ",").replace("#", ".")
+            ),
+        ),
+        (),
+        ("no column that a time is told from", "as Zeit [ms] holds", "--csv thousands=."),
+        ("--csv", "thousands=."),
+    ),
     "a unit that is none": (
         lines("time_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
         ("--rate-unit", "furlongs"),
@@ -394,6 +430,24 @@ def test_a_line_that_looks_like_a_row_is_never_offered_as_a_comment(tmp_path: Pa
     _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert "line 102: 4 cells" in error
     assert "comment=" not in error
+
+
+def test_units_in_cells_are_taken_out_by_the_command_that_the_refusal_gives(tmp_path: Path, run: Run) -> None:
+    text = lines("time,temperature,rate", lambda k, t, r: f"{10 * k}.0 s,{t:.3f} °C,{r:.9f} °/h")
+    (tmp_path / "a.csv").write_text(text, "utf-8")
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    sed = error[error.index("sed ") : error.index(" takes the units out")]
+    subprocess.run(sed, shell=True, check=True, cwd=tmp_path)
+    units = ("--time-unit", "s", "--temperature-unit", "degC", "--rate-unit", "deg/h")
+    assert run("import", tmp_path / "a.csv.csv", "--out", tmp_path / "R", *units)[0] == 0
+    assert load(tmp_path / "R").runs[0].n_rows == 600
+
+
+def test_digits_that_may_be_hexadecimal_are_told(tmp_path: Path, run: Run) -> None:
+    text = lines("tick [ms],temp_c,rate_dph", lambda k, t, r: f"{10000 * k:06X}h,{t},{r}")
+    (tmp_path / "a.csv").write_text(text)
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert "as tick [ms] holds '" in error and "0x before each of its numbers" in error
 
 
 @pytest.mark.parametrize("rows", [10, 20, 45])

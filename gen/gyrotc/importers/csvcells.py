@@ -7,11 +7,21 @@ from collections.abc import Sequence
 
 from .forms import forms_of
 
-__all__ = ["MISSING", "cells_of", "is_number", "kind_of_cells", "plain_lines", "plain_number", "thousands_of"]
+__all__ = [
+    "HEXADECIMAL",
+    "MISSING",
+    "cells_of",
+    "is_number",
+    "kind_of_cells",
+    "plain_lines",
+    "plain_number",
+    "thousands_of",
+]
 
 MISSING = (
     "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
 )  # fmt: skip
+HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]{1,15}")  # of a counter; within 63 bits
 _NUMBER = re.compile(r"(?:[+-] *)?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?[iI]nf(inity)?")
 _BLANKS = " \u00a0\u202f\u2009'\u2019"  # between thousands: blanks of all widths, apostrophes
 _GROUPED = {
@@ -59,7 +69,7 @@ def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
         rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell
     ):
         cell = cell.replace(thousands, "")
-    if _GROUPED[decimal].fullmatch(cell):
+    if _GROUPED[decimal].fullmatch(cell) or HEXADECIMAL.fullmatch(cell):
         return True
     if decimal == ",":
         return "." not in cell and bool(_NUMBER.fullmatch(cell.replace(",", ".", 1)))

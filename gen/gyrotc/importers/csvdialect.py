@@ -224,6 +224,9 @@ def _instead(name: str, line: str) -> str:
         return "a table: records of JSON as CSV or Parquet, one column for each field"
     if re.search(r"\w[=:] ?[-+]?[0-9.]", line):
         return f"numbers alone: sed -E 's/[A-Za-z_]+ ?[=:] ?//g' {name} > {name}.csv takes the words out"
+    if re.search(r"[0-9] ?[A-DF-Za-df-z°%]", line):
+        sed = f"sed -E 's/([0-9]) ?[A-DF-Za-df-z°%][^,;0-9 ]*/\\1/g' {name} > {name}.csv"
+        return f"numbers alone: {sed} takes the units out, and options state them (--rate-unit, ...)"
     return "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen"
 
 

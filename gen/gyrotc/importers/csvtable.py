@@ -15,7 +15,7 @@ import pyarrow.csv as pacsv
 
 from ..errors import InputError
 from .csvblocks import blocks_of, lines_of
-from .csvcells import MISSING, cells_of, kind_of_cells, plain_lines, plain_number
+from .csvcells import HEXADECIMAL, MISSING, cells_of, kind_of_cells, plain_lines, plain_number
 from .csvdialect import Dialect, dialect_of
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
@@ -145,7 +145,8 @@ class CsvTable(LoggerTable):
             return pa.string()
         long = [c for c in column.sample if len(c) >= 16]
         whole = long and all(re.fullmatch(r"[+-]?\d{16,18}|", c) for c in column.sample)
-        return pa.int64() if whole else pa.float64()
+        counted = any(column.sample) and all(HEXADECIMAL.fullmatch(c) for c in column.sample if c)
+        return pa.int64() if whole or counted else pa.float64()
 
     def _slow(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any]:
         """The rows of a block cell by cell.
@@ -195,6 +196,8 @@ class CsvTable(LoggerTable):
                 values[name] = float("nan") if self._type(name) != pa.string() else None
             elif self._type(name) == pa.string():
                 values[name] = cell
+            elif HEXADECIMAL.fullmatch(cell):
+                values[name] = int(cell, 16)
             else:
                 plain = plain_number(cell, self.dialect.decimal, self.dialect.thousands)
                 if not _NUMBER.fullmatch(plain) and plain.lower().lstrip("+-") not in ("inf", "infinity"):

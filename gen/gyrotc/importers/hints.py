@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 from ..dataset.units import NATIVE
 from .names import meaning, split_unit, words
 from .tables import LoggerFile
 from .unitchoice import OPTIONS
 
-__all__ = ["in_text", "increments", "listed", "name_it"]
+_HEXADECIMAL = re.compile(r"(?=.*[A-Fa-f])[0-9A-Fa-f]+h?|[0-9A-Fa-f]+h")
+
+__all__ = ["in_text", "increments", "listed", "name_it", "nameless"]
 
 
 def increments(file: LoggerFile) -> str:
@@ -30,6 +34,8 @@ def in_text(file: LoggerFile, kind: str) -> str:
         for column in table.columns:
             if column.kind == "text" and meaning(column.name, column.unit, table.name).kind == kind:
                 shown = next((cell for cell in reversed(column.sample) if cell), "")
+                if _HEXADECIMAL.fullmatch(shown):
+                    return f"; or, as {column.name} holds {shown[:40]!r}, 0x before each of its numbers"
                 return (
                     f"; or, as {column.name} holds {shown[:40]!r}, --csv decimal=, (or .) and --csv thousands=. "
                     "(or another mark), or --csv missing=WORD"
@@ -44,3 +50,12 @@ def listed(file: LoggerFile) -> str:
 
 def name_it(kind: str) -> str:
     return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
+
+
+def nameless(file: LoggerFile) -> str:
+    """All that has to be said where no column has a name; empty where one has."""
+    names = [column.name for table in file.tables for column in table.columns]
+    if any(not name.startswith("column ") for name in names):
+        return ""
+    said = (f'--column {kind}="column ..." {OPTIONS[kind]} ...' for kind in ("time", "temperature", "rate"))
+    return f"a line of names above the rows, or {' '.join(said)}"

@@ -15,6 +15,9 @@ __all__ = ["Meaning", "axis_of", "meaning", "split_unit", "words"]
 
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({<]\s*(?P<unit>[^\])}>]+?)\s*[\])}>]\s*$")
 _AFTER_SIGN = re.compile(r"^(?P<base>[^/,]*[^/,\s])\s*(?:/|,|\bin\b)\s*(?P<unit>\S.*)$")
+_WITH_SIGN = re.compile(
+    r"^(?P<base>.*\S)\s+(?P<unit>[^\s/]+\s*/\s*[^\s/]+)$"
+)  # Rate deg/h: not the hours of a name
 _ENDINGS: dict[str, tuple[str, Kind]] = {
     "s": ("s", "time"),
     "sec": ("s", "time"),
@@ -145,6 +148,8 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
             return before
         if kind_of(unit) or not re.fullmatch(r"[xyzXYZ\d\s#:]+", unit):
             return found["base"], unit, "in brackets in its name"
+    if (found := _WITH_SIGN.match(name)) and kind_of(found["unit"]) == "rate":
+        return found["base"].rstrip(" /,"), found["unit"], "the end of its name"
     if (found := _AFTER_SIGN.match(name)) and kind_of(found["unit"]):
         return found["base"], found["unit"], "after the sign in its name"
     parts = words(name)

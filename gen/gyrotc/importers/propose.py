@@ -12,7 +12,7 @@ from pathlib import Path
 from ..dataset.units import UnitError, channel_unit, conversion
 from ..errors import InputError
 from .clockparts import fraction_of, parts_of
-from .hints import in_text, increments, listed, name_it
+from .hints import in_text, increments, listed, name_it, nameless
 from .mapping import Map
 from .names import Meaning, meaning, split_unit, words
 from .plan import Choice, ImportPlan
@@ -117,6 +117,8 @@ def _values(
     top = [one for one in likely if one[2] == best]
     if not top:
         unseen = f"no column that a rate is told from among {listed(file)}"
+        if made := nameless(file):
+            raise InputError(file.path.name, f"{unseen}: nothing stands above its rows", made)
         raise InputError(file.path.name, unseen, increments(file) or name_it("rate") + in_text(file, "rate"))
     if len(top) > 1:
         names = ", ".join(repr(table.name) for table, _, _ in top)
@@ -223,7 +225,9 @@ def _time(
         return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
     if parts := parts_of(main.columns):
         return [(column, "parts of the time, by their names") for column in parts], None, ""
-    found = [(c, meaning(c.name, c.unit, main.name)) for c in main.columns if c.kind == "number"]
+    stated = {*chosen.columns.values().values(), chosen.columns.temperature}
+    free = [c for c in main.columns if c.kind == "number" and c.name not in stated]
+    found = [(c, meaning(c.name, c.unit, main.name)) for c in free]
     likely = [(m.score, c) for c, m in found if m.kind == "time"]
     best = max((score for score, _ in likely), default=0)
     top = [c for score, c in likely if score == best]
@@ -234,7 +238,8 @@ def _time(
     expected = (
         '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
     )
-    raise InputError(file.path.name, f"no column that a time is told from among {listed(file)}", expected)
+    unseen = f"no column that a time is told from among {listed(file)}"
+    raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 
 
 def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:

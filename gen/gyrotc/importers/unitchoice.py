@@ -16,7 +16,7 @@ Ask = Callable[[str], str | None]
 
 
 OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
-_EXAMPLES = {"time": "s, ms, us, min", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
+_EXAMPLES = {"time": "s, ms, us, min, d", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
 
 
 class Units:
