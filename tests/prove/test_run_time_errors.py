@@ -55,7 +55,7 @@ PARTS = {
             "f32": "gtc_f32_mean,gtc_f32_window_slope,gtc_f32_is_missing",
             "q31": "gtc_q31_mean,gtc_q31_window_slope",
         },
-        checks=16,
+        checks=15,
     ),
     "snapshot, re-zero": Part(
         "sigma",
