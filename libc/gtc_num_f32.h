@@ -489,12 +489,6 @@ static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitud
 #define NO_SQUARE 0.0F
 #define SHIFT_SHARE float
 
-/* 1 if x is no finite number. */
-static inline int FN(is_wild)(float x)
-{
-    return FN(is_missing)(x);
-}
-
 static inline float FN(limited)(float x)
 {
     return x;
@@ -523,7 +517,7 @@ static inline float FN(shared_out)(float square, uint_least32_t n)
     return share;
 }
 
-/* a / (a + b), 0 where both are */
+/* a / (a + b), 0 where both are, and where they are more than a number says */
 static inline float FN(share_of)(float a, float b)
 {
     float whole;
@@ -533,7 +527,7 @@ static inline float FN(share_of)(float a, float b)
         return 0.0F;
     }
     whole = a / whole;
-    return whole;
+    return (whole <= 1.0F) ? whole : 0.0F;
 }
 
 static inline float FN(part)(float share, float x)

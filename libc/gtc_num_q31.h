@@ -566,13 +566,6 @@ static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, i
 #define SHIFT_SHARE uint_least64_t /* 2^-31 */
 #define Q31_PART 1073741824
 
-/* 1 if x is no finite number: no integer is. */
-static inline int FN(is_wild)(int_least64_t x)
-{
-    (void)x;
-    return 0;
-}
-
 /* The nearest number of magnitude 2^30 at most. */
 static inline int_least64_t FN(limited)(int_least64_t x)
 {

@@ -60,9 +60,6 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
     rest = FN(plus)(FN(variance)(state), FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
     share = FN(share_of)(prior, rest);
     shift = FN(add)(state->shift, FN(part)(share, mean_rate));
-    if (FN(is_wild)(shift) != 0) {
-        return GTC_E_ARG;
-    }
     state->shift = FN(granted)(state->table, shift);
     if ((shift > state->shift) || (shift < state->shift)) {
         status = GTC_CLAMPED;

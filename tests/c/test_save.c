@@ -206,6 +206,8 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define WINDOW_AT 11
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
 #define TERM_AT (INPUT_AT + (13 * (GTC_MAX_TERMS + 1)))
+#define DOUBT_AT (TERM_AT + (2 * GTC_MAX_TERMS))
+#define SHIFT_AT (DOUBT_AT + 10)
 
 /* CRC of a saved state, bit by bit: over all words before it. */
 static void resealed(gtc_word_t words[WORDS])
@@ -264,6 +266,35 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
     CHECK_INT(GTC_OK, restored(&state, words, 0U));
 }
 
+/* What the uncertainty goes by must be numbers and temperatures, the shift what the table grants. */
+TEST(doubts_that_no_call_leaves_are_refused_with_a_right_crc)
+{
+    static const int at[10] = {
+        DOUBT_AT, DOUBT_AT + 1, DOUBT_AT + 2, DOUBT_AT + 3, DOUBT_AT + 4, DOUBT_AT + 5, DOUBT_AT + 6, SHIFT_AT,
+        SHIFT_AT, SHIFT_AT + 1,
+    };
+    static const uint_least32_t to[10] = {
+        MISSING_BITS, MISSING_BITS, MISSING_BITS, 0x70000000UL, 0x70000000UL, 0x70000000UL, MISSING_BITS, 0x70000000UL,
+        0xF0000000UL, MISSING_BITS,
+    };
+    gtc_word_t words[WORDS];
+    gtc_word_t forged[WORDS];
+    state_t state = started();
+    int k;
+
+    walk(&state, 0, 30);
+    saved(&state, words);
+    for (k = 0; k < 10; k++) {
+        memcpy(forged, words, sizeof forged);
+        forged[at[k]].bits = to[k];
+        if ((TEST_Q31 != 0) && (at[k] == SHIFT_AT)) {
+            forged[at[k]].bits = (k == 7) ? 0x7FFFFFFFUL : 0x80000001UL;
+        }
+        resealed(forged);
+        CHECK_INT(GTC_E_IMAGE, restored(&state, forged, 0U));
+    }
+}
+
 TEST(bad_arguments_are_refused)
 {
     gtc_word_t words[WORDS];
@@ -296,6 +327,7 @@ int main(void)
     RUN(erased_memory_is_refused);
     RUN(a_state_of_the_other_arithmetic_is_refused);
     RUN(numbers_that_no_call_leaves_are_refused_with_a_right_crc);
+    RUN(doubts_that_no_call_leaves_are_refused_with_a_right_crc);
     RUN(bad_arguments_are_refused);
     return test_end();
 }

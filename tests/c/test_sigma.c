@@ -206,8 +206,236 @@ TEST(a_table_that_grants_no_shift_keeps_its_constant)
     CHECK(same(bias_of(&state), before));
 }
 
+/* n samples of a table with a channel: from *temp on, which moves by `step`. */
+static void terms_ramp(state_t *state, num_t *temp, num_t step, num_t supply, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        num_t channels[2];
+
+        channels[0] = *temp;
+        channels[1] = supply;
+        CHECK(FN(sample)(state, channels) >= 0);
+        *temp = (num_t)(*temp + step);
+    }
+}
+
+/* While the window fills, the slope that the correction lacks is known from the second block on. */
+TEST(sigma_while_warming_grows_with_the_slope)
+{
+    num_t sigma[2];
+    int k;
+
+    for (k = 0; k < 2; k++) {
+        state_t state = started();
+        num_t temp = C(12);
+
+        ramp(&state, &temp, (k == 0) ? 0 : (num_t)(C(1) / 64), 10);
+        CHECK((status_of(&state) & GTC_WARMING) != 0);
+        sigma[k] = snapshot_of(&state).sigma;
+    }
+    CHECK(sigma[1] > sigma[0]);
+}
+
+TEST(sigma_grows_below_the_envelope_too)
+{
+    state_t state = started();
+    state_t colder = started();
+    const num_t edge = VALUE(TABLE.envelope[0]);
+
+    rest(&state, (num_t)(edge - C(1)), 100);
+    rest(&colder, (num_t)(edge - C(10)), 100);
+    CHECK(snapshot_of(&colder).sigma > snapshot_of(&state).sigma);
+}
+
+/* A memory forgets by time, a play by temperatures seen; a lost channel stays unknown. */
+TEST(terms_whose_past_is_not_known_say_so_until_they_have_forgotten_it)
+{
+    state_t state;
+    num_t temp = C(15);
+    num_t begun;
+    num_t rested;
+    num_t moved;
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &TERMS, PERIOD));
+    terms_ramp(&state, &temp, 0, C(12), 20); /* the window is full */
+    CHECK_INT(0, status_of(&state) & GTC_WARMING);
+    begun = snapshot_of(&state).sigma;
+    terms_ramp(&state, &temp, 0, C(12), 4000); /* the memory has settled, the play has not moved */
+    rested = snapshot_of(&state).sigma;
+    CHECK(rested < begun);
+    terms_ramp(&state, &temp, C(1) / 64, C(12), 400); /* by 6 C, more than twice its width */
+    temp = (num_t)(temp - C(1) / 64);
+    terms_ramp(&state, &temp, 0, C(12), 40);
+    moved = snapshot_of(&state).sigma;
+    CHECK(moved < rested);
+    terms_ramp(&state, &temp, 0, MISSING, 40);
+    CHECK((status_of(&state) & GTC_CHANNEL_LOST) != 0);
+    CHECK(snapshot_of(&state).sigma > moved);
+}
+
+/* ... but what was saved a block ago is known. */
+TEST(terms_that_go_on_from_where_they_were_are_sure)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t state;
+    state_t other;
+    state_t fresh;
+    num_t temp = C(15);
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &TERMS, PERIOD));
+    terms_ramp(&state, &temp, 0, C(12), 4000);
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&other, &TERMS, PERIOD, words, 1U));
+    CHECK_INT(GTC_OK, FN(init)(&fresh, &TERMS, PERIOD));
+    terms_ramp(&other, &temp, 0, C(12), 20);
+    terms_ramp(&fresh, &temp, 0, C(12), 20);
+    CHECK(snapshot_of(&other).sigma < snapshot_of(&fresh).sigma);
+}
+
+TEST(a_table_without_uncertainties_gives_neither_snapshot_nor_shift)
+{
+    state_t state;
+    snapshot_t snapshot = nothing;
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &NARROW, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, FN(snapshot)(&state, &snapshot));
+    CHECK(memcmp(&snapshot, &nothing, sizeof snapshot) == 0);
+    CHECK_INT(GTC_E_LAYOUT, FN(rezero)(&state, DPH(0.01), 3600U));
+}
+
+TEST(words_of_uncertainty_are_all_there_or_none)
+{
+    table_t table = TABLE;
+    state_t state;
+
+    table.n_sigma = TABLE.n_sigma - 1U;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    table.n_sigma = TABLE.n_sigma;
+    table.sigma_cells[0] = 0U;
+    table.sigma_cells[1] = 0U;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    table.n_sigma = GTC_SIGMA_RULES; /* as many as rules alone are */
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+}
+
+/* The widest words that `init` accepts: sums of squares stay within their numbers, the root is a sigma. */
+TEST(the_largest_words_give_a_sigma)
+{
+    gtc_word_t words[15];
+    table_t table = TABLE;
+    state_t state;
+    num_t temp = (num_t)(VALUE(TABLE.envelope[1]) + C(9));
+    num_t shift;
+    uint_least32_t i;
+
+    for (i = 0U; i < 15U; i++) {
+        words[i] = TABLE.sigma[i];
+#if TEST_Q31
+        words[i].integer = 2147483647L;
+#else
+        words[i].value = 7.5e6F;
+#endif
+    }
+    table.sigma = words;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    feed(&state, temp, 3);
+    CHECK(FN(missed)(&state, 2U * N) >= 0);
+    CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
+    for (i = 0U; i < 2U; i++) { /* slopes to either side, beyond the largest product */
+        ramp(&state, &temp, (num_t)((i == 0U) ? -(C(1) / 8) : (C(1) / 8)), 100);
+        CHECK(FN(missed)(&state, 2U * N) >= 0);
+        CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
+    }
+    CHECK(FN(rezero)(&state, DPH(0.001), 1U) >= 0);
+    shift = (num_t)(bias_of(&state) - state.doubt.plain);
+    CHECK((shift >= -VALUE(TABLE.rezero)) && (shift <= VALUE(TABLE.rezero)));
+}
+
+/* Numbers that no call leaves, as after an upset of the memory. */
+TEST(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no_shift)
+{
+    state_t state = started();
+    snapshot_t snapshot;
+    num_t before;
+
+    rest(&state, C(15), 100);
+    before = bias_of(&state);
+    state.constant = MUCH;
+#if !TEST_Q31
+    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U)); /* its square is none: nothing is known of the share */
+    CHECK(same(bias_of(&state), before));
+#endif
+    state.doubt.at[0] = MISSING;
+    snapshot = snapshot_of(&state);
+    CHECK(same(snapshot.bias, bias_of(&state)));
+    state.bias = MISSING;
+    CHECK(bias_of(&state) >= VALUE(TABLE.authority[0]));
+    CHECK(bias_of(&state) <= VALUE(TABLE.authority[1]));
+}
+
+/* Without noise and without an uncertain constant a rest says nothing. */
+TEST(a_table_that_is_sure_of_everything_takes_no_rest)
+{
+    gtc_word_t words[15];
+    table_t table = TABLE;
+    state_t state;
+    num_t before;
+    uint_least32_t i;
+
+    for (i = 0U; i < 15U; i++) {
+        words[i].bits = 0U;
+    }
+    table.sigma = words;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    rest(&state, C(15), 100);
+    before = bias_of(&state);
+    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
+    CHECK(same(bias_of(&state), before));
+    CHECK(snapshot_of(&state).sigma == 0);
+}
+
+TEST(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t state = started();
+    state_t other;
+
+    rest(&state, C(15), 100);
+    CHECK_INT(GTC_OK, FN(rezero)(&state, -DPH(0.004), 3600U));
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&other, &TABLE, PERIOD, words, 100U));
+    rest(&other, C(15), 100);
+    CHECK(same(bias_of(&state), bias_of(&other)));
+    CHECK(snapshot_of(&other).sigma > snapshot_of(&state).sigma);
+}
+
+/* A state without uncertainties is saved and restored as others are. */
+TEST(a_state_without_uncertainties_outlasts_a_time_without_power)
+{
+    gtc_word_t words[GTC_SAVE_WORDS];
+    state_t state;
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &NARROW, PERIOD));
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&state, &NARROW, PERIOD, words, 100U));
+    CHECK_INT(GTC_HELD, status_of(&state));
+}
+
 int main(void)
 {
+    RUN(sigma_while_warming_grows_with_the_slope);
+    RUN(sigma_grows_below_the_envelope_too);
+    RUN(terms_whose_past_is_not_known_say_so_until_they_have_forgotten_it);
+    RUN(terms_that_go_on_from_where_they_were_are_sure);
+    RUN(a_table_without_uncertainties_gives_neither_snapshot_nor_shift);
+    RUN(words_of_uncertainty_are_all_there_or_none);
+    RUN(the_largest_words_give_a_sigma);
+    RUN(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no_shift);
+    RUN(a_table_that_is_sure_of_everything_takes_no_rest);
+    RUN(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does);
+    RUN(a_state_without_uncertainties_outlasts_a_time_without_power);
     RUN(bad_arguments_are_refused_and_nothing_is_written);
     RUN(sigma_falls_while_the_front_end_learns);
     RUN(sigma_grows_with_the_age_of_a_held_correction);
