@@ -200,7 +200,8 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert (limits["schema"], limits["met"], limits["product"]) == ("gyrotc.limits/1", False, "NAV")
     assert "not met" in (tmp_path / "one" / "report.html").read_text()
 
-    product.write_text("schema = 1\n[at_most]\ntable_bytes = 300\n")
+    guards = "[guards.temperature_c]\nrange = [-55.0, 85.0]\nstuck_s = 700.0\n"
+    product.write_text("schema = 1\n[at_most]\ntable_bytes = 300\n" + guards)
     recording(tmp_path / "second", "RLG-1", shift=0.01)
     done = gyrotc(*build, tmp_path / "second", "--out", tmp_path / "two", "--previous", tmp_path / "one")
     assert done.returncode == 0, done.stderr
@@ -212,6 +213,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
         and "c/gtc.c" not in changes["files"]["other_bytes"]
     )
     assert "maps 1.000e-02 deg/h RMS apart" in done.stdout
+    assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     found = changes["as_found"]
     assert found["judged_on"] == "train" and found["limits"]["met"] is True
     assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"

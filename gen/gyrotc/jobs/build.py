@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ..judge.budget import budget_of
 from ..judge.changes import changes_since, load_earlier
 from ..judge.evaluate import Watch, evaluate
 from ..judge.limits import Limits, held_against, load_limits
+from ..judge.product_guards import guarded
 from ..model import Model
 from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
 from ..pages.report import write_report
@@ -157,6 +158,9 @@ def _build_axis(
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)
+    if order.limits:
+        model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
+        fitted = replace(fitted, model=model)
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training.content())
     say("emitting C")

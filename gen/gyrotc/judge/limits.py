@@ -23,6 +23,7 @@ from ..results.verification import Verification
 from ..verify.toolchain import all_targets
 from .conformity import decided, worst_of
 from .instruments import StatedInstrument
+from .product_guards import ProductGuard
 
 __all__ = ["Limits", "held_against", "load_limits"]
 
@@ -120,7 +121,9 @@ class Limits(_Part):
     needs: Required = Required()
     interval: Recalibration | None = None
     instrument: Annotated[tuple[StatedInstrument, ...], BeforeValidator(_as_tuple)] = ()
-    sha256: str = ""  # of the file
+    guards: dict[str, ProductGuard] = {}  # by channel: what the runtime believes of it
+    sha256: str = ""  # of the file ...
+    file: str = ""  # ... and its name
 
 
 def load_limits(path: Path) -> Limits:
@@ -131,10 +134,12 @@ def load_limits(path: Path) -> Limits:
     """
     data = read_input(path, "text_mib", "a limits file")
     content = parse_toml(data, str(path), "a limits file")
-    if "sha256" in content:
-        raise InputError(f"{path}, field sha256", "is not known", "a field named in docs/limits.md")
+    own = {"sha256": hashlib.sha256(data).hexdigest(), "file": str(path)}
+    for name in own:
+        if name in content:
+            raise InputError(f"{path}, field {name}", "is not known", "a field named in docs/limits.md")
     try:
-        limits = Limits.model_validate(content | {"sha256": hashlib.sha256(data).hexdigest()})
+        limits = Limits.model_validate(content | own)
     except ValidationError as error:
         detail = error.errors()[0]
         where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"

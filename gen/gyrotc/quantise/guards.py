@@ -11,7 +11,10 @@ from ..model import Guard, Model
 from ..reference.table import Numeric, Words, f32_words
 from .terms import channel_names
 
-__all__ = ["guard_of", "guard_words"]
+__all__ = ["TEMPERATURE", "guard_of", "guard_words"]
+
+TEMPERATURE = "temperature_c"
+"""Name of the temperature among the guards of a model."""
 
 _US_PER_MIN = 60e6  # microseconds in a minute
 _LARGEST = 2**31 - 1  # a signed 32-bit word
@@ -22,6 +25,8 @@ def guard_of(model: Model, channel: str | None) -> Guard:
     """The guard of a channel; None: of the temperature. Without one in the model every reading passes."""
     missing_s = model.hold_blocks * model.block_s
     if channel is None:
+        if TEMPERATURE in model.guards and TEMPERATURE not in channel_names(model):
+            return model.guards[TEMPERATURE]
         low, high = PLAUSIBLE_C
         return Guard(
             low=low,
