@@ -260,6 +260,25 @@ typedef struct {
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS (37 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
+/* What the functions below take on a Cortex-M4F (arm-none-eabi-gcc, -O2), about, bytes: code with all that it
+ * calls, which is linked once; stack at the deepest call, whatever terms a table has. Other targets:
+ * docs/results.md of gyrotc.
+ *               f32 code  stack   q31 code  stack
+ *   check           4480    450       3530    460
+ *   open            2770    470       2460    490
+ *   map              910     20        760    130
+ *   init            2630    300       2350    320
+ *   sample          4170    170       4580    310
+ *   sample_at       4500    180       4920    330
+ *   missed          3350    160       3980    310
+ *   bias              80      0         70     10
+ *   snapshot        1110     30       1880    110
+ *   rezero          1340     40       2240    110
+ *   unzero           120      0        110     10
+ *   angle            340      0        180     20
+ *   save             560     30        550     30
+ *   restore         4350    810       3960    860 */
+
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
  * word within its range (docs/FORMAT.md, section 3), its known answers, which the generator chooses to

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 from emitted import emitted
 from gyrotc.errors import CheckFailed
 from gyrotc.verify.functions import PUBLIC, function_costs, parse_graph
@@ -27,6 +29,29 @@ def test_the_deepest_call_counts_and_a_pointer_goes_to_a_hook_of_its_arithmetic(
     assert graph.deepest("gtc_f32_map") == 16
     assert graph.deepest("gtc_f32_sample") == 8 + 40
     assert graph.helpers("gtc_f32_sample") == {"__aeabi_uldivmod"}
+    assert graph.reached("gtc_f32_sample") == {
+        "gtc_f32_sample", "gtc_f32_map", "gtc_f32_play_step", "__aeabi_uldivmod"
+    }  # fmt: skip
+
+
+def test_a_function_that_both_arithmetics_share_is_counted_under_its_one_name() -> None:
+    shared = (
+        '\nedge: { sourcename: "gtc_f32_sample" targetname: "gtc.c:gtc_f32_shared" label: "gtc.c:7:5" }\n'
+    )
+    node = (
+        '\nnode: { title: "gtc.c:gtc_q31_shared" label: "gtc_q31_shared\\ngtc.c:9:1\\n100 bytes (static)" }'
+    )
+    graph = parse_graph(GRAPH + node + shared)
+    assert graph.deepest("gtc_f32_sample") == 8 + 100
+    assert graph.helpers("gtc_f32_sample") == {"__aeabi_uldivmod"}
+
+
+def test_public_functions_are_those_of_the_header() -> None:
+    """None is left out of the figures of code, stack and cost."""
+    header = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
+    for numeric in ("f32", "q31"):
+        declared = re.findall(rf"^GTC_MUST_CHECK int gtc_{numeric}_(\w+)\(", header, re.MULTILINE)
+        assert sorted(declared) == sorted(PUBLIC)
 
 
 def test_a_stack_without_a_bound_is_refused() -> None:
@@ -47,6 +72,20 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
         found = costs[numeric]
         assert list(found) == list(PUBLIC)
         assert found["sample"].stack_bytes > found["map"].stack_bytes > 0
+        assert found["sample_at"].code_bytes > found["sample"].code_bytes > found["map"].code_bytes
         assert found["restore"].stack_bytes <= 1000, "one state on the stack, not two"
         assert found["save"].stack_bytes <= 100
         assert all(cost.code_bytes > 0 for cost in found.values())
+        assert all("gtc_" not in helper for cost in found.values() for helper in cost.helpers)
+        for name, (code, stack) in _said_by_the_header(numeric).items():
+            assert found[name].code_bytes == pytest.approx(code, rel=0.1, abs=10), name
+            assert found[name].stack_bytes == pytest.approx(stack, rel=0.1, abs=16), name
+
+
+def _said_by_the_header(numeric: str) -> dict[str, tuple[int, int]]:
+    """Bytes of code and stack in the comment of gtc.h; compilers of other versions differ by some of them."""
+    header = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
+    rows = re.findall(r"^ \*   (\w+) +(\d+) +(\d+) +(\d+) +(\d+)(?: \*/)?$", header, re.MULTILINE)
+    assert [row[0] for row in rows] == list(PUBLIC)
+    first = 1 if numeric == "f32" else 3
+    return {row[0]: (int(row[first]), int(row[first + 1])) for row in rows}

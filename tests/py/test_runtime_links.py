@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from gyrotc.emit.amalgamate import amalgamate
 from gyrotc.reference.runtime import runtime_folders
+from gyrotc.verify.functions import PUBLIC
 
 ROOT = Path(__file__).resolve().parents[2]
 MINIMAL = ROOT / "examples" / "minimal"
 RIGHT = ("-std=c99", "-ffp-contract=off", f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}", f"-I{MINIMAL}")
 SOURCES = [str(ROOT / "libc" / f"gtc_{name}.c") for name in ("crc", "f32", "q31")]
-FUNCTIONS = ("check", "open", "map", "init", "sample", "missed", "bias", "angle", "save", "restore")
 #: Every public function, in a program without start-up code; `_start` is never run here.
 ALONE = """
 #include "gtc_rlg_0042.h"
@@ -23,6 +23,7 @@ static gtc_{n}_state_t state;
 static gtc_{n}_table_t opened;
 static gtc_{n}_angle_t sum;
 static gtc_word_t words[GTC_SAVE_WORDS];
+static gtc_{n}_snapshot_t snapshot;
 
 void _start(void);
 void _start(void)
@@ -31,6 +32,8 @@ void _start(void)
     volatile int done = gtc_{n}_check(&gtc_rlg_0042_{n}) + gtc_{n}_open(&opened, words, 9U, 1U)
                         + gtc_{n}_map(&opened, x[0], x[0], x) + gtc_{n}_init(&state, &opened, 1000000UL)
                         + gtc_{n}_sample(&state, x) + gtc_{n}_missed(&state, 9U) + gtc_{n}_bias(&state, x)
+                        + gtc_{n}_sample_at(&state, 9U, x) + gtc_{n}_snapshot(&state, &snapshot)
+                        + gtc_{n}_rezero(&state, x[0], 9U) + gtc_{n}_unzero(&state)
                         + gtc_{n}_angle(&sum, x[0], x[0], x) + gtc_{n}_save(&state, words)
                         + gtc_{n}_restore(&state, &opened, 9U, words, 0U);
     while (done != 0) {{
@@ -91,7 +94,7 @@ def test_units_with_different_options_do_not_link_and_the_linker_says_which(
 def test_every_public_function_is_found_by_its_name(numeric: str) -> None:
     """In the sources and in what is emitted: a definition at the start of a line."""
     for text in (Path(SOURCES[1 if numeric == "f32" else 2]).read_text(), amalgamate(*runtime_folders())[1]):
-        for name in FUNCTIONS:
+        for name in PUBLIC:
             assert len(re.findall(rf"^int gtc_{numeric}_{name}\(", text, re.MULTILINE)) == 1, name
 
 

@@ -19,9 +19,10 @@ _COSTS = """Cost with the golden model ({centers} centers): instructions of a ma
 `sample`, the largest (it closes a block); bytes of code that a program with both links, of stack below the caller.
 Counted in emulators; AVR: cycles. float32 is not offered where the compiler does not keep to its arithmetic.
 """
-_FUNCTIONS = """Public functions on {target} ({arithmetic}): bytes of own code; of stack, by its graph of calls, the
-deepest one counted whatever terms a table has, without that of the compiler's own functions that are named. A program
-with the self-test, a state and its samples links {read_only} bytes of constants, the table's among them.
+_FUNCTIONS = """Public functions on {target} ({arithmetic}): bytes of code, of the function with all that it calls (what
+several call is linked once); of stack, by its graph of calls, the deepest one counted; both whatever terms a table has,
+without those of the compiler's own functions that are named. A program with the self-test, a state and its samples
+links {read_only} bytes of constants, the table's among them.
 """
 _CONTROLS = """Negative controls: builds that are wrong on purpose. Each ran to its end; that many results differed.
 """

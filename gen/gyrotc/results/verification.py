@@ -27,7 +27,7 @@ class CallCost(Part):
 class FunctionCost(Part):
     """What a public function takes."""
 
-    code_bytes: Count = Field(description="its own code")
+    code_bytes: Count = Field(description="of it and of what it calls")
     stack_bytes: Count = Field(description="at the deepest of its calls")
     helpers: tuple[str, ...] = Field(
         description="functions of the compiler's library that it calls; their stack is not counted"

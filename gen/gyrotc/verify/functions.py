@@ -1,4 +1,4 @@
-"""What each public function of the runtime costs: bytes of its code, and stack at the deepest of its calls.
+"""What each public function of the runtime costs: bytes of code with all it calls, and stack at the deepest call.
 
 gcc writes the graph of calls with the stack of each function (`-fcallgraph-info=su`). A call through a pointer goes to
 a hook of a term; the deepest of them all counts, whichever terms a table has. Functions of the compiler's own library
@@ -18,7 +18,11 @@ from .toolchain import Target, compile_objects, symbols
 
 __all__ = ["PUBLIC", "Graph", "function_costs", "parse_graph"]
 
-PUBLIC = ("check", "open", "map", "init", "sample", "missed", "bias", "angle", "save", "restore")
+PUBLIC = (
+    "check", "open", "map", "init", "sample", "sample_at", "missed", "bias", "snapshot", "rezero", "unzero",
+    "angle", "save", "restore",
+)  # fmt: skip
+"""Every function that gtc.h declares, without its prefix (`tests/py/test_functions.py`)."""
 _NODE = re.compile(
     r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
 )
@@ -40,11 +44,20 @@ class Graph:
 
     def callees(self, name: str) -> set[str]:
         """Whom a function calls, pointers to hooks of its arithmetic resolved."""
-        found = self.calls.get(name, set())
+        found = {self._folded(callee) for callee in self.calls.get(name, set())}
         if _INDIRECT not in found:
             return found
         hooks = {n for n in self.stack if _HOOK.match(n) and n[:8] == name[:8]}
         return (found - {_INDIRECT}) | hooks
+
+    def _folded(self, name: str) -> str:
+        """Functions that are the same in both arithmetics are one, which has one of the two names."""
+        twin = name.replace("_q31_", "_f32_") if "_q31_" in name else name.replace("_f32_", "_q31_")
+        return twin if name not in self.stack and twin in self.stack else name
+
+    def reached(self, name: str) -> set[str]:
+        """The function and all that it calls on the way."""
+        return {name}.union(*(self.reached(callee) for callee in self.callees(name)))
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> int:
         """Bytes of stack of a function and the deepest chain of calls from it.
@@ -107,7 +120,7 @@ def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, Fu
         name = next((n for n in sizes if linked.match(n)), None)
         if name is not None:
             costs[function] = FunctionCost(
-                code_bytes=sizes[name],
+                code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),
                 stack_bytes=graph.deepest(name),
                 helpers=tuple(sorted(graph.helpers(name))),
             )
