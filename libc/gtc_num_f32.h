@@ -527,7 +527,7 @@ static inline float FN(share_of)(float a, float b)
         return 0.0F;
     }
     whole = a / whole;
-    return (whole <= 1.0F) ? whole : 0.0F;
+    return (FN(is_missing)(whole) != 0) ? 0.0F : whole;
 }
 
 static inline float FN(part)(float share, float x)
