@@ -71,6 +71,12 @@ AverageOption = Annotated[
     float,
     typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
 ]
+ChannelsOption = Annotated[
+    bool,
+    typer.Option(
+        "--channels", help="Let recorded channels be inputs, those that hold on unseen history alone."
+    ),
+]
 MethodOption = Annotated[
     str,
     typer.Option(

@@ -16,6 +16,7 @@ from .base import (
     AxisOption,
     BlockOption,
     CentersOption,
+    ChannelsOption,
     DatasetArg,
     JsonOption,
     MethodOption,
@@ -34,6 +35,7 @@ from .base import (
 from .diagnosis_lines import diagnosis_lines, extension_lines
 from .results import (
     change_lines,
+    channel_lines,
     evaluation_table,
     ladder_lines,
     limit_lines,
@@ -58,6 +60,7 @@ def build(
     rho: RhoOption = None,
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
+    channels: ChannelsOption = False,
     numeric: NumericOption = None,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
@@ -82,7 +85,7 @@ def build(
     from ..jobs.build import build as run
     from ..train.fitting import FitOptions
 
-    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels)
     with progress() as say:
         results = run(
             dataset,
@@ -119,7 +122,11 @@ def _failures(result: Built) -> list[str]:
 def _print_built(result: Built) -> None:
     show(evaluation_table(result.evaluation))
     show(verify_table(result.verification))
-    for line in (*span_lines(result.training), *ladder_lines(result.training)):
+    for line in (
+        *span_lines(result.training),
+        *ladder_lines(result.training),
+        *channel_lines(result.training),
+    ):
         tell(line)
     for name, reason in result.refused.items():
         tell(f"{name} left out: {reason}")

@@ -61,6 +61,19 @@ def ladder_lines(training: Training) -> Iterator[str]:
         yield f"  left-out RMS, deg/h: {', '.join(tried)}"
 
 
+def channel_lines(training: Training) -> Iterator[str]:
+    """What became of every channel that was tried as an input."""
+    for tried in training.channels or ():
+        if tried.verdict != "taken":
+            yield f"channel {tried.name}: {tried.verdict}: {tried.reason}"
+            continue
+        before, after = tried.left_out_rms_before_dph, tried.left_out_rms_after_dph
+        yield (
+            f"channel {tried.name}: taken, {tried.slope_dph_per_unit:.4g} deg/h per unit; left-out RMS {before:.4g} -> "
+            f"{after:.4g} deg/h, {tried.share_of_variance:.0%} of the variance of the bias"
+        )
+
+
 def prediction_line(training: Training) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
     ratio = training.predicted_rms_ratio

@@ -17,6 +17,7 @@ from .base import (
     AxisOption,
     BlockOption,
     CentersOption,
+    ChannelsOption,
     DatasetArg,
     DirArg,
     JsonOption,
@@ -35,6 +36,7 @@ from .base import (
     write_json,
 )
 from .results import (
+    channel_lines,
     evaluation_table,
     file_notes,
     ladder_lines,
@@ -57,6 +59,7 @@ def fit(
     rho: RhoOption = None,
     block_s: BlockOption = 10.0,
     average_s: AverageOption = 100.0,
+    channels: ChannelsOption = False,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
@@ -69,7 +72,7 @@ def fit(
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
-    options = FitOptions(method, seed, centers, rho, block_s, average_s)
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
@@ -78,7 +81,11 @@ def fit(
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
     write_json(json_file, fitted.training.content())
-    for line in (*span_lines(fitted.training), *ladder_lines(fitted.training)):
+    for line in (
+        *span_lines(fitted.training),
+        *ladder_lines(fitted.training),
+        *channel_lines(fitted.training),
+    ):
         tell(line)
     for finding in fitted.training.findings:
         tell(f"finding {finding.id}: {finding.text}")

@@ -30,6 +30,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Role = Literal["train", "exam"]
+_OWN = "temperature_c"  # what a difference calls the temperature of the gyro itself, whatever the column is named
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,27 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def has_channel(self, name: str) -> bool:
+        """Whether `channel` knows it."""
+        return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
+
+    def channel(self, name: str) -> Floats:
+        """A recorded channel, or a difference of two columns by the name "a - b" (or of "temperature_c").
+
+        Raises:
+            KeyError: There is no such column.
+        """
+        if name in self.channels:
+            return self.channels[name]
+        first, _, second = name.partition(" - ")
+        return np.asarray(self._column(first) - self._column(second))
+
+    def _is_column(self, name: str) -> bool:
+        return name in self.channels or name == _OWN
+
+    def _column(self, name: str) -> Floats:
+        return self.temperature_c if name == _OWN and _OWN not in self.channels else self.channels[name]
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,7 +170,7 @@ def _with_terms(
     if content["uncertainty_dph"] is not None:
         rules = content["uncertainty_dph"]["rules"]
         channels = {
-            e["channel"]: np.concatenate([run.rows().channels[e["channel"]] for run in runs])
+            e["channel"]: np.concatenate([run.rows().channel(e["channel"]) for run in runs])
             for e in entries
             if e["channel"] is not None
         }

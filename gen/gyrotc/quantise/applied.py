@@ -59,7 +59,7 @@ def channels_of(rows: Rows, model: Model, table: Table) -> NDArray[np.uint32]:
     """
     names = sorted({t.channel for t in model.terms if t.channel})
     for name in names:
-        if name not in rows.channels:
+        if not rows.has_channel(name):
             raise InputError(f"channel {name}", "the recording has no such column", "the channel of a term")
-    columns = [rows.temperature_c, *(rows.channels[name] for name in names)]
+    columns = [rows.temperature_c, *(rows.channel(name) for name in names)]
     return table.encode_inputs(np.stack(columns, axis=1))

@@ -12,6 +12,7 @@ from .evaluation import FoundIn, Pooled
 __all__ = [
     "AllanPoint",
     "BiasPlane",
+    "ChannelTried",
     "DeclaredUnits",
     "LeftOutRows",
     "NoiseTerms",
@@ -80,6 +81,24 @@ class Rung(Part):
     refused: str | None = Field(default=None, description="why it could not be taken, where it was the best")
 
 
+class ChannelTried(Part):
+    """A recorded channel, or a difference of thermometers, that was tried as an input (`--channels`)."""
+
+    name: str = Field(description='its column; "a - b": a difference, of "temperature_c" the gyro\'s own')
+    verdict: Literal["taken", "not earned", "collinear", "refused"] = Field(description="what became of it")
+    reason: str = Field(description="why, in words")
+    slope_dph_per_unit: float | None = Field(
+        default=None, description="of what it adds, deg/h per unit; where taken"
+    )
+    left_out_rms_before_dph: Figure = Field(
+        default=None, description="RMS on history left out with those taken before it, deg/h; where taken"
+    )
+    left_out_rms_after_dph: Figure = Field(default=None, description="the same with it, deg/h; where taken")
+    share_of_variance: Figure = Field(
+        default=None, description="variance of what it adds over that of the measured bias; where taken"
+    )
+
+
 class LeftOutRows(Part):
     """A stretch of rows that were left out."""
 
@@ -132,6 +151,9 @@ class Training(Result):
     findings: tuple[FoundIn, ...] = Field(description="what a person should know")
     curves: dict[str, Any] = Field(
         description="figures of the method; `sizes` and `chosen` where it chose a number of centers"
+    )
+    channels: tuple[ChannelTried, ...] | None = Field(
+        default=None, description="recorded channels that were tried as inputs; absent without `--channels`"
     )
     outliers: Outliers | None = Field(
         default=None, description="rows that were left out; absent of an extended model"

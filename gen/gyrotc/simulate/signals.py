@@ -62,13 +62,13 @@ class Laser(_Signal):
     path_node: str = "block"
     loss_ppm: Positive = 300.0
     loss_ppm_per_c: float = 0.1
-    contamination_ppm: NonNegative = 4.0
+    contamination_ppm: NonNegative = 6.0
     contamination_tau_s: Positive = 7200.0
     walk_ppm: NonNegative = 20.0
     gain_ppm: Positive = 900.0
     gain_per_c: float = -1e-3
     gas_c: float = 50.0
-    depletion_day: Positive = 2000.0
+    depletion_day: Positive = 10000.0
     intensity_level_v: Positive = 2.0
     intensity_noise_v: NonNegative = 5e-4
     wavelength_nm: Positive = 632.8
@@ -79,6 +79,6 @@ class Laser(_Signal):
     reset_share: Annotated[float, Field(ge=0.5, le=2.0)] = 0.6
     stroke_v: Positive = 60.0
     stroke_noise_v: NonNegative = 0.02
-    null_dph_per_ppm: float = 5e-5
+    null_dph_per_ppm: float = 1e-4
     null_growth_per_c: float = 0.0
     stroke_dph: float = 5e-4

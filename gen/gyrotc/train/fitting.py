@@ -34,6 +34,7 @@ from . import (
     predict,
     uncertainty,
 )
+from .channels import chosen_channels, seen_by_target, with_channels
 from .data import joined
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .noisefloor import noise_terms, sensitivities, stretches
@@ -70,7 +71,10 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """Options of `gyrotc fit`; the method `auto` is the ladder of corrections."""
+    """Options of `gyrotc fit`; the method `auto` is the ladder of corrections.
+
+    `channels`: recorded channels become inputs where they earn their place.
+    """
 
     method: str = AUTO
     seed: int = 0
@@ -78,6 +82,7 @@ class FitOptions:
     rho: float | None = None
     block_s: float = 10.0
     average_s: float = 100.0
+    channels: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +168,7 @@ def fit_dataset(
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
     stretches = joined_runs(runs)
-    parts = []
+    parts, columns = [], []
     left_out_rows: list[LeftOutRows] = []
     longest_s = 0.0
     for k, run in enumerate(stretches):
@@ -171,6 +176,7 @@ def fit_dataset(
         blocks = front.blocks(run)
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
+        columns.append(seen_by_target(dataset, run.rows(), blocks) if options.channels else {})
         left_out_rows += stretches_left_out(run, blocks.left_out_s)
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
@@ -180,13 +186,23 @@ def fit_dataset(
             f"at least {_MIN_SAMPLES}",
         )
     say("training")
+    choice = None
+    if options.channels:
+        whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
+        choice = chosen_channels(dataset, data, whole, power_ons(stretches), options.average_s)
+    added = choice.added if choice else np.zeros(len(data))
+    data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _fit(data, options, power_on=power_ons(stretches))
     spans = training_spans(stretches, data)
     left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
     front = replace(front, stuck_s=stuck_after_s(longest_s))
-    model = model_of(dataset, runs, data, fitted, front, options)
+    model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
-    return Fitted(model, training.model_copy(update={"outliers": outliers_of(left_out_rows, data)}))
+    told: dict[str, Any] = {"outliers": outliers_of(left_out_rows, data)}
+    if choice:
+        told["channels"] = choice.rows
+        model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
+    return Fitted(model, training.model_copy(update=told))
 
 
 def map_method(method: str) -> str:

@@ -37,7 +37,7 @@ def stuck_after_s(longest_s: float) -> float:
 
 def channel_guard(runs: Sequence[Run], channel: str, missing_s: float) -> dict[str, float]:
     """The guard of an auxiliary channel as training runs showed it, in the fields of `model.json`."""
-    columns = [np.asarray(run.rows().channels[channel]) for run in runs]
+    columns = [np.asarray(run.rows().channel(channel)) for run in runs]
     longest = max(longest_same_s(c, run.row_period_s) for c, run in zip(columns, runs, strict=True))
     readings = [column[np.isfinite(column)] for column in columns]
     every = np.concatenate(readings)

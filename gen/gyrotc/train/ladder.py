@@ -39,7 +39,7 @@ from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .simple import SIMPLE, design, solve
 from .spans import Fold, history_folds
 
-__all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb"]
+__all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb", "pieces_of"]
 
 Floats = NDArray[np.float64]
 Correction = Callable[[Floats, Floats], Floats]
@@ -224,7 +224,7 @@ def climb(
     )
     square = np.array([_squares(fold, means, kept, scaling, process, average_s) for fold in folds])
     square = square.reshape(len(folds), len(RUNGS))
-    return Ladder(folds, np.sqrt(square), 0.5 * np.log(square + noise**2), noise, _pieces(folds))
+    return Ladder(folds, np.sqrt(square), 0.5 * np.log(square + noise**2), noise, pieces_of(folds))
 
 
 def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData, NDArray[np.bool_]]:
@@ -241,7 +241,7 @@ def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData
     return means.select(first), kept[first]
 
 
-def _pieces(folds: Sequence[Fold]) -> NDArray[np.int64]:
+def pieces_of(folds: Sequence[Fold]) -> NDArray[np.int64]:
     """Power-ons, else runs, where there are three of them; else every stretch is a piece."""
     power_ons = np.array([fold.power_on for fold in folds], dtype=np.int64)
     runs = np.array([fold.run for fold in folds], dtype=np.int64)

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dataset import Dataset, Run
-from ...frontend import F32, Blocks, Guarded, blocks_since_power_on, channel_at, with_missing
+from ...frontend import blocks_since_power_on
 from ...metrics import Averages, average
 from ...terms import CATALOGUE, Cause, Scene
 from ...terms.recursion import Course, CourseChannel, TermOutcome
 from ...train import Fit, TrainingData, fit, predict
+from ...train.channels import channel_shown
 from ...train.data import joined
 from ...train.fitting import FrontEnd, samples_of
 from ...train.simple import without_rate
@@ -118,30 +119,10 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
         begins_s=blocks.begins_s,
         on_s=data.time_s - (run.power_on_s or 0.0),
         day=day,
-        channels={name: _shown(blocks, rows.channels[name]) for name in dataset.channels},
+        channels={name: channel_shown(blocks, rows.channels[name]) for name in dataset.channels},
         block_s=front.block_s,
         environment=run.environment,
     )
-
-
-_OPEN = Guarded(  # as of a channel without a guard: every reading passes
-    low=np.float32(-1e9),
-    high=np.float32(1e9),
-    max_step=np.float32(1e9),
-    max_rate=np.float32(0.0),
-    agree_us=0,
-    stuck_us=0,
-    missing_blocks=0,
-    takes_edge=True,
-)
-
-
-def _shown(blocks: Blocks, column: Array) -> CourseChannel:
-    """A channel as the target sees it; where it shows nothing it adds nothing."""
-    readings = with_missing(F32, F32.numbers(column), blocks.stream.position)
-    guard = replace(_OPEN, missing_blocks=blocks.settings.guard.missing_blocks)
-    shown = channel_at(F32, readings, guard, np.float32(np.nan), blocks.settings, blocks.steps)
-    return replace(shown, mean=shown.mean.astype(np.float64))
 
 
 def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:

@@ -1,0 +1,256 @@
+"""Recorded channels as inputs: what the target would see of each, which may be one, which earn their place.
+
+A table holds slope · (channel − reference) for up to four channels. Candidates are the recorded channels as they are,
+and of thermometers their differences: to the gyro's own, and between any two of them, for what one thermometer shows
+the map holds already. Of a difference the firmware passes the difference. `parts` chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebval
+from numpy.typing import NDArray
+
+from ..dataset import Dataset, Rows, Run
+from ..dataset.units import channel_unit, kind_of
+from ..frontend import F32, Blocks, Guarded, channel_at, with_missing
+from ..model import Model
+from ..results.training import ChannelTried
+from ..terms import CATALOGUE
+from ..terms.recursion import CourseChannel
+from .data import Scaling, TrainingData, scaling_of
+from .guards import channel_guard
+from .parts import Parts, PartsTrial, chosen_parts
+from .process import Process, TrainingFailed, conditioned, fit_process
+from .rules import start_sigma
+
+__all__ = ["ChannelChoice", "channel_shown", "chosen_channels", "seen_by_target", "with_channels"]
+
+Floats = NDArray[np.float64]
+
+_MOST = 4  # terms of a table: GTC_MAX_TERMS of gtc.h
+_MOST_MISSING = 0.1  # a channel that is away for longer has not been seen beside what it should explain
+_STILL = 1e-9  # change of a channel, of its size, that is rounding
+_OWN = 1e-3  # share of its spread: noise and steps of a sensor alone are more
+_DEGREE = 10  # in temperature: compensations in firmware have polynomials of a lower one
+_CARRIES = (
+    0.25  # correlation of fast changes with those of the rate; below it most of the noise is not in common
+)
+_SIGMAS = 6.0  # and it must be no luck: 1/sqrt(n) is one of these
+_ALIKE = 0.98  # correlation beside the map: weights of both would be a seventh as well known as that of one
+
+
+@dataclass(frozen=True)
+class ChannelChoice:
+    """What was chosen among the channels.
+
+    Attributes:
+        trial: What was tried on history left out.
+        references: Mean of each chosen channel in training, in its unit.
+        added: What the chosen ones add at every training sample, deg/h.
+        rows: Every candidate and every channel that is none.
+    """
+
+    trial: PartsTrial
+    references: Mapping[str, float]
+    added: Floats
+    rows: tuple[ChannelTried, ...]
+
+
+_OPEN = Guarded(  # as of a channel without a guard: every reading passes
+    low=np.float32(-1e9),
+    high=np.float32(1e9),
+    max_step=np.float32(1e9),
+    max_rate=np.float32(0.0),
+    agree_us=0,
+    stuck_us=0,
+    missing_blocks=0,
+    takes_edge=True,
+)
+
+
+def channel_shown(blocks: Blocks, column: Floats) -> CourseChannel:
+    """A channel as the target sees it at every correction; NaN where it shows nothing."""
+    readings = with_missing(F32, F32.numbers(column), blocks.stream.position)
+    guard = replace(_OPEN, missing_blocks=blocks.settings.guard.missing_blocks)
+    shown = channel_at(F32, readings, guard, np.float32(np.nan), blocks.settings, blocks.steps)
+    return replace(shown, mean=shown.mean.astype(np.float64))
+
+
+def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, Floats]:
+    """Recorded channels and differences of thermometers at the training samples of a run, in their units."""
+    at = blocks.in_force[blocks.used]
+    return {name: channel_shown(blocks, rows.channel(name)).mean[at] for name in _names(dataset)}
+
+
+def _names(dataset: Dataset) -> list[str]:
+    """Candidates by name: "a" or "a - b"."""
+    warm = [name for name in dataset.channels if _kind(dataset, name) == "temperature"]
+    pairs = [(a, "temperature_c") for a in warm] + list(combinations(warm, 2))
+    return [n for n in dataset.channels if n not in warm] + [f"{a} - {b}" for a, b in pairs]
+
+
+def _kind(dataset: Dataset, name: str) -> str | None:
+    unit = dataset.units.get(name) or channel_unit(name)
+    return kind_of(unit) if unit else None
+
+
+def chosen_channels(
+    dataset: Dataset,
+    samples: TrainingData,
+    columns: Mapping[str, Floats],
+    power_on: NDArray[np.int64],
+    average_s: float,
+) -> ChannelChoice | None:
+    """Chooses channels; None where there is none, or no map beside which to judge them.
+
+    Args:
+        dataset: The recordings.
+        samples: Training samples in order.
+        columns: Of every candidate at these samples, shape (n,) each.
+        power_on: Number of the power-on of each run.
+        average_s: Averaging of what is judged, s.
+    """
+    if not columns:
+        return None
+    scaling = scaling_of(samples)
+    try:
+        process = fit_process(samples, scaling)
+    except TrainingFailed:
+        return None
+    against = {n: _objection(dataset, n, v, samples, scaling) for n, v in columns.items()}
+    able = {n: v for n, v in columns.items() if not against[n]}
+    known = np.all([np.isfinite(v) for v in able.values()], axis=0) if able else np.ones(len(samples), bool)
+    references = {n: float(v[known].mean()) for n, v in able.items()}
+    inputs = {n: np.where(np.isfinite(v), v - references[n], 0.0)[:, None] for n, v in able.items()}
+    part = Parts({n: v[known] for n, v in inputs.items()}, {})
+    trial = chosen_parts(samples.select(known), scaling, part, power_on, average_s, _MOST)
+    parts = {n: inputs[n] @ trial.weights[n] for n in trial.chosen}
+    added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
+    alike = _alike(
+        trial, {n: v[known, 0] for n, v in inputs.items()}, samples.select(known), process, scaling
+    )
+    rows = [_row(n, trial, parts, samples, against[n], alike.get(n, "")) for n in columns]
+    return ChannelChoice(trial, {n: references[n] for n in trial.chosen}, added, tuple(rows))
+
+
+def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingData, scaling: Scaling) -> str:
+    """Why a channel must not be an input; empty if it may."""
+    if _kind(dataset, name) == "rate":
+        return "it is a rate: it would compensate the gyro with what it measures"
+    known = np.isfinite(values)
+    if np.mean(~known) > _MOST_MISSING:
+        return f"no reading in {np.mean(~known):.0%} of the training samples"
+    own = values[known]
+    if np.ptp(own) <= _STILL * (1.0 + float(np.abs(own).max())):
+        return "it does not change in the training runs"
+    common = _common_noise(values, samples)
+    if common > 0.0:
+        return f"it carries the rate: their fast changes are correlated by {common:.2f}"
+    left = _less_smooth(own, samples.select(known), scaling)
+    if float(np.std(left)) < _OWN * float(np.std(own)):
+        return "temperature and its rate say it to a thousandth: the map holds it, or it is a compensation's output"
+    return ""
+
+
+def _common_noise(values: Floats, samples: TrainingData) -> float:
+    """Correlation of second differences with those of the rate where it is more than luck; else 0."""
+    next_to = (np.diff(samples.run) == 0) & (
+        np.diff(samples.time_s) < 1.5 * float(np.median(samples.duration_s))
+    )
+    both = next_to[1:] & next_to[:-1] & np.isfinite(np.diff(values, 2))
+    x, y = np.diff(values, 2)[both], np.diff(samples.bias_dph, 2)[both]
+    if len(x) < 3 or not x.std() or not y.std():
+        return 0.0
+    found = abs(float(np.corrcoef(x, y)[0, 1]))
+    return found if found > max(_CARRIES, _SIGMAS / np.sqrt(len(x))) else 0.0
+
+
+def _less_smooth(values: Floats, samples: TrainingData, scaling: Scaling) -> Floats:
+    """What no polynomial of temperature and its rate holds of a channel, whatever the noise of the bias is."""
+    t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
+    columns = [chebval(t, np.eye(k + 1)[k]) * r**power for k in range(_DEGREE + 1) for power in range(3)]
+    design = np.stack(columns, axis=1)
+    return np.asarray(values - design @ np.linalg.lstsq(design, values, rcond=1e-9)[0])
+
+
+def _less_map(values: Floats, samples: TrainingData, process: Process, scaling: Scaling) -> Floats:
+    """What no map of temperature and its rate holds of a channel."""
+    t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
+    size = float(np.std(values)) / process.spread
+    mean = conditioned(process, t, r, values / size, samples.weight)
+    return np.asarray(values - size * mean(t, r))
+
+
+def _alike(
+    trial: PartsTrial,
+    inputs: Mapping[str, Floats],
+    samples: TrainingData,
+    process: Process,
+    scaling: Scaling,
+) -> dict[str, str]:
+    """Candidates that say what a chosen one says, and which."""
+    left = {n: _less_map(v, samples, process, scaling) for n, v in inputs.items()}
+    found = {}
+    for name in (n for n in left if n not in trial.chosen):
+        for chosen in trial.chosen:
+            same = abs(float(np.corrcoef(left[name], left[chosen])[0, 1]))
+            if same > _ALIKE:
+                found[name] = f"beside the map it says what {chosen} says (correlation {same:.3f})"
+    return found
+
+
+def _row(
+    name: str,
+    trial: PartsTrial,
+    parts: Mapping[str, Floats],
+    samples: TrainingData,
+    against: str,
+    alike: str,
+) -> ChannelTried:
+    if against:
+        return ChannelTried(name=name, verdict="refused", reason=against)
+    if name not in parts:
+        reason = alike or "it does not lessen what is left on history left out by more than a standard error"
+        return ChannelTried(name=name, verdict="collinear" if alike else "not earned", reason=reason)
+    place = trial.chosen.index(name)
+    before, after = trial.left_out_rms_dph[place : place + 2]
+    return ChannelTried(
+        name=name,
+        verdict="taken",
+        reason="it earns its place on history left out",
+        slope_dph_per_unit=float(trial.weights[name][0]),
+        left_out_rms_before_dph=before,
+        left_out_rms_after_dph=after,
+        share_of_variance=float(np.var(parts[name]) / np.var(samples.bias_dph)),
+    )
+
+
+def with_channels(
+    model: Model, choice: ChannelChoice, runs: Sequence[Run], samples: TrainingData, missing_s: float
+) -> Model:
+    """The model with a term, a guard and an uncertainty for every chosen channel.
+
+    `samples`: those that the map was trained on, without what the channels add.
+    """
+    cause = next(c for c in CATALOGUE.values() if c.needs.channel and c.table is not None)
+    assert cause.amplitudes is not None
+    terms: list[dict[str, Any]] = []
+    sigmas = []
+    content = model.to_dict()
+    rules = content["uncertainty_dph"]["rules"] if content["uncertainty_dph"] else {}
+    for name in choice.trial.chosen:
+        values = cause.amplitudes(choice.trial.weights[name]) | {"reference": choice.references[name]}
+        terms.append({"id": cause.id, "parameters": values, "channel": name})
+        readings = np.concatenate([run.rows().channel(name) for run in runs])
+        sigmas.append(start_sigma(cause.id, values, rules, samples, readings))
+    if rules:
+        rules["terms"] = sigmas
+    guards = {name: channel_guard(runs, name, missing_s) for name in sorted(choice.trial.chosen)}
+    effects = [min(0.0, float(choice.added.min())), max(0.0, float(choice.added.max()))]
+    return Model.from_dict({**content, "terms": terms, "guards": guards, "effects_dph": effects})

@@ -1,0 +1,270 @@
+"""Parts of a correction beside its map, each a group of columns, chosen by thermal history that was left out.
+
+The samples are y = map(T, dT/dt) + Σ columns β + noise. With the map as a Gaussian process of known parameters the
+weights are those of generalised least squares, β = (Uᵀ E U + Λ)⁻¹ Uᵀ E y, E v = v less the process conditioned on v
+(partial linear models; Speckman, J. Royal Statistical Society B 50, 1988). E is applied to every column once for each
+stretch that is left out; after that any set of parts costs a small linear system.
+
+Choice: forward, then the fewest parts that are not worse than the best number of them by more than one standard error
+of the paired difference over stretches, in score and in mean square, as rungs of the ladder are (`ladder`); and with
+these the correction must be better than without any by a t test at 5 % over independent pieces of history.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from .data import Scaling, TrainingData, average
+from .ladder import pieces_of
+from .noise import difference_sigma
+from .process import MEAN_S, Process, conditioned, fit_process
+from .spans import Fold, history_folds
+
+__all__ = ["Parts", "PartsTrial", "chosen_parts"]
+
+Floats = NDArray[np.float64]
+
+_LEVEL = 0.05  # of the test over pieces, as of the ladder: docs/training.md, section 2
+_ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Candidates: groups of columns at every sample, shape (n, k) each, and the ridge on the weights of each.
+
+    A column of a ridge 0 is free; else the prior variance of its weight is 1/ridge, in noise variances.
+    """
+
+    columns: Mapping[str, Floats]
+    ridge: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class PartsTrial:
+    """What was chosen.
+
+    Attributes:
+        chosen: Names in the order in which they were taken.
+        weights: Of the columns of each chosen part, deg/h per unit.
+        left_out_rms_dph: RMS over the stretches left out (all counting alike) with none, one, two, ... of them.
+        gain_dph2: For every part that was tried beside the chosen ones: by how much the mean square would fall.
+        stretches: Number of stretches.
+    """
+
+    chosen: tuple[str, ...]
+    weights: dict[str, Floats]
+    left_out_rms_dph: tuple[float, ...]
+    gain_dph2: dict[str, float]
+    stretches: int
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Of a stretch: normal equations of the rest, and what the process leaves of each column on the stretch."""
+
+    normal: Floats  # Uᵀ E U with y as its first column, shape (1 + k, 1 + k)
+    left: Floats  # shape (means, 1 + k)
+    weight: Floats
+
+
+def chosen_parts(
+    samples: TrainingData,
+    scaling: Scaling,
+    parts: Parts,
+    power_on: NDArray[np.int64] | None,
+    average_s: float,
+    most: int,
+) -> PartsTrial:
+    """Chooses parts one after the other.
+
+    Args:
+        samples: Samples as `cleaned` returns them.
+        scaling: Scaling of them.
+        parts: Candidates at these samples.
+        power_on: Number of the power-on of each run, by the run's index; None: each run is one.
+        average_s: Averaging of what is judged, s.
+        most: Largest number of parts.
+
+    Raises:
+        TrainingFailed: The process cannot be fitted.
+    """
+    course = _Course.of(samples, scaling, parts, power_on, average_s)
+    chosen: list[str] = []
+    weights: dict[str, Floats] = {}
+    for _ in range(_ROUNDS):
+        added = course.added(weights)
+        process = fit_process(replace(samples, bias_dph=samples.bias_dph - added), scaling)
+        folds = [course.fold(process, one) for one in course.folds]
+        chosen = course.choose(folds, most)
+        weights = course.weights(process, chosen)
+    path = [course.squares(folds, chosen[:k]) for k in range(len(chosen) + 1)]
+    last = path[-1].mean() if len(course.folds) else 0.0
+    gain = {
+        name: float(last - course.squares(folds, [*chosen, name]).mean())
+        for name in parts.columns
+        if name not in chosen and len(course.folds)
+    }
+    rms = tuple(float(np.sqrt(square.mean())) for square in path) if len(course.folds) else ()
+    return PartsTrial(tuple(chosen), weights, rms, gain, len(course.folds))
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Means of samples and columns, and the stretches."""
+
+    samples: TrainingData
+    means: TrainingData
+    scaling: Scaling
+    parts: Parts
+    names: tuple[str, ...]
+    table: Floats  # bias and all columns as means, shape (m, 1 + k)
+    where: Mapping[str, NDArray[np.int64]]  # columns of each part in `table`
+    folds: Sequence[Fold]
+    pieces: NDArray[np.int64]
+    average_s: float
+    noise_dph: float
+
+    @classmethod
+    def of(
+        cls,
+        samples: TrainingData,
+        scaling: Scaling,
+        parts: Parts,
+        power_on: NDArray[np.int64] | None,
+        average_s: float,
+    ) -> _Course:
+        means = average(samples, MEAN_S)
+        columns, where, at = [means.bias_dph], {}, 1
+        for name, values in parts.columns.items():
+            columns += [average(replace(samples, bias_dph=column), MEAN_S).bias_dph for column in values.T]
+            where[name] = np.arange(at, len(columns))
+            at = len(columns)
+        groups = means.run if power_on is None else power_on[means.run]
+        folds = history_folds(means, groups)
+        judged = average(means, average_s)
+        noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
+        table = np.stack(columns, axis=1)
+        names = tuple(parts.columns)
+        return cls(
+            samples, means, scaling, parts, names, table, where, folds, pieces_of(folds), average_s, noise
+        )
+
+    def added(self, weights: Mapping[str, Floats]) -> Floats:
+        """What parts add to every sample, deg/h, shape (n,)."""
+        total = np.zeros(len(self.samples))
+        for name, beta in weights.items():
+            total = total + self.parts.columns[name] @ beta
+        return total
+
+    def fold(self, process: Process, fold: Fold) -> _Fold:
+        """Normal equations without a stretch, and what is left on it."""
+        rest, held = ~fold.near, fold.held
+        inside, left = self._less_map(process, rest, held)
+        weight = self.means.weight[rest] / np.median(self.means.weight)
+        normal = (self.table[rest] * weight[:, None]).T @ inside
+        return _Fold(0.5 * (normal + normal.T), self._averaged(held, left), self._weight(held))
+
+    def _less_map(
+        self, process: Process, rest: NDArray[np.bool_], held: NDArray[np.bool_]
+    ) -> tuple[Floats, Floats]:
+        """All columns less the process that has seen them on `rest`, there and on `held`."""
+        t, r = self.scaling.normalise(self.means.temperature_c, self.means.slope_c_per_min)
+        low, high = (f([t[rest], r[rest]], axis=1) for f in (np.min, np.max))
+        at = np.clip(t[held], low[0], high[0]), np.clip(r[held], low[1], high[1])
+        inside, left = [], []
+        for column in self.table.T:
+            # The process has the spread of the bias: a column in other units is brought to it, and back.
+            size = float(np.std(column[rest])) / process.spread or 1.0
+            mean = conditioned(process, t[rest], r[rest], column[rest] / size, self.means.weight[rest])
+            inside.append(column[rest] - size * mean(t[rest], r[rest]))
+            left.append(column[held] - size * mean(*at))
+        return np.stack(inside, axis=1), np.stack(left, axis=1)
+
+    def _averaged(self, held: NDArray[np.bool_], columns: Floats) -> Floats:
+        of = self.means.select(held)
+        return np.stack(
+            [average(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1
+        )
+
+    def _weight(self, held: NDArray[np.bool_]) -> Floats:
+        return average(self.means.select(held), self.average_s).weight
+
+    def squares(self, folds: Sequence[_Fold], chosen: Sequence[str]) -> Floats:
+        """Mean square on every stretch with some parts, (deg/h)², shape (folds,)."""
+        return np.array(
+            [
+                np.average((fold.left @ self._mix(fold.normal, chosen)) ** 2, weights=fold.weight)
+                for fold in folds
+            ]
+        )
+
+    def _mix(self, normal: Floats, chosen: Sequence[str]) -> Floats:
+        """1 for the bias and −β for the columns, shape (1 + k,)."""
+        mix = np.zeros(len(normal))
+        mix[0] = 1.0
+        at = np.concatenate([self.where[name] for name in chosen]) if chosen else np.zeros(0, dtype=np.int64)
+        if at.size:
+            own = normal[np.ix_(at, at)] + np.diag(self._ridge(chosen))
+            size = np.sqrt(np.maximum(np.diag(own), np.finfo(np.float64).tiny))
+            solved = np.linalg.lstsq(own / np.outer(size, size), normal[at, 0] / size, rcond=1e-10)[0]
+            mix[at] = -solved / size
+        return mix
+
+    def _ridge(self, chosen: Sequence[str]) -> Floats:
+        return np.concatenate([np.full(len(self.where[n]), self.parts.ridge.get(n, 0.0)) for n in chosen])
+
+    def choose(self, folds: Sequence[_Fold], most: int) -> list[str]:
+        """Parts by forward selection; of the way so found the shortest that is not clearly worse than the best."""
+        taken: list[str] = []
+        if len(folds) < 2:
+            return taken
+        way = [self.squares(folds, taken)]
+        while len(taken) < min(most, len(self.names)):
+            tried = {n: self.squares(folds, [*taken, n]) for n in self.names if n not in taken}
+            taken.append(min(tried, key=lambda n: float(self._score(tried[n]).mean())))
+            way.append(tried[taken[-1]])
+        best = min(way, key=lambda square: float(self._score(square).mean()))
+        count = next(k for k, square in enumerate(way) if not self._clearly_worse(square, best))
+        return taken[:count] if self._surely_better(way[count], way[0]) else []
+
+    def _score(self, square: Floats) -> Floats:
+        return np.asarray(0.5 * np.log(square + self.noise_dph**2))
+
+    def _clearly_worse(self, square: Floats, best: Floats) -> bool:
+        """By more than a standard error of the paired difference over stretches, in score and in mean square."""
+        for lost in (self._score(square) - self._score(best), square - best):
+            if lost.mean() <= lost.std(ddof=1) / np.sqrt(len(lost)):
+                return False
+        return True
+
+    def _surely_better(self, beside: Floats, without: Floats) -> bool:
+        """Over pieces of history, or over all stretches where pieces differ by noise alone."""
+        used = self.pieces >= 0
+        gain = (self._score(without) - self._score(beside))[used]
+        _, index = np.unique(self.pieces[used], return_inverse=True)
+        tests = [np.bincount(index, gain) / np.bincount(index)]
+        if len(gain) and (beside[used] < 2.0 * self.noise_dph**2).all():
+            tests.append(gain)
+        return any(_surely_above_0(one) for one in tests)
+
+    def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, Floats]:
+        """Weights of the chosen parts from all means."""
+        everything = np.ones(len(self.means), dtype=bool)
+        inside, _ = self._less_map(process, everything, everything)
+        weight = self.means.weight / np.median(self.means.weight)
+        normal = (self.table * weight[:, None]).T @ inside
+        mix = self._mix(0.5 * (normal + normal.T), chosen)
+        return {name: -mix[self.where[name]] for name in chosen}
+
+
+def _surely_above_0(values: Floats) -> bool:
+    """Student's t at 5 %, one-sided."""
+    if len(values) < 2:
+        return False
+    error = float(values.std(ddof=1)) / float(np.sqrt(len(values)))
+    return bool(values.mean() > stdtrit(len(values) - 1, 1.0 - _LEVEL) * max(error, 1e-12))

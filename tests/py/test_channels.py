@@ -1,0 +1,212 @@
+"""Recorded channels as inputs: which are taken, which are refused and why, and what the target makes of them."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.dataset import Dataset, Rows, load
+from gyrotc.quantise.applied import applied_of
+from gyrotc.simulate import read_truth, simulate
+from gyrotc.train import TrainingData
+from gyrotc.train.channels import chosen_channels
+from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_RUNS, _BLOCKS = 6, 720  # two hours of 10 s each
+
+SHORT = """
+extends = "signals"
+[profile."up and down"]
+start_c = 10.0
+record_min = 150
+steps = [{hold_min = 20}, {ramp_to_c = 40.0, c_per_min = 2.0}, {hold_min = 20}, {ramp_to_c = 0.0, c_per_min = 2.0},
+  {hold_min = 30}, {ramp_to_c = 20.0, c_per_min = 2.0}, {hold_min = 30}]
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = ["up and down", "up and down", "up and down", "up and down"]
+[[set]]
+role = "exam"
+started = 2026-01-08T00:00:00Z
+profiles = ["up and down"]
+"""
+
+
+def wander(rng: np.random.Generator, tau: float = 150.0) -> Array:
+    """A Markov process of variance 1 over all runs, begun anew in each."""
+    runs = []
+    for _ in range(_RUNS):
+        x = [rng.normal()]
+        for push in rng.normal(0.0, np.sqrt(1.0 - np.exp(-2.0 / tau)), _BLOCKS - 1).tolist():
+            x.append(x[-1] * np.exp(-1.0 / tau) + push)
+        runs.append(np.array(x))
+    return np.concatenate(runs)
+
+
+def history(rng: np.random.Generator, noise: float = 1e-3) -> TrainingData:
+    """Six runs over a triangle of temperature; a bias that curves with T."""
+    time = 10.0 * np.arange(_BLOCKS)
+    t = np.concatenate([20.0 + 30.0 * np.sin(2 * np.pi * time / 7200.0 + k) for k in range(_RUNS)])
+    r = np.concatenate(
+        [30.0 * 60 * 2 * np.pi / 7200.0 * np.cos(2 * np.pi * time / 7200.0 + k) for k in range(_RUNS)]
+    )
+    n = len(t)
+    bias = 7e-3 + 1e-3 * np.tanh(t / 20.0) + rng.normal(0.0, noise, n)
+    run = np.repeat(np.arange(_RUNS), _BLOCKS)
+    return TrainingData(t, r, bias, np.ones(n), run, np.tile(time, _RUNS), np.full(n, 10.0))
+
+
+def named(*names: str) -> Dataset:
+    """A data set of which only the channels count."""
+    return Dataset(
+        folder=Path("none"),
+        serial="T",
+        axis=None,
+        description="",
+        earth_rate="",
+        noise=None,
+        applied_table=None,
+        meta={},
+        warnings=(),
+        runs=(),
+        channels=names,
+    )
+
+
+def verdicts(samples: TrainingData, columns: dict[str, Array]) -> dict[str, tuple[str, str]]:
+    choice = chosen_channels(named(*columns), samples, columns, np.arange(_RUNS), 100.0)
+    assert choice is not None
+    return {row.name: (row.verdict, row.reason) for row in choice.rows}
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    seed = secrets.randbelow(2**32)
+    print("seed", seed)
+    return np.random.default_rng(seed)
+
+
+def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.Generator) -> None:
+    samples = history(rng)
+    supply = 28.0 + 0.1 * wander(rng)
+    made = replace(samples, bias_dph=samples.bias_dph + 8e-3 * (supply - 28.0))
+    choice = chosen_channels(named("supply_v"), made, {"supply_v": supply}, np.arange(_RUNS), 100.0)
+    assert choice is not None
+    (row,) = choice.rows
+    assert row.verdict == "taken"
+    assert row.slope_dph_per_unit == pytest.approx(8e-3, rel=0.1)
+    assert row.left_out_rms_after_dph is not None
+    assert row.left_out_rms_before_dph is not None
+    assert row.left_out_rms_after_dph < 0.7 * row.left_out_rms_before_dph
+    assert choice.added == pytest.approx(row.slope_dph_per_unit * (supply - supply.mean()))
+
+
+def test_a_useless_channel_is_seldom_taken_and_does_no_harm() -> None:
+    """Twelve drifting channels that the bias does not follow: two at most are taken, each with a weight near 0."""
+    rng = np.random.default_rng(20260402)
+    samples = history(rng)
+    taken, harm = 0, []
+    for _ in range(3):
+        columns = {f"channel_{k}_v": wander(rng) for k in range(4)}
+        choice = chosen_channels(named(*columns), samples, columns, np.arange(_RUNS), 100.0)
+        assert choice is not None
+        taken += len(choice.trial.chosen)
+        harm.append(float(np.mean(choice.added**2)))
+    assert taken <= 2
+    assert max(harm) < 0.004 * (1e-3 / np.sqrt(10.0)) ** 2 * 5.0  # 0.2 % of the RMS of 100-s means, and luck
+
+
+def test_what_must_not_be_an_input_is_refused_with_the_reason(rng: np.random.Generator) -> None:
+    samples = history(rng)
+    gone = wander(rng)
+    gone[rng.random(len(gone)) < 0.3] = np.nan
+    found = verdicts(
+        samples,
+        {
+            "other_dph": wander(rng),
+            "pulses_hz": 5e5 + 3.0 * samples.bias_dph / 1e-3,
+            "correction": 1e-3 * samples.temperature_c + 7e-3,
+            "gone_v": gone,
+            "still_v": np.full(len(gone), 5.0),
+        },
+    )
+    assert {name for name, (verdict, _) in found.items() if verdict == "refused"} == set(found)
+    assert "rate" in found["other_dph"][1]
+    assert "fast changes" in found["pulses_hz"][1]
+    assert "temperature and its rate say it" in found["correction"][1]
+    assert "no reading in 3" in found["gone_v"][1]
+    assert "does not change" in found["still_v"][1]
+
+
+def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_told(rng: np.random.Generator) -> None:
+    samples = history(rng)
+    supply = wander(rng)
+    made = replace(samples, bias_dph=samples.bias_dph + 8e-4 * supply)
+    copy = 2.0 * supply + rng.normal(0.0, 0.01, len(supply))
+    found = verdicts(made, {"supply_v": supply, "copy_v": copy})
+    assert sorted(verdict for verdict, _ in found.values()) == ["collinear", "taken"]
+    assert any("says what" in reason for _, reason in found.values())
+
+
+def test_a_difference_of_columns_is_formed_by_its_name() -> None:
+    rows = Rows(
+        np.arange(3.0), np.full(3, 20.0), np.zeros(3), {"case_c": np.full(3, 25.0), "lid_c": np.full(3, 30.0)}
+    )
+    assert rows.channel("case_c - temperature_c").tolist() == [5.0] * 3
+    assert rows.channel("lid_c - case_c").tolist() == [5.0] * 3
+    assert rows.has_channel("lid_c - case_c")
+    assert not rows.has_channel("lid_c - mirror_c")
+    with pytest.raises(KeyError):
+        rows.channel("mirror_c")
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("channels")
+    (folder / "short.toml").write_text(SHORT, "utf-8")
+    simulate(folder / "short.toml", seed=5, out=folder / "data")
+    return folder / "data"
+
+
+@pytest.fixture(scope="module")
+def fitted(recordings: Path) -> Fitted:
+    return fit_dataset(load(recordings), FitOptions(channels=True))
+
+
+def test_a_model_with_channels_leaves_less_on_an_exam_through_the_target_s_own_arithmetic(
+    recordings: Path, fitted: Fitted, tmp_path: Path
+) -> None:
+    """Differences of thermometers reach the table by their names; the reference of the C code gives the correction."""
+    plain = fit_dataset(load(recordings), FitOptions())
+    assert plain.training.channels is None
+    assert fitted.training.channels is not None
+    taken = [row.name for row in fitted.training.channels if row.verdict == "taken"]
+    assert "intensity_v" in taken
+    assert any(" - " in name for name in taken)
+    assert sorted(t.channel or "" for t in fitted.model.terms) == sorted(taken)
+    assert set(fitted.model.guards) == set(taken)
+    run = next(r for r in load(recordings).runs if r.role == "exam")
+    truth = read_truth(recordings)
+    assert truth is not None
+    true = run.rows().rate_dph - truth.noise_dph(run.file)[1]
+    left = []
+    for name, model in (("with", fitted.model), ("without", plain.model)):
+        model.save(tmp_path / f"{name}.json")
+        rows = run.rows()
+        wrong = applied_of(tmp_path / f"{name}.json").correction_dph(rows, run.row_period_s) - true
+        left.append(float(np.sqrt(np.mean(wrong[60:] ** 2))))
+    assert left[0] < 0.6 * left[1]
+
+
+def test_without_the_option_recordings_with_channels_give_the_model_that_they_gave(
+    recordings: Path, fitted: Fitted
+) -> None:
+    model = fit_dataset(load(recordings), FitOptions()).model
+    assert not model.terms
+    assert not model.guards
+    assert fitted.training.channels
