@@ -139,7 +139,7 @@ def test_what_must_not_be_an_input_is_refused_with_the_reason(rng: np.random.Gen
     assert "rate" in found["other_dph"][1]
     assert "fast changes" in found["pulses_hz"][1]
     assert "temperature and its rate say it" in found["correction"][1]
-    assert "no reading in 3" in found["gone_v"][1]
+    assert "% of the training samples" in found["gone_v"][1]
     assert "does not change" in found["still_v"][1]
 
 

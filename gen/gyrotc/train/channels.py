@@ -128,14 +128,13 @@ def chosen_channels(
     known = np.all([np.isfinite(v) for v in able.values()], axis=0) if able else np.ones(len(samples), bool)
     references = {n: float(v[known].mean()) for n, v in able.items()}
     inputs = {n: np.where(np.isfinite(v), v - references[n], 0.0)[:, None] for n, v in able.items()}
-    part = Parts({n: v[known] for n, v in inputs.items()}, {})
-    trial = chosen_parts(samples.select(known), scaling, part, power_on, average_s, _MOST)
+    seen, of = {n: v[known] for n, v in inputs.items()}, samples.select(known)
+    alike = _alike(seen, of, process, scaling)
+    part = Parts(seen, rivals={n: frozenset(others) for n, others in alike.items()})
+    trial = chosen_parts(of, scaling, part, power_on, average_s, _MOST)
     parts = {n: inputs[n] @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
-    alike = _alike(
-        trial, {n: v[known, 0] for n, v in inputs.items()}, samples.select(known), process, scaling
-    )
-    rows = [_row(n, trial, parts, samples, against[n], alike.get(n, "")) for n in columns]
+    rows = [_row(n, trial, parts, samples, against[n], alike.get(n, {})) for n in columns]
     return ChannelChoice(trial, {n: references[n] for n in trial.chosen}, added, tuple(rows))
 
 
@@ -188,20 +187,15 @@ def _less_map(values: Floats, samples: TrainingData, process: Process, scaling: 
 
 
 def _alike(
-    trial: PartsTrial,
-    inputs: Mapping[str, Floats],
-    samples: TrainingData,
-    process: Process,
-    scaling: Scaling,
-) -> dict[str, str]:
-    """Candidates that say what a chosen one says, and which."""
-    left = {n: _less_map(v, samples, process, scaling) for n, v in inputs.items()}
-    found = {}
-    for name in (n for n in left if n not in trial.chosen):
-        for chosen in trial.chosen:
-            same = abs(float(np.corrcoef(left[name], left[chosen])[0, 1]))
-            if same > _ALIKE:
-                found[name] = f"beside the map it says what {chosen} says (correlation {same:.3f})"
+    inputs: Mapping[str, Floats], samples: TrainingData, process: Process, scaling: Scaling
+) -> dict[str, dict[str, float]]:
+    """For every candidate those that say beside the map what it says, and their correlation."""
+    left = {n: _less_map(v[:, 0], samples, process, scaling) for n, v in inputs.items()}
+    found: dict[str, dict[str, float]] = {name: {} for name in left}
+    for a, b in combinations(left, 2):
+        same = abs(float(np.corrcoef(left[a], left[b])[0, 1]))
+        if same > _ALIKE:
+            found[a][b] = found[b][a] = same
     return found
 
 
@@ -211,13 +205,16 @@ def _row(
     parts: Mapping[str, Floats],
     samples: TrainingData,
     against: str,
-    alike: str,
+    alike: Mapping[str, float],
 ) -> ChannelTried:
     if against:
         return ChannelTried(name=name, verdict="refused", reason=against)
     if name not in parts:
-        reason = alike or "it does not lessen what is left on history left out by more than a standard error"
-        return ChannelTried(name=name, verdict="collinear" if alike else "not earned", reason=reason)
+        for chosen in (n for n in trial.chosen if n in alike):
+            same = f"beside the map it says what {chosen} says (correlation {alike[chosen]:.3f})"
+            return ChannelTried(name=name, verdict="collinear", reason=same)
+        reason = "it does not lessen what is left on history left out by more than a standard error"
+        return ChannelTried(name=name, verdict="not earned", reason=reason)
     place = trial.chosen.index(name)
     before, after = trial.left_out_rms_dph[place : place + 2]
     return ChannelTried(

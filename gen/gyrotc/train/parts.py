@@ -13,7 +13,7 @@ these the correction must be better than without any by a t test at 5 % over ind
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +38,12 @@ class Parts:
     """Candidates: groups of columns at every sample, shape (n, k) each, and the ridge on the weights of each.
 
     A column of a ridge 0 is free; else the prior variance of its weight is 1/ridge, in noise variances.
+    `rivals` of a part are never taken beside it.
     """
 
     columns: Mapping[str, Floats]
-    ridge: Mapping[str, float]
+    ridge: Mapping[str, float] = field(default_factory=dict)
+    rivals: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -224,13 +226,20 @@ class _Course:
         if len(folds) < 2:
             return taken
         way = [self.squares(folds, taken)]
-        while len(taken) < min(most, len(self.names)):
-            tried = {n: self.squares(folds, [*taken, n]) for n in self.names if n not in taken}
+        while len(taken) < most:
+            tried = {n: self.squares(folds, [*taken, n]) for n in self._open(taken)}
+            if not tried:
+                break
             taken.append(min(tried, key=lambda n: float(self._score(tried[n]).mean())))
             way.append(tried[taken[-1]])
         best = min(way, key=lambda square: float(self._score(square).mean()))
         count = next(k for k, square in enumerate(way) if not self._clearly_worse(square, best))
         return taken[:count] if self._surely_better(way[count], way[0]) else []
+
+    def _open(self, taken: Sequence[str]) -> list[str]:
+        """Parts that may still be taken."""
+        closed = set(taken).union(*(self.parts.rivals.get(name, frozenset()) for name in taken))
+        return [name for name in self.names if name not in closed]
 
     def _score(self, square: Floats) -> Floats:
         return np.asarray(0.5 * np.log(square + self.noise_dph**2))
