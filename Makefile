@@ -133,9 +133,10 @@ lot: setup
 uncertainty: setup
 	@$(PYTHON) -m bench.budget docs
 
-## a thousand gyros through gyrotc fleet: docs/results.md
+## a thousand gyros through gyrotc fleet, a million calibrations in a catalogue: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
+	@$(PYTHON) -m bench.catalogue docs
 
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results.md
 kills: setup

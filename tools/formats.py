@@ -14,6 +14,7 @@ from gyrotc.emit.record import EmissionRecord
 from gyrotc.model import Model
 from gyrotc.results.base import Part
 from gyrotc.results.budget import Budget
+from gyrotc.results.catalogue import CatalogueAnswer
 from gyrotc.results.changes import Changes
 from gyrotc.results.check import Checked
 from gyrotc.results.comparison import Comparison
@@ -37,6 +38,7 @@ SCHEMAS = ROOT / "gen" / "gyrotc" / "results" / "schemas"
 
 RESULTS: dict[str, type[Part]] = {
     "budget": Budget,
+    "catalogue": CatalogueAnswer,
     "changes": Changes,
     "check": Checked,
     "compare": Comparison,

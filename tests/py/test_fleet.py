@@ -158,7 +158,7 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("done (done before)") >= 2
     assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
-        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html",
+        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html", "catalogue",
     }  # fmt: skip
 
 

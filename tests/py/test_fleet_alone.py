@@ -159,7 +159,7 @@ def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
     assert run_fleet(fleet, out)[0].status == "done"
-    assert told and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
+    assert told and {path.name for path in out.iterdir()} == {"RLG-1", "catalogue", MARKER, *SUMMARY}
 
 
 @pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
@@ -426,5 +426,5 @@ def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
         _agrees(out)
     assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert _agrees(out) == 3
-    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), MARKER, *SUMMARY}
+    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), "catalogue", MARKER, *SUMMARY}
     assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import CheckFailed
+from ..errors import CheckFailed, InputError
 from .base import JsonOption, OutOption, app, progress, tell, time_left, write_json
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ def fleet(
     full: Annotated[
         bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
     ] = False,
+    tag: Annotated[
+        str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")
+    ] = "",
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
@@ -42,13 +46,55 @@ def fleet(
     wanted = load_manifest(manifest)
     with progress() as say:
         told = _Told(len(wanted.units), say)
-        entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, told=told)
+        entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, tag=tag, told=told)
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     _tell_comparison(summary)
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
     if summary.failed:
         raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed")
+
+
+@app.command()
+def catalogue(
+    place: Annotated[Path, typer.Argument(help="The --out of fleet, or a catalogue.sqlite.")],
+    serial: Annotated[str | None, typer.Argument(help="Which table may this gyro carry?")] = None,
+    day: Annotated[str | None, typer.Option("--on", help="On this day, ISO 8601; default today.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
+
+    Exit status 1 where there is none.
+
+    Example: gyrotc catalogue fleet RLG-0042 --on 2026-09-01
+    """
+    from ..jobs.fleet import catalogued
+
+    asked = _day(day)
+    answer = catalogued(place, serial, asked)
+    write_json(json_file, answer.content())
+    for one in answer.found:
+        until = f" to {one.valid_until}" if one.valid_until else ""
+        spread = f", U {one.expanded_dph:.2g} deg/h" if one.expanded_dph is not None else ""
+        tell(
+            f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
+            f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
+        )
+        tell(f"  model {one.model_hash}")
+        tell(f"  image {one.image_sha256}")
+        for file in one.recordings if serial else ():
+            tell(f"  {file.role} {file.file} {file.sha256}")
+    if serial is None:
+        tell(f"{answer.calibrations} calibrations in all")
+    elif not answer.found:
+        raise CheckFailed(f"{serial} may carry no table of this catalogue on {asked}")
+
+
+def _day(text: str | None) -> str:
+    try:
+        return (date.fromisoformat(text) if text else date.today()).isoformat()
+    except ValueError as error:
+        raise InputError("--on", repr(text), "a day such as 2026-09-01") from error
 
 
 def _tell_comparison(summary: FleetSummary) -> None:

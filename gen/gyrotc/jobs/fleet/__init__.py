@@ -3,9 +3,10 @@
 Each serial is a job of its own: one that fails does not stop the others, one that is done is not done again.
 """
 
+from .catalogue import catalogued
 from .manifest import Fleet, Unit, load_manifest
 from .outliers import outliers
 from .page import summary_of
 from .run import run_fleet
 
-__all__ = ["Fleet", "Unit", "load_manifest", "outliers", "run_fleet", "summary_of"]
+__all__ = ["Fleet", "Unit", "catalogued", "load_manifest", "outliers", "run_fleet", "summary_of"]

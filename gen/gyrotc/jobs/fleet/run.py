@@ -11,6 +11,7 @@ from ...outputs import KINDS, Lock, deferred
 from ...outputs.places import check_apart, check_contents, final_place
 from ...results.fleet import FleetEntry
 from .aside import clean_units
+from .catalogue import enter
 from .fingerprint import program_of
 from .manifest import SUMMARY, Fleet
 from .page import write_summary
@@ -29,6 +30,7 @@ def run_fleet(
     jobs: int = 2,
     scheduler: str | None = None,
     full: bool = False,
+    tag: str = "",
     told: Told | None = None,
 ) -> list[FleetEntry]:
     """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
@@ -37,6 +39,7 @@ def run_fleet(
         out: A folder for each unit goes into it, and the files of the summary.
         jobs: Processes on this machine.
         scheduler: Address of a Dask scheduler to use instead; its workers see the same folders.
+        tag: Goes into the catalogue with what is new in it.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
         told: Called with each entry as it comes, those of earlier calls first.
 
@@ -51,7 +54,9 @@ def run_fleet(
     place.mkdir(parents=True, exist_ok=True)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        return _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
+        entries = _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
+        enter(place, entries, tag)
+        return entries
     finally:
         with deferred():
             try:

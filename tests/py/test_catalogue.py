@@ -1,0 +1,100 @@
+"""The catalogue of a fleet: which table a gyro may carry on a day, and from which data."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from pathlib import Path
+
+import pytest
+from conftest import ROOT, Command
+from gyrotc.errors import InputError
+from gyrotc.jobs.fleet import catalogued, load_manifest, run_fleet
+from gyrotc.jobs.fleet.catalogue import SCHEMA
+from gyrotc.outputs import sha256
+from recordings import columns, toml, write_csv
+
+DAYS = ("2026-03-01", "2026-09-01")
+
+
+def gyro(folder: Path, day: str, *, seed: int, rms_dph: float) -> None:
+    write_csv(folder / "d" / "RLG-1" / "run-01.csv", columns(720, seed=seed))
+    head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"'
+    text = toml('file = "run-01.csv"', head=head) + f"\n[meta]\ncalibrated_on = {day}\n"
+    (folder / "d" / "RLG-1" / "dataset.toml").write_text(text)
+    limits = f"schema = 1\n[at_most]\nrms_dph = {rms_dph}\n[interval]\ndays = 365\n"
+    (folder / "limits.toml").write_text(limits)
+    (folder / "fleet.toml").write_text('schema = 1\ndatasets = ["d/*"]\nlimits = "limits.toml"\n')
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One gyro, calibrated in March and again in September, when it failed."""
+    folder = tmp_path_factory.mktemp("lab")
+    for day, seed, rms_dph in ((DAYS[0], 1, 1e3), (DAYS[1], 2, 1e-9)):
+        gyro(folder, day, seed=seed, rms_dph=rms_dph)
+        run_fleet(load_manifest(folder / "fleet.toml"), folder / "out", jobs=1, tag=f"lot {seed}")
+    return folder / "out"
+
+
+def test_the_last_calibration_governs_and_one_that_failed_lets_none_fly(fleet: Path) -> None:
+    assert catalogued(fleet, "RLG-1", "2026-02-28").found == ()
+    [one] = catalogued(fleet, "RLG-1", "2026-08-31").found
+    assert (one.valid_from, one.valid_until, one.tag) == (DAYS[0], "2027-03-01", "lot 1")
+    assert one.verdict in ("PASS", "CONDITIONAL PASS")
+    assert [file.file for file in one.recordings] == ["run-01.csv"]
+    assert catalogued(fleet, "RLG-1", "2026-09-01").found == ()  # failed in September
+    assert catalogued(fleet, "RLG-2", "2026-08-31").found == ()
+    assert catalogued(fleet, None, None).calibrations == 2
+
+
+def test_payloads_stay_when_the_result_was_replaced(fleet: Path) -> None:
+    [one] = catalogued(fleet, "RLG-1", "2026-08-31").found
+    for known in (one.image_sha256, one.model_sha256):
+        payload = fleet / "catalogue" / "payloads" / known[:2] / known
+        assert sha256(payload) == known
+        assert payload.stat().st_mode & 0o222 == 0
+    assert sha256(fleet / "RLG-1" / "model.json") != one.model_sha256
+
+
+def test_what_is_done_before_is_entered_once(fleet: Path) -> None:
+    run_fleet(load_manifest(fleet.parent / "fleet.toml"), fleet, jobs=1)
+    assert catalogued(fleet, None, None).calibrations == 2
+
+
+def test_the_documented_sql_answers_the_same_and_its_tables_are_those_of_the_file(fleet: Path) -> None:
+    page = (ROOT / "docs" / "catalogue.md").read_text("utf-8")
+    query, tables = re.findall(r"```sql\n(.*?)```", page, re.DOTALL)
+    assert tables.strip() == SCHEMA.strip()
+    with sqlite3.connect(fleet / "catalogue" / "catalogue.sqlite") as base:
+        rows = base.execute(query, {"serial": "RLG-1", "day": "2026-08-31"}).fetchall()
+        assert base.execute(query, {"serial": "RLG-1", "day": "2026-09-01"}).fetchall() == []
+    [one] = catalogued(fleet, "RLG-1", "2026-08-31").found
+    assert [(row[0], row[1]) for row in rows] == [("", one.image_sha256)]
+    assert one.recordings[0].sha256 in rows[0][-1]
+
+
+def test_a_withdrawn_table_may_not_be_carried(fleet: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "catalogue.sqlite"
+    copy.write_bytes((fleet / "catalogue" / "catalogue.sqlite").read_bytes())
+    with sqlite3.connect(copy) as base:
+        base.execute("UPDATE calibration SET tag = 'withdrawn' WHERE status = 'done'")
+    assert catalogued(copy, "RLG-1", "2026-08-31").found == ()
+    with sqlite3.connect(copy) as base:  # the failed one withdrawn, the first one governs again
+        base.execute("UPDATE calibration SET tag = CASE status WHEN 'done' THEN '' ELSE 'withdrawn' END")
+    assert len(catalogued(copy, "RLG-1", "2026-09-02").found) == 1
+
+
+def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has no catalogue"):
+        catalogued(tmp_path, "RLG-1", "2026-01-01")
+    (tmp_path / "a.sqlite").write_text("not a data base, though long enough to be one" * 100)
+    with pytest.raises(InputError, match="is no catalogue"):
+        catalogued(tmp_path / "a.sqlite", "RLG-1", "2026-01-01")
+
+
+def test_the_command(fleet: Path, gyrotc: Command) -> None:
+    told = gyrotc("catalogue", fleet, "RLG-1", "--on", "2026-08-31")
+    assert told.returncode == 0 and "2026-03-01 to 2027-03-01" in told.stdout and "run-01.csv" in told.stdout
+    assert gyrotc("catalogue", fleet, "RLG-1", "--on", "2030-01-01").returncode == 1
+    assert gyrotc("catalogue", fleet, "RLG-1", "--on", "soon").returncode == 2
