@@ -7,6 +7,7 @@ tables for other programs.
 from __future__ import annotations
 
 import sqlite3
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -72,6 +73,8 @@ ORDER BY axis
 def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     """Adds what a fleet has made and the catalogue does not have yet; returns how many calibrations that are.
 
+    Gyros under one serial are not told apart by it, so none of them is entered.
+
     Args:
         out: The fleet's folder; each entry's result lies in the folder of its name.
         tag: Goes with each that is added.
@@ -79,7 +82,8 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     Raises:
         InputError: The file there is no catalogue, or is damaged.
     """
-    made = [entry for entry in entries if entry.key and entry.serial and entry.model_hash]
+    counts = Counter((entry.serial, entry.axis) for entry in entries)
+    made = [e for e in entries if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1]
     place = out / CATALOGUE
     if not made and not place.exists():
         return 0
