@@ -54,7 +54,7 @@ def open_hdf5(path: Path) -> LoggerFile:
         raise InputError(path.name, "no numeric vectors", "vectors, matrices or tables of numbers")
     facts = {str(k).lower(): _text(v) for k, v in file.attrs.items() if isinstance(v, str | bytes)}
     matlab = "MATLAB_class" in {k for d in file.values() for k in d.attrs}
-    return LoggerFile(path, "MATLAB 7.3 file" if matlab else "HDF5 file", tables, facts)
+    return LoggerFile(path, "MATLAB 7.3 file" if matlab else "HDF5 file", tables, facts, close=file.close)
 
 
 def _columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, int, Column, Part]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -114,17 +115,17 @@ def _imported(
     with result_folder(out, "import", inputs=files) as stage:
         folder = stage.folder
         for path in files:
-            file = open_logger_file(path, chosen)
-            plan = propose(file, chosen, ask)
-            rows = ImportedRows(path.name, plan, chosen.time)
-            for line in proposal(file, plan, rows):
-                tell(line)
-            chosen = kept_map(chosen, file, plan, rows)
-            if not serial:
-                serial = serial_of(options.serial, chosen, file, out)
-                stage.of(serial)
-            target = folder / f"{run_name(path, names)}.{options.format}"
-            entries.append(_run(file, rows, target, chosen, options, tell, progress))
+            with closing(open_logger_file(path, chosen)) as file:
+                plan = propose(file, chosen, ask)
+                rows = ImportedRows(path.name, plan, chosen.time)
+                for line in proposal(file, plan, rows):
+                    tell(line)
+                chosen = kept_map(chosen, file, plan, rows)
+                if not serial:
+                    serial = serial_of(options.serial, chosen, file, out)
+                    stage.of(serial)
+                target = folder / f"{run_name(path, names)}.{options.format}"
+                entries.append(_run(file, rows, target, chosen, options, tell, progress))
         chosen = chosen.model_copy(update={"serial": serial})
         (folder / MAP_FILE).write_text(map_text(chosen), "utf-8")
         (folder / FILE).write_text(description_of(serial, chosen, entries), "utf-8")

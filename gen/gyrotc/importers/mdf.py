@@ -28,7 +28,7 @@ def open_mdf(path: Path) -> LoggerFile:
         raise InputError(path.name, f"cannot be read as MDF ({what})", "a whole MDF file") from error
     if not tables:
         raise InputError(path.name, "no numeric channels", "a file with channels of numbers")
-    return LoggerFile(path, f"MDF {file.version}", tables, {"started": str(started)})
+    return LoggerFile(path, f"MDF {file.version}", tables, {"started": str(started)}, close=file.close)
 
 
 def _table(file: Any, index: int) -> LoggerTable | None:

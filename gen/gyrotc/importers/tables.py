@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -112,6 +112,7 @@ class LoggerFile:
         facts: Facts about the recording that the file states, such as a serial.
         csv: How a CSV file is read, as keys of `[csv]` of a map; empty for other formats.
         since_power_on: Whether its clock starts when the unit is switched on.
+        close: Ends the reading: after it no chunk comes.
     """
 
     path: Path
@@ -120,6 +121,7 @@ class LoggerFile:
     facts: dict[str, str] = field(default_factory=dict)
     csv: dict[str, Any] = field(default_factory=dict)
     since_power_on: bool = False
+    close: Callable[[], object] = lambda: None
 
 
 def library(path: Path, module: str, extra: str, what: str) -> ModuleType:

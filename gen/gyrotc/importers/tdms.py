@@ -24,18 +24,19 @@ def open_tdms(path: Path) -> LoggerFile:
         InputError: nptdms is not installed, or the file is damaged.
     """
     nptdms = library(path, "nptdms", "tdms", "a TDMS file")
+    stream = path.open("rb")  # nptdms leaves one that it opens itself open where the file is damaged
     try:
-        file = nptdms.TdmsFile.open(path)
+        file = nptdms.TdmsFile.open(stream)
         tables = tuple(table for group in file.groups() for table in _tables(group))
-    except InputError:
-        raise
     except Exception as error:  # whatever a damaged file makes of the parser
+        stream.close()
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
     if not tables:
+        stream.close()
         raise InputError(path.name, "no numeric channels", "a TDMS file with channels of numbers")
     facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
-    return LoggerFile(path, "TDMS file", tables, facts)
+    return LoggerFile(path, "TDMS file", tables, facts, close=stream.close)
 
 
 def _tables(group: Any) -> list[LoggerTable]:
