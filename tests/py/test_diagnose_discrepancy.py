@@ -9,10 +9,10 @@ import pytest
 from gyrotc.diagnose.discrepancy.declared_noise import _two_sided, noise_findings
 from gyrotc.diagnose.discrepancy.ensemble import _discrepancy, ensemble_of
 from gyrotc.diagnose.noise_colour.colours import Declared
+from gyrotc.diagnose.noise_words import NOISE_WORDS
 from gyrotc.diagnose.pipeline import needs_finer, search_of
 from gyrotc.diagnose.screen.blocks import Records
 from gyrotc.diagnose.signatures.candidates import columns_of
-from gyrotc.diagnose.words import NOISE_WORDS
 from numpy.typing import NDArray
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose.screen.events import Event, accepted, events_of
-from gyrotc.frontend.steps import steps_of
+from gyrotc.frontend.lasting_steps import steps_of
 from recordings import toml, write_csv
 
 SEED, ROW_S, HOURS = 20261122, 10.0, 8

@@ -121,3 +121,54 @@ def test_a_name_of_a_class_means_one_thing() -> None:
     twice = {name: where for name, where in found.items() if len(where) > 1 and name not in _SAME}
     assert twice == {}, "give one of them a name of its own"
     assert all(len(found[name]) > 1 for name in _SAME), "no longer there twice"
+
+
+def test_modules_import_in_no_circle() -> None:
+    """Whatever runs when a module is loaded or later in a function of it; what only types ask for does not count."""
+    graph = {_module(path): _modules_of(path) for path in PACKAGE.rglob("*.py")}
+    assert _circle(graph) == []
+    assert set(_circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}})) == {"a", "b", "c"}
+
+
+def _module(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _modules_of(path: Path) -> set[str]:
+    """Modules of the package that a module imports by their own names, `from .. import _core` without its package."""
+    inside = path.relative_to(PACKAGE.parent).parts[:-1]
+    found: set[str] = set()
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    typing = {
+        id(part)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+        for part in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom) or id(node) in typing:
+            continue
+        base = (
+            (*inside[: len(inside) - node.level + 1], *(node.module or "").split(".")) if node.level else ()
+        )
+        place = PACKAGE.parent.joinpath(*(part for part in base if part))
+        for name in (alias.name for alias in node.names):
+            inner = place / name
+            if inner.with_suffix(".py").is_file() or (inner / "__init__.py").is_file():
+                found.add(".".join(inner.relative_to(PACKAGE.parent).parts))
+            elif node.level and place != PACKAGE:
+                found.add(".".join(place.relative_to(PACKAGE.parent).parts))
+    return found - {_module(path)}
+
+
+def _circle(graph: dict[str, set[str]]) -> list[str]:
+    """Modules that a circle runs through or leads to: what is left when those that import nothing left go, again and
+    again, and those that nothing left imports."""
+    left = {name: set(others) & set(graph) for name, others in graph.items()}
+    while True:
+        wanted = set().union(*left.values()) if left else set()
+        kept = {name: others for name, others in left.items() if others & set(left) and name in wanted}
+        if kept.keys() == left.keys():
+            return sorted(left)
+        left = {name: others & set(kept) for name, others in kept.items()}

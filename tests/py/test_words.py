@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gyrotc.errors import CheckFailed
 from gyrotc.quantise import quantise
-from gyrotc.quantise.words import _limits, outside
+from gyrotc.quantise.legal import _limits, outside
 from gyrotc.reference.table import ARRAYS, Table
 from libc_build import ROOT, runtime
 from models import bank_with_channels, random_model, random_terms

@@ -19,12 +19,12 @@ from .detect.search import Search, open_search
 from .discrepancy.declared_noise import NoiseFinding, noise_findings
 from .discrepancy.ensemble import Ensemble, ensemble_of
 from .noise_colour.colours import Declared
+from .noise_words import NOISE_WORDS
 from .orthonormal import main_directions, orthonormal
 from .screen.blocks import Records
 from .screen.screens import Screened, cleaned, screen
 from .signatures.cache import bank_of
 from .signatures.candidates import Candidate, columns_of, diagnosed, searched
-from .words import NOISE_WORDS
 
 __all__ = ["Analysis", "analyse", "search_of"]
 

@@ -34,10 +34,10 @@ from .attribute.single_cycle import Cycle
 from .detect.detection_limits import CauseLimit
 from .discrepancy.declared_noise import NoiseFinding
 from .extend.extension import Extension
+from .noise_words import NOISE_WORDS
 from .pipeline import Analysis
 from .signatures.candidates import diagnosed
 from .verdict import verdict_of
-from .words import NOISE_WORDS
 
 __all__ = ["not_testable", "result_of"]
 

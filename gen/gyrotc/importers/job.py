@@ -21,8 +21,8 @@ from .propose import propose
 from .rows import ImportedRows
 from .runfile import Format, RunFile
 from .tables import LoggerFile
+from .told import preview, proposal, summary
 from .unitchoice import Ask
-from .words import preview, proposal, summary
 
 __all__ = ["ImportOptions", "Imported", "import_files"]
 

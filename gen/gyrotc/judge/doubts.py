@@ -11,7 +11,7 @@ import numpy as np
 from ..dataset import Dataset, Mark, Rows, Run, RunFacts, facts_of
 from ..frontend import departing_rows, samples_per_block
 from ..model import Model
-from ..train.outliers import exclude_text, stretches_left_out
+from ..train.left_out import exclude_text, stretches_left_out
 from .advice import advice_of
 from .findings import (
     contradiction_findings,

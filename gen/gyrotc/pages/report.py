@@ -20,7 +20,7 @@ from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
-from ..train.outliers import exclude_text
+from ..train.left_out import exclude_text
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 from .unit import UnitResults, unit_in
 from .words import (

@@ -18,8 +18,8 @@ from ..model import Model
 from ..reference.table import Numeric, Table
 from . import f32, q31
 from .authority import with_authority
+from .legal import outside
 from .probes import with_probes
-from .words import outside
 
 __all__ = ["NUMERICS", "Table", "quantise"]
 

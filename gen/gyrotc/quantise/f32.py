@@ -16,10 +16,10 @@ from ..errors import CheckFailed
 from ..model import Envelope, Model, Network
 from ..reference.table import Table, Words, f32_words
 from .authority import unbounded
-from .bank import Axis, handover_error_dph, regions
 from .common import STEEPEST, shared
 from .gradient import largest_gradient
 from .guards import guard_words
+from .handover import Axis, handover_error_dph, regions
 from .sigma import sigma_values
 from .terms import f32_terms
 

@@ -19,9 +19,9 @@ from ..model import Envelope, Model
 from ..reference.q31 import GAUSS_ERROR
 from ..reference.table import Table
 from .authority import unbounded
-from .bank import Axis, handover_error_dph, regions
 from .common import shared
 from .guards import guard_words
+from .handover import Axis, handover_error_dph, regions
 from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
 from .sigma import sigma_values
 from .solve import gram, solve

@@ -14,9 +14,9 @@ from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
 from .linear import fit_mlr, fit_poly
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .noise import floor_dph
 from .ols import SIZE_RULES, fit_ols
 from .process import TrainingFailed
+from .residual_noise import floor_dph
 from .result import Fit, Outcome, network, predict
 from .rungs import chosen_by_ladder
 from .simple import SIMPLE, fit_simple

@@ -37,8 +37,8 @@ from . import (
 from .channels import chosen_channels, seen_by_target, with_channels
 from .data import joined
 from .guards import AGREE_S, longest_same_s, stuck_after_s
+from .left_out import outliers_of, stretches_left_out
 from .noisefloor import noise_terms, sensitivities, stretches
-from .outliers import outliers_of, stretches_left_out
 from .rules import rezero_dph
 from .spans import Span, training_spans
 

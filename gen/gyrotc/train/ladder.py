@@ -34,8 +34,8 @@ from scipy.special import stdtrit
 
 from ..metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average
-from .noise import difference_sigma
 from .process import MEAN_S, Process, TrainingFailed, conditioned
+from .residual_noise import difference_sigma
 from .simple import SIMPLE, design, solve
 from .spans import Fold, history_folds
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..errors import InputError
 from .data import Scaling, TrainingData, average
-from .noise import floor_dph
+from .residual_noise import floor_dph
 from .result import Outcome, network
 
 __all__ = ["SIZE_RULES", "fit_ols"]

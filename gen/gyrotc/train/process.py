@@ -19,7 +19,7 @@ from .. import _core
 from ..errors import GyrotcError
 from ..metrics import MAD_TO_SIGMA
 from .data import Bins, Scaling, TrainingData, average, gather
-from .noise import difference_sigma
+from .residual_noise import difference_sigma
 
 __all__ = ["MEAN_S", "Process", "TrainingFailed", "conditioned", "fit_process"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .data import Scaling, TrainingData, average
-from .noise import floor_dph
+from .residual_noise import floor_dph
 from .result import Network, Outcome, network
 
 __all__ = ["SIMPLE", "design", "fit_simple", "solve", "without_rate"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...dataset import Dataset, Exclusion, Rows, Run, facts_of
 from ...frontend import departing_rows, samples_per_block
-from ...frontend.steps import Step, steps_of
+from ...frontend.lasting_steps import Step, steps_of
 from ...results.diagnosed import Estimate, EventSize, FoundEvent
 
 __all__ = ["Event", "accepted", "events_of"]
