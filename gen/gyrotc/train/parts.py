@@ -21,8 +21,8 @@ from scipy.special import stdtrit
 
 from .data import Scaling, TrainingData, average
 from .ladder import pieces_of
-from .noise import difference_sigma
 from .process import MEAN_S, Process, conditioned, fit_process
+from .residual_noise import difference_sigma
 from .spans import Fold, history_folds
 
 __all__ = ["Parts", "PartsTrial", "chosen_parts"]
