@@ -142,6 +142,10 @@ fleet: setup
 kills: setup
 	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## faults planted in the generator, and which check sees each: docs/results.md
+mutants: setup
+	@$(PYTHON) -m tests.mutants.run --docs docs
+
 ## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
 blind: setup
 	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
@@ -154,6 +158,10 @@ odd: setup
 cycles: setup
 	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/test_diagnose_cycle.py -k clean_cycles
 
+## archives to install from, without sources: sdist, wheel, bills of materials, checksums in dist/
+dist: setup
+	@$(PYTHON) tools/dist.py dist
+
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
 packages: setup
 	@$(PYTHON) tools/packages.py build/packages
@@ -162,4 +170,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills blind odd cycles packages clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills mutants blind odd cycles packages dist clean

@@ -36,6 +36,8 @@ NUMBERS = {"fallback", "authority", "effect", "rezero", "scale", "envelope"}
 ARRAYS = ("serial", "networks", "centers", "guards", "terms", "coverage", "sigma", "probes")
 TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
 CLAMPED, UNCOVERED = 2, 4
+MARGIN = 0.25  # of the range of corrections, granted at either end: the header says so
+LARGEST_BOUND = 0.01  # of the noise floor, beyond which a format is refused: docs/numerics.md, section 4
 TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
 
 Pair = tuple[float, float]
@@ -69,6 +71,7 @@ class Model:
         self.t_range = self.raw["envelope"]["temperature_c"]
         self.r_range = self.raw["envelope"]["slope_c_per_min"]
         self.shift = 0.0  # of --zero-at
+        self.known_biases: list[float] = []
 
     def id(self) -> str:
         serial, axis = self.raw["serial"], self.raw["axis"] or ""
@@ -85,6 +88,12 @@ class Model:
         total = math.fsum(share for share, _ in parts)
         sums = (share * self.of_network(n, t, r) for share, n in parts if share > 0.0)
         return math.fsum(sums) / total - self.shift
+
+    def biases(self) -> list[float]:
+        """At every one of `places`; computed once."""
+        if not self.known_biases:
+            self.known_biases = [self.bias(t, slope) for t, slope in places(self)]
+        return self.known_biases
 
     def share(self, n: dict[str, Any], t: float, r: float) -> float:
         """What a network of a bank counts for, before it is divided by the sum of all."""
@@ -364,12 +373,113 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
     bits = "".join(f"{word:032b}"[::-1] for word in image.array["coverage"])
     if bits[: len(cells)] != cells or "1" in bits[len(cells) :]:
         yield "the coverage bits are not the model's"
-    sigma = [s for row in (raw["uncertainty_dph"] or {"rows": []})["rows"] for s in row]
-    for got, want in zip(image.array["sigma"], sigma, strict=True):
-        if abs(image.to_dph(image.number(got)) - want) > max(
-            abs(want) * 2.0**-24, 0.51 / result_unit * (unit > 1)
-        ):
-            yield f"an uncertainty is {image.to_dph(image.number(got))}, the model says {want}"
+
+
+def sigma_of(model: Model) -> tuple[list[float], int]:
+    """What the uncertainty's words stand for, deg/h but for one that is a time in s, and the place of that one."""
+    known = model.raw["uncertainty_dph"]
+    if known is None or known.get("rules") is None:
+        return [], -1
+    r, per_block = known["rules"], model.per_block
+    covered = [s for row in known["rows"] for s in row]
+    uncovered = [s for row in known.get("uncovered") or known["rows"] for s in row]
+    grids = [math.sqrt(max(s * s - r["between_dph"] ** 2, 0.0)) for s in covered + uncovered]
+    rules = [
+        r["hold_dph_per_c"], r["rest_dph_per_min"] * per_block, r["slope_dph_per_c_per_min"] / per_block,
+        r["start_dph"], r["beyond_dph_per_c"], r["beyond_dph_per_c_per_min"] / per_block, r["fallback_dph"],
+        r["none_dph"], r["between_dph"], r["noise_deg_per_sqrt_h"] * 60.0, r["correlation_s"],
+    ]  # fmt: skip
+    return grids + rules + list(r["terms"]), len(grids) + len(rules) - 1
+
+
+def check_sigma(model: Model, image: Image) -> Iterator[str]:
+    """The uncertainty: two grids, rules, a number for each term."""
+    wanted, time_at = sigma_of(model)
+    if len(wanted) != image.one("n_sigma"):
+        yield f"n_sigma is {image.one('n_sigma')}, the model says {len(wanted)}"
+        return
+    for k, (word, want) in enumerate(zip(image.array["sigma"], wanted, strict=True)):
+        scale = 1.0 if image.numeric == "f32" or k == time_at else 2.0 ** image.one("bias_frac_bits")
+        scaled = want * scale if image.numeric == "f32" else min(want * scale, 2**31 - 1)
+        room = abs(want) * 2.0**-23 if image.numeric == "f32" else 0.5000001 + abs(scaled) * 2.0**-50
+        if abs(image.number(word) - scaled) > room:
+            yield f"word {k} of the uncertainty is {image.number(word)}, the model says {scaled}"
+
+
+def wider(low: float, high: float, least: float = 0.0) -> Pair:
+    """A range with the margin that the header names at either end."""
+    margin = max(MARGIN * (high - low), least)
+    return low - margin, high + margin
+
+
+def effect_of(model: Model) -> Pair:
+    """Smallest and largest that the terms may add, deg/h."""
+    if not model.raw["terms"]:
+        return 0.0, 0.0
+    if model.raw.get("effects_dph") is not None:
+        return wider(*model.raw["effects_dph"])
+    span, low, high = model.t_range[1] - model.t_range[0], 0.0, 0.0
+    for term in model.raw["terms"]:
+        kind, _, values = model.term(term)
+        if kind == 5:
+            guard = model.guard(term["channel"])
+            ends = [values[0] * (x - values[1]) for x in (guard["low"], guard["high"])]
+            low, high = low + min(0.0, *ends), high + max(0.0, *ends)
+        else:
+            scale = {1: span, 2: values[0], 3: 1.0, 4: 1.0}[kind]
+            size = abs(values[2 if kind == 4 else 1]) * scale
+            low, high = low - size, high + size
+    return wider(low, high)
+
+
+def check_authority(model: Model, image: Image, bound: float) -> Iterator[str]:
+    """The range of corrections: that of the model's map on a grid and at its centers, and of its terms."""
+    raw, effect = model.raw, effect_of(model)
+    biases = model.biases()
+    low, high = wider(min(biases), max(biases), raw["noise_floor_dph"] or 0.0)
+    fallback = raw["fallback_dph"] - model.shift
+    least = min(low + effect[0], fallback, 0.0) - raw["rezero_dph"]
+    most = max(high + effect[1], fallback, 0.0) + raw["rezero_dph"]
+    room = 0.02 * (max(biases) - min(biases)) + 2.0 * bound  # other points of the map are looked at
+    held = 1.5e7 if image.numeric == "f32" else image.to_dph(2**31 - 1)
+    for name, wanted, off in (("effect", effect, 0.0), ("authority", (least, most), room)):
+        for number, want in zip(image.member[name], wanted, strict=True):
+            got = image.to_dph(number)
+            within = max(min(want, held), -held)
+            if abs(got - within) > off + abs(within) * 2.0**-22 + image.to_dph(2) * (image.numeric == "q31"):
+                yield f"{name} is {got}, the model says {within}"
+
+
+def check_header(model: Model, image: Image, name: str, header: str) -> Iterator[str]:
+    """What a program reads from the emitted header before it runs."""
+    macros = dict(
+        re.findall(rf"^#define GTC_{name.upper()}_(\w+) (\S+|\"[^\"]*\")(?: /\*.*)?$", header, re.M)
+    )
+    block = round(model.raw["block_s"] * 1e6)
+    whole = {
+        "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
+        "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
+        "N_CHANNELS": 1 + len(model.channels()),
+        # 13 pointers; neither magic nor arithmetic and length
+        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 10),
+    }  # fmt: skip
+    if image.numeric == "q31":
+        whole["Q31_BIAS_FRAC_BITS"] = image.one("bias_frac_bits")
+    for key, want in whole.items():
+        if int(macros[key].rstrip("UL"), 0) != want:
+            yield f"the header's {key} is {macros[key]}, not {want}"
+    edges = {"T_MIN_C": model.t_range[0], "T_MAX_C": model.t_range[1],
+             "SLOPE_MIN_C_PER_MIN": model.r_range[0], "SLOPE_MAX_C_PER_MIN": model.r_range[1]}  # fmt: skip
+    for key, edge in edges.items():
+        if abs(float(macros[key].strip("()F")) - edge) > abs(edge) * 1e-6:
+            yield f"the header's {key} is {macros[key]}, the model says {edge}"
+    ends = [float(macros[f"AUTHORITY_{end}_DPH"].strip("()F")) for end in ("MIN", "MAX")]
+    low, high = (image.to_dph(number) for number in image.member["authority"])
+    if not (ends[0] <= low + abs(low) * 1e-6 and high - abs(high) * 1e-6 <= ends[1]):
+        yield f"the header's authority {ends} is narrower than the table's, {low} ... {high}"
+    for k, channel in enumerate(["temperature_c", *model.channels()]):
+        if macros[f"CHANNEL_{k}"] != f'"{channel}"':
+            yield f"the header's channel {k} is {macros[f'CHANNEL_{k}']}, the model says {channel}"
 
 
 def check_guards(model: Model, image: Image) -> Iterator[str]:
@@ -459,6 +569,14 @@ def check_map(model: Model, image: Image, bound: float) -> Iterator[str]:
         yield f"at T = {where[0]:.4f} C, slope = {where[1]:.6f} C per block the table departs by {worst:.3e} deg/h"
 
 
+def check_bound(model: Model, bound: float) -> Iterator[str]:
+    """A bound that a wrong table would keep, too, shows nothing: at most 1 % of the noise, else of the map's range."""
+    biases = model.biases()
+    against = model.raw["noise_floor_dph"] or max(biases) - min(biases)
+    if not bound <= LARGEST_BOUND * against:
+        yield f"the printed bound {bound:.2e} deg/h is more than 1 % of {against:.2e}: it proves nothing"
+
+
 def check_answer(model: Model, image: Image, words: list[int], bound: float) -> Iterator[str]:
     """One known answer: temperature, slope, bias, status."""
     t, slope = (image.number(w) / (1.0 if image.numeric == "f32" else 65536.0) for w in words[:2])
@@ -542,6 +660,10 @@ def check(folder: Path) -> list[str]:
             *check_members(model, image, name),
             *check_regions(model, image),
             *check_terms(model, image),
+            *check_sigma(model, image),
+            *check_authority(model, image, bound),
+            *check_header(model, image, name, header),
+            *check_bound(model, bound),
             *check_map(model, image, bound),
         ]
         for words in known_answers(c, name, image):
@@ -556,7 +678,7 @@ def main() -> int:
         return 2
     try:
         wrong = check(Path(sys.argv[1]))
-    except (OSError, Unreadable, ValueError, KeyError, TypeError, StopIteration) as error:
+    except (OSError, Unreadable, ArithmeticError, ValueError, KeyError, TypeError, StopIteration) as error:
         print(f"check_table: {type(error).__name__}: {error}", file=sys.stderr)
         return 2
     for text in wrong[:20]:

@@ -7,6 +7,7 @@ but the model can tell.
 from __future__ import annotations
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from emitted import GOLDEN, emitted, flip
+from emitted import GOLDEN, emitted, flip, spoil
 from gyrotc.emit import vectors
 from gyrotc.emit.files import Emission, emit, emit_texts, quantise_all, write_texts
 from gyrotc.model import Model, load_model
@@ -62,6 +63,57 @@ def test_tables_with_terms_and_banks_are_the_model(seed: int, tmp_path: Path, fe
 def _extended(seed: int) -> Model:
     """A bank of three networks with terms; seeds 2 and 3 have every kind among them."""
     return bank_of(random_model(seed, terms=random_terms(seed)))
+
+
+UNCERTAIN = ROOT / "examples" / "nav_loop" / "filter_model.json"
+
+
+@pytest.fixture(scope="module")
+def uncertain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table as training ships it: with uncertainties and their rules. Before, it could not be read."""
+    return emitted(tmp_path_factory.mktemp("uncertain"), load_model(UNCERTAIN))
+
+
+def test_a_table_with_uncertainties_is_the_model(uncertain: Path) -> None:
+    done = _check(uncertain)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+@pytest.mark.parametrize("word", [0, 45, 80, 81, 89, 90])
+def test_seeded_fault_in_the_uncertainty_is_seen(
+    word: int, numeric: str, tmp_path: Path, few_vectors: None
+) -> None:
+    """A cell of either grid, the first rules, noise and correlation time."""
+    model = load_model(UNCERTAIN)
+    table = quantise_all(model, [numeric]).tables[numeric]
+    words = _words(table, "sigma")
+    words[word] += 4
+    write_texts(
+        tmp_path, emit_texts(model, Emission({numeric: replace(table, sigma=words)}, {}), asked=True), model
+    )
+    model.save(tmp_path / "model.json")
+    done = _check(tmp_path)
+    assert done.returncode == 1 and f"word {word} of the uncertainty" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize(
+    "macro",
+    ["Q31_BIAS_FRAC_BITS", "BLOCK_US", "ID", "PERIOD_MAX_US", "T_MIN_C", "AUTHORITY_MIN_DPH", "N_CHANNELS"],
+)
+def test_a_wrong_macro_of_the_header_is_seen(macro: str, uncertain: Path, tmp_path: Path) -> None:
+    shutil.copytree(uncertain, tmp_path / "spoilt")
+    header = tmp_path / "spoilt" / "c" / "gtc_sim_0003.h"
+    spoil(header, rf"(GTC_SIM_0003_{macro} \(?-?(?:0x)?)[0-9a-f]", r"\g<1>7")
+    done = _check(tmp_path / "spoilt")
+    assert done.returncode == 1 and ("header" in done.stdout), done.stdout
+
+
+def test_a_bound_that_proves_nothing_is_seen(uncertain: Path, tmp_path: Path) -> None:
+    shutil.copytree(uncertain, tmp_path / "spoilt")
+    spoil(tmp_path / "spoilt" / "c" / "gtc_sim_0003.h", r"\|error\| <= \S+", "|error| <= 1.00e-03")
+    done = _check(tmp_path / "spoilt")
+    assert done.returncode == 1 and "it proves nothing" in done.stdout
 
 
 def test_a_table_shifted_by_zero_at_is_the_model(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Faults that are planted in the generator, and who sees them."""

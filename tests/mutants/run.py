@@ -1,0 +1,145 @@
+"""Faults planted in the generator, one at a time, and who sees them: `make mutants`.
+
+Each fault of `faults.toml` is a line of `gen/gyrotc/` that reads otherwise. The changed generator emits a model; the
+independent check (`tools/check_table.py`) looks at the result, then `gyrotc verify` of the changed generator itself.
+A fault that nobody sees is a hole in the proof: exit status 1. Unchanged, nobody may object to any of the models.
+"""
+
+from __future__ import annotations
+
+import argparse
+import compileall
+import json
+import os
+import py_compile
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+from .page import write_page
+
+__all__ = ["MODELS", "Fault", "House", "faults", "main", "tried"]
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+#: Models that together have all that a table can hold.
+MODELS = {
+    "plain": "examples/minimal/model.json",
+    "uncertain": "examples/nav_loop/filter_model.json",
+    "bank": "tests/c/model_bank.json",
+    "terms": "tests/c/model_terms.json",
+    "waves": "tests/c/model_narrow.json",
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A line of the generator that reads otherwise."""
+
+    name: str
+    file: str  # below gen/gyrotc
+    old: str
+    new: str
+    model: str  # key of MODELS
+
+
+def faults() -> list[Fault]:
+    """All of faults.toml, in order."""
+    with (HERE / "faults.toml").open("rb") as file:
+        return [Fault(**entry) for entry in tomllib.load(file)["fault"]]
+
+
+class House:
+    """A copy of the generator and the runtime in which one file at a time is spoilt."""
+
+    def __init__(self, folder: Path) -> None:
+        self.package = folder / "gen" / "gyrotc"
+        for name in ("include", "libc"):
+            shutil.copytree(ROOT / name, folder / name)
+        shutil.copytree(ROOT / "gen" / "gyrotc", self.package, ignore=shutil.ignore_patterns("__pycache__"))
+        # By its content: a file that is changed and put back within a second is read anew.
+        compileall.compile_dir(
+            self.package, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH
+        )
+
+    def objection(self, model: str, fault: Fault | None = None) -> dict[str, Any]:
+        """Who objects to what the generator, with the fault, makes of a model."""
+        path = self.package / (fault.file if fault else "__init__.py")
+        text = path.read_text("utf-8")
+        if fault is not None:
+            if text.count(fault.old) != 1:
+                raise ValueError(
+                    f"{fault.name}: {fault.file} has its text {text.count(fault.old)} times, not once"
+                )
+            path.write_text(text.replace(fault.old, fault.new), "utf-8")
+        try:
+            with tempfile.TemporaryDirectory() as out:
+                return self._driven(ROOT / MODELS[model], Path(out) / "result")
+        finally:
+            path.write_text(text, "utf-8")
+
+    def _driven(self, model: Path, out: Path) -> dict[str, Any]:
+        environment = os.environ | {"PYTHONPATH": str(self.package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(
+            [sys.executable, HERE / "drive.py", model, out, ROOT / "tools" / "check_table.py"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=self.package.parent,
+            timeout=600,
+        )
+        if done.returncode != 0:
+            return {"seen_by": "generator", "told": done.stderr.strip().splitlines()[-1]}
+        found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        return found
+
+
+def tried(names: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
+    """Every fault (or those named) with who saw it, in order; first the generator as it is.
+
+    Raises:
+        ValueError: A fault's text is not there, or somebody objects to the generator as it is.
+    """
+    chosen = [fault for fault in faults() if not names or fault.name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        house = House(Path(folder))
+        for model in dict.fromkeys(fault.model for fault in chosen):
+            found = house.objection(model)
+            if found["seen_by"] is not None:
+                raise ValueError(
+                    f"{found['seen_by']} objects to the sound generator's {model}: {found['told']}"
+                )
+        for fault in chosen:
+            yield asdict(fault) | house.objection(fault.model, fault)
+
+
+def main() -> int:
+    """Tries all faults, or those that are named, and writes the page if told where."""
+    parser = argparse.ArgumentParser(prog="tests.mutants.run", description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--docs", type=Path, help="folder whose results.md gets the table")
+    arguments = parser.parse_args()
+    results = []
+    for result in tried(arguments.names):
+        results.append(result)
+        print(f"{result['seen_by'] or 'NOBODY':<12} {result['name']}: {result['told'][:100]}", flush=True)
+    unseen = [result["name"] for result in results if result["seen_by"] is None]
+    if arguments.docs and not arguments.names:
+        write_page(arguments.docs, {"mutants": results})
+    print(f"{len(results)} faults, {len(unseen)} that nobody sees{': ' if unseen else ''}{', '.join(unseen)}")
+    return 1 if unseen else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
