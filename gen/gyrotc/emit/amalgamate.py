@@ -17,7 +17,9 @@ _HEADERS = ("gtc_config.h", "gtc_table.h", "gtc.h")
 ARITHMETICS = ("f32", "q31")
 _INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
 _DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
+# REUSE-IgnoreStart
 _LICENCE = " * SPDX-License-Identifier: MIT"
+# REUSE-IgnoreEnd
 
 
 @functools.cache
