@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+import architecture  # noqa: E402
+
+PACKAGE = architecture.PACKAGE
 
 # From left to right. A stage is a module or a package of gyrotc.
 ORDER = [
@@ -42,45 +48,33 @@ ORDER = [
 ]
 
 
-def _stage(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-
-
-def _imported(path: Path) -> set[str]:
-    """Stages that a module imports, relative or absolute, at any depth of its functions."""
-    found: set[str] = set()
-    depth = len(path.relative_to(PACKAGE).parts)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            if node.level == depth:
-                names = [module.split(".")[0]] if module else [alias.name for alias in node.names]
-            elif node.level == 0 and module.split(".")[0] == "gyrotc":
-                names = module.split(".")[1:2] or [alias.name for alias in node.names]
-            else:
-                names = []
-            found.update(names)
-        elif isinstance(node, ast.Import):
-            found.update(a.name.split(".")[1] for a in node.names if a.name.startswith("gyrotc."))
-    return {name for name in found if not name.startswith("__")}
-
-
-MODULES = sorted(p for p in PACKAGE.rglob("*.py") if p.name != "__init__.py" or p.parent != PACKAGE)
+MODULES = architecture.modules()
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports_point_left(path: Path) -> None:
-    stage = _stage(path)
+    stage = architecture.stage(path)
     assert stage in ORDER, f"{stage} has no place in the house; give it one in ORDER"
-    for other in _imported(path) - {stage}:
+    for other in architecture.imported(path) - {stage}:
         assert other in ORDER, f"{path.name} imports {other}, which has no place in ORDER"
         assert ORDER.index(other) < ORDER.index(stage), f"{stage} must not import {other}"
 
 
 def test_the_reader_of_imports_sees_a_wrong_one(tmp_path: Path) -> None:
     """The check itself can fail: cli is seen as an import of any module that names it."""
-    assert "model" in _imported(PACKAGE / "emit" / "files.py")
-    assert "errors" in _imported(PACKAGE / "model.py")
+    assert "model" in architecture.imported(PACKAGE / "emit" / "files.py")
+    assert "errors" in architecture.imported(PACKAGE / "model.py")
+
+
+def test_the_page_shows_the_imports_that_there_are() -> None:
+    """Red: run `python tools/architecture.py`."""
+    assert architecture.PAGE.read_text(encoding="utf-8") == architecture.page(architecture.rooms())
+
+
+def test_an_arrow_is_left_out_only_where_a_longer_way_says_it() -> None:
+    text = architecture.page({"a": set(), "b": {"a"}, "c": {"a", "b"}})
+    assert [line for line in text.splitlines() if "-->" in line] == ["  a --> b", "  b --> c"]
+    assert "| `c` | `a`, `b` |" in text
 
 
 def _exists(module: str) -> bool:
