@@ -158,9 +158,9 @@ odd: setup
 cycles: setup
 	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/test_diagnose_cycle.py -k clean_cycles
 
-## archives to install from, without sources: sdist, wheel, bills of materials, checksums in dist/
+## archives to install from, without sources: sdist, wheel, bills of materials, checksums in build/dist
 dist: setup
-	@$(PYTHON) tools/dist.py dist
+	@$(PYTHON) tools/archives.py build/dist
 
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
 packages: setup

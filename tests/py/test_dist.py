@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-import dist  # noqa: E402
+import archives  # noqa: E402
 import version  # noqa: E402
 
 TOP = f"gyrotc-{version.header_version(ROOT)}"
@@ -27,7 +27,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The sdist, made at a fixed time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        return dist.sdist(tmp_path_factory.mktemp("dist"))
+        return archives.sdist(tmp_path_factory.mktemp("dist"))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def unpacked(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_made_twice_it_is_the_same(archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    assert dist.sdist(tmp_path).read_bytes() == archive.read_bytes()
+    assert archives.sdist(tmp_path).read_bytes() == archive.read_bytes()
     with tarfile.open(archive) as opened:
         assert {(e.mtime, e.uid, e.uname, e.mode) for e in opened} == {(1700000000, 0, "", 0o644)}
     assert gzip.decompress(archive.read_bytes()) and archive.read_bytes()[4:8] == b"\0\0\0\0"
@@ -84,7 +84,7 @@ def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp
 
 
 def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
-    generator, c = (json.loads(path.read_text("utf-8")) for path in dist.sboms(tmp_path))
+    generator, c = (json.loads(path.read_text("utf-8")) for path in archives.sboms(tmp_path))
     for bom in (generator, c):
         assert (bom["bomFormat"], bom["specVersion"]) == ("CycloneDX", "1.5")
         assert bom["metadata"]["component"]["version"] == version.header_version(ROOT)

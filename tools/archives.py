@@ -210,7 +210,7 @@ def sboms(out: Path) -> list[Path]:
 
 def main() -> int:
     """Makes all archives."""
-    parser = argparse.ArgumentParser(prog="tools/dist.py", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="tools/archives.py", description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--sdist", action="store_true", help="no wheel")
     arguments = parser.parse_args()
