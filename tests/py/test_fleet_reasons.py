@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from gyrotc.jobs.fleet.facts import facts_of, step_in
+from gyrotc.jobs.fleet.page import summary_of
 from gyrotc.jobs.fleet.reasons import reasons
 from gyrotc.metrics import Averages
 from gyrotc.results.fleet import Copy, FleetEntry, Reason
@@ -81,6 +82,22 @@ def test_words_with_run_and_time() -> None:
     assert "shows what" in told["axes_exchanged"].text
     assert "copy of another unit" in told["copy_of_other"].text
     assert told["copy_of_other"].text.endswith(told["copy_of_other"].name[-2:]), "the other's same axis"
+
+
+def test_exchanged_axes_stand_apart_in_what_the_fleet_says() -> None:
+    """Two columns of one unit changed places: both axes are named with what they show, and both have the finding."""
+    lot = Lot(6, 12)
+    lot.plant("axes_exchanged", lot.units[4])
+    figured = [e.model_copy(update={"serial": e.dataset, "model_hash": "0"}) for e in entries(lot)]
+    summary = summary_of(figured)
+    (wrong,) = lot.planted.values()
+    assert {reason.name: reason.id for reason in summary.apart} == dict.fromkeys(wrong, "axes_exchanged")
+    for unit in summary.serials:
+        assert ("axes_exchanged" in unit.findings) == (unit.name in wrong)
+        assert (unit.apart is None) == (unit.name not in wrong)
+    one, other = sorted(name[-1] for name in wrong)
+    told = next(reason.text for reason in summary.apart if reason.name.endswith(f"-{one}"))
+    assert told == f"axes exchanged: {one} shows what {other} axes show, and {other} what {one} axes show"
 
 
 def test_a_handful_of_gyros_accuses_nobody() -> None:

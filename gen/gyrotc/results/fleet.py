@@ -52,7 +52,8 @@ class FleetUnit(Part):
     error_bound_dph: Figure = Field(default=None, description="of the tables for any input, deg/h")
     findings: tuple[str, ...] = Field(
         default=(),
-        description="ids of findings; `copy_of_other` and `sign_reversed` come from the comparison with the fleet",
+        description="ids of findings; `copy_of_other`, `axes_exchanged` and `sign_reversed` are also those of the "
+        "comparison with the fleet",
     )
     model_hash: str | None = Field(default=None, description="hash of the model")
     verdict: Verdict | None = Field(default=None, description="the worst of all limits; null without limits")

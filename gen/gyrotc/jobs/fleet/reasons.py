@@ -31,6 +31,7 @@ _LEAST_NOISY_RUN = 3.0  # times the noise of the other runs of the gyro
 _LEAST_STEP = 1.6  # times the usual score
 _FAR_LOG = 4.0  # for logarithms of scores and factors, beside a least ratio
 _LEAST_SPIKES = 5  # rows
+_MISMOUNTED = frozenset({"sign_reversed", "axes_exchanged"})
 _PER_H = 3600.0  # s in an hour
 
 
@@ -98,13 +99,13 @@ def _reason(
 
 
 def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:
-    """The entries with their reasons' words; where the sign is reversed, with the finding too."""
+    """The entries with their reasons' words; what is mounting or wiring is a finding too."""
     told = {reason.name: reason for reason in named}
     return [_with_reason(entry, told[entry.name]) if entry.name in told else entry for entry in entries]
 
 
 def _with_reason(entry: FleetEntry, reason: Reason) -> FleetEntry:
-    more = {"sign_reversed"} & {reason.id} - set(entry.findings)
+    more = _MISMOUNTED & {reason.id} - set(entry.findings)
     return entry.model_copy(update={"apart": reason.text, "findings": (*entry.findings, *more)})
 
 
