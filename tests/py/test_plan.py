@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -128,3 +129,50 @@ def test_options_are_read() -> None:
     assert pair_of("hysteresis, ageing") == ("hysteresis", "ageing") and pair_of(None) is None
     with pytest.raises(InputError):
         pair_of("ageing,ageing")
+
+
+ROOMY = """
+title = "A far node, a near one, and one with a thermometer"
+[gyro.node.case]
+heat_capacity_j_per_k = 1500.0
+power_w = 14.0
+to_air_w_per_k = 2.5
+to = {block = 1.0}
+[gyro.node.block]
+heat_capacity_j_per_k = 800.0
+to = {cavity = 3.0}
+[gyro.node.cavity]
+heat_capacity_j_per_k = 5.0
+[gyro.node.mount]
+heat_capacity_j_per_k = 400.0
+power_w = 1.0
+to_air_w_per_k = 0.3
+to = {block = 0.2}
+[profile.cycle]
+start_c = 20.0
+record_min = 240
+steps = [{hold_min = 30}, {ramp_to_c = 50.0, c_per_min = 3.0}, {hold_min = 40}, {ramp_to_c = 0.0, c_per_min = 1.5},
+  {hold_min = 40}, {ramp_to_c = 30.0, c_per_min = 5.0}, {hold_min = 90}]
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = ["cycle", "cycle"]
+"""
+
+
+def test_a_further_thermometer_is_proposed_where_the_others_say_least(tmp_path: Path) -> None:
+    path = tmp_path / "roomy.toml"
+    path.write_text(ROOMY, "utf-8")
+    found = plan(path, add_thermometer=True).thermometers
+    assert found is not None
+    # slow and far, far, tight to the sensor
+    assert [place.node for place in found] == ["mount", "case", "cavity"]
+    limits = [place.limit_dph_per_c or math.inf for place in found]
+    assert limits == sorted(limits)
+    assert limits[0] < 0.1 * limits[-1]
+    path.write_text(ROOMY + '[[thermometer]]\nname = "mount_c"\nnode = "mount"\n', "utf-8")
+    beside = plan(path, add_thermometer=True).thermometers
+    assert beside is not None
+    assert (beside[-1].node, beside[-1].there) == ("mount", True)
+    before = {place.node: place.unseen_c for place in found}
+    assert all(place.unseen_c <= before[place.node] * (1.0 + 1e-9) for place in beside)
+    assert "thermometers" not in plan(path).content()

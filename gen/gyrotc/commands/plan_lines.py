@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..errors import InputError
-from ..results.planned import Additions, DetectionLimit, Plan, Shortest
+from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
 from ..terms import CATALOGUE
 
 __all__ = ["limits_of", "pair_of", "plan_parts"]
@@ -69,6 +69,22 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
         yield from _shortest(result.shortest)
     if result.additions:
         yield from _additions(result.additions)
+    if result.thermometers:
+        yield _places(result.thermometers)
+
+
+def _places(found: Sequence[ThermometerPlace]) -> Table:
+    title = "Where a further thermometer would tell most"
+    table = _table(title, "node", "apart, C", "not seen so far, C", "shows from, deg/h/C")
+    for place in found:
+        limit = "never" if place.limit_dph_per_c is None else f"{place.limit_dph_per_c:.2g}"
+        name = f"{place.node} (there is one)" if place.there else place.node
+        table.add_row(name, f"{place.apart_c:.3g}", f"{place.unseen_c:.2g}", limit)
+    table.caption = (
+        "apart: RMS difference to the gyro's own thermometer; not seen: by map and those that are there"
+    )
+    table.caption_justify = "left"
+    return table
 
 
 def _table(title: str, *columns: str) -> Table:

@@ -33,6 +33,9 @@ def plan(
             "--separate", help="Two causes, e.g. hysteresis,turn_on_offset: which further run parts them."
         ),
     ] = None,
+    add_thermometer: Annotated[
+        bool, typer.Option("--add-thermometer", help="Where a further thermometer would tell most.")
+    ] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -50,6 +53,7 @@ def plan(
             seed=seed,
             required=limits_of(require or ()),
             pair=pair_of(separate),
+            add_thermometer=add_thermometer,
             progress=say,
         )
         if stage:

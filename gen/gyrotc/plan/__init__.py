@@ -7,6 +7,7 @@ make on them: detection limits, separability, how well the map will be known aft
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from ..results.planned import (
     Separability,
     Shortest,
     Temperature,
+    ThermometerPlace,
     TriedRun,
 )
 from ..simulate.campaign import Noise
@@ -35,6 +37,7 @@ from .programme import Programme, programme_of
 from .sensitivity import Sensitivity
 from .separate import Row, additions, separability
 from .shortest import shortest
+from .thermometers import places
 
 __all__ = ["plan"]
 
@@ -50,6 +53,7 @@ def plan(  # long: one line for each field of the result
     seed: int = 1,
     required: Mapping[str, float] | None = None,
     pair: tuple[str, str] | None = None,
+    add_thermometer: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """What `plan.json` holds.
@@ -60,6 +64,7 @@ def plan(  # long: one line for each field of the result
         seed: Draws the simulated gyro, on whose bias the limits of `cavity_lag` and `time_misalignment` depend.
         required: Detection limits to reach, by cause, for the shortest profile.
         pair: Two causes; further runs are ranked by how they part them.
+        add_thermometer: Say where a further thermometer would tell most.
         progress: Called with what is being done.
 
     Raises:
@@ -73,7 +78,7 @@ def plan(  # long: one line for each field of the result
     say("comparing causes")
     rows = separability(sensitivity)
     shown = [Separability(id=r.id, parameter=r.parameter, value=r.value, d=r.d) for r in rows]
-    return Plan(
+    result = Plan(
         gyrotc_version=__version__,
         serial=None,
         axis=None,
@@ -93,6 +98,18 @@ def plan(  # long: one line for each field of the result
         shortest=_shortest(sensitivity, required, say) if required else None,
         additions=_additions(scenario, pair, noise, seed, say) if pair else None,
     )
+    if not add_thermometer:
+        return result
+    found = _places(scenario, sensitivity, noise, seed, say)
+    return result.model_copy(update={"thermometers": found})
+
+
+def _places(
+    scenario: str | Path, sensitivity: Sensitivity, noise: Noise, seed: int, say: Callable[[str], None]
+) -> tuple[ThermometerPlace, ...]:
+    say("trying further thermometers")
+    found = places(scenario, sensitivity, noise=noise, seed=seed)
+    return tuple(ThermometerPlace(**asdict(place)) for place in found)
 
 
 def _shortest(

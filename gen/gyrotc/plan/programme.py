@@ -15,12 +15,15 @@ from ..diagnose.screen.gather import block_length
 from ..errors import InputError
 from ..simulate.campaign import Noise, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, read
+from ..simulate.signals import Thermometer
 from ..terms.base import History
 
-__all__ = ["Programme", "library", "programme_of"]
+__all__ = ["NodeTemperatures", "Programme", "library", "node_temperatures", "programme_of"]
 
 Array = NDArray[np.float64]
 
+_BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
+"""What of a scenario is left out where the map alone is asked about."""
 _ROW_CELLS = 10  # simulated seconds in a row
 _AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
 _LIBRARY = "separating"  # its profiles are what is proposed besides a scenario's own
@@ -79,6 +82,34 @@ def programme_of(scenario: str | Path, *, noise: Noise, seed: int, added: Sequen
     )
 
 
+@dataclass(frozen=True)
+class NodeTemperatures:
+    """True temperatures inside the gyro over the planned runs.
+
+    Attributes:
+        runs: Of every run the temperatures by node, C, as rows of `Programme.records`.
+        sensor: The node of the gyro's own thermometer.
+        there: Nodes that have a further thermometer.
+    """
+
+    runs: tuple[dict[str, Array], ...]
+    sensor: str
+    there: frozenset[str]
+
+
+def node_temperatures(scenario: str | Path, *, noise: Noise, seed: int) -> NodeTemperatures:
+    """The nodes of the gyro over the runs of `programme_of`. Raises as that."""
+    _, plan = read(scenario)
+    there = frozenset(one.node for one in plan.thermometer)
+    bare = _training_only(with_noise(plan, noise))
+    asked = [Thermometer(name=f"at_{k}", node=node) for k, node in enumerate(plan.gyro.node)]
+    runs = []
+    for made in campaign(bare.model_copy(update={"thermometer": asked}), seed):
+        n = made.reading_c.size // _ROW_CELLS * _ROW_CELLS
+        runs.append({node: _rows(made.states[f"{node}_c"][:n]) for node in plan.gyro.node})
+    return NodeTemperatures(tuple(runs), plan.sensor.node, there)
+
+
 def library(scenario: str | Path) -> list[str]:
     """Profiles that can be added: the scenario's own, and those that are made to separate causes."""
     own, made = read(scenario)[1].profile, read(_LIBRARY)[1].profile
@@ -87,7 +118,7 @@ def library(scenario: str | Path) -> list[str]:
 
 def _training_only(plan: Scenario) -> Scenario:
     chosen = [s for s in plan.set if s.role == "train"] or list(plan.set)
-    return plan.model_copy(update={"set": chosen, "cause": [], "channel": []})
+    return plan.model_copy(update={"set": chosen, **_BARE})
 
 
 def _with_added(plan: Scenario, added: Sequence[str]) -> Scenario:

@@ -20,6 +20,7 @@ __all__ = [
     "Separability",
     "Shortest",
     "Temperature",
+    "ThermometerPlace",
     "TriedRun",
 ]  # fmt: skip
 
@@ -118,6 +119,20 @@ class Additions(Part):
     runs: tuple[TriedRun, ...] = Field(description="the first is the profile as it is")
 
 
+class ThermometerPlace(Part):
+    """A node of the gyro as a place for a further thermometer (`--add-thermometer`)."""
+
+    node: str = Field(description="name of the node")
+    there: bool = Field(description="whether a thermometer is there")
+    apart_c: float = Field(description="RMS of its temperature less the sensor's, about the mean, C")
+    unseen_c: float = Field(
+        description="RMS of what map and thermometers that are there do not hold of it, C"
+    )
+    limit_dph_per_c: Figure = Field(
+        description="amplitude of a part of the bias that follows it from which these runs show it; null: never"
+    )
+
+
 class Plan(Result):
     """What a profile will be able to tell, before it is run (`gyrotc plan`)."""
 
@@ -138,3 +153,7 @@ class Plan(Result):
     accuracy: tuple[Accuracy, ...] = Field(description="after each run")
     shortest: Shortest | None = Field(description="where limits were required")
     additions: Additions | None = Field(description="where a pair was given")
+    thermometers: tuple[ThermometerPlace, ...] | None = Field(
+        default=None,
+        description="places for a further thermometer, the most telling first; those that have one last",
+    )
