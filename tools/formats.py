@@ -23,6 +23,7 @@ from gyrotc.results.diagnosed import Diagnosed
 from gyrotc.results.emission import Emitted
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.fleet import FleetEntry, FleetSummary
+from gyrotc.results.imported import ImportedFiles
 from gyrotc.results.limits import HeldLimits
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.marker import Marker
@@ -48,6 +49,7 @@ RESULTS: dict[str, type[Part]] = {
     "entry": FleetEntry,
     "evaluate": Evaluation,
     "fleet": FleetSummary,
+    "import": ImportedFiles,
     "limits": HeldLimits,
     "manifest": Manifest,
     "plan": Plan,

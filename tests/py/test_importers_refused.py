@@ -13,6 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 from gyrotc.dataset import load
 from gyrotc.importers import ImportOptions, Map, import_files, load_map
+from gyrotc.results.base import read_result
+from gyrotc.results.imported import ImportedFiles
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -299,6 +301,15 @@ def test_a_folder_that_import_did_not_make_is_left_alone(tmp_path: Path, run: Ru
     status, _, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "R")
     assert status == 2 and "R" in error
     assert [p.name for p in (tmp_path / "R").iterdir()] == ["thesis.tex"]
+
+
+def test_what_an_import_says_is_a_typed_result(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "a.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r if k != 7 else 'NaN'}"))
+    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R-1", "--json", tmp_path / "i.json")[0] == 0
+    said = read_result(tmp_path / "i.json", ImportedFiles)
+    (one,) = said.runs
+    assert (said.serial, one.rows, one.left_out) == ("R-1", 599, {"no number in rate_dph": 1})
+    assert one.source.file == "a.csv" and one.source.bytes == (tmp_path / "a.csv").stat().st_size
 
 
 def test_a_dry_run_writes_nothing(tmp_path: Path, run: Run) -> None:

@@ -95,7 +95,7 @@ def import_(
             files, out, Map.model_validate(chosen), options, ask=_ask, say=tell, progress=progress
         )
     if result is not None:
-        write_json(json_file, result.to_dict())
+        write_json(json_file, result.result().content())
 
 
 def _stated(

@@ -14,6 +14,7 @@ from ..dataset.schema import FILE
 from ..dataset.values import MIN_ROWS
 from ..errors import InputError
 from ..outputs import result_folder
+from ..results.imported import ImportedFile, ImportedFiles, OriginalFile
 from .described import description_of, kept_map, run_name, serial_of, sha256_of, size_of
 from .formats import open_logger_file
 from .mapping import MAP_FILE, Map, map_text
@@ -55,17 +56,24 @@ class Imported:
     map: Map
     runs: tuple[dict[str, Any], ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON object of `gyrotc import`."""
-        shown = ("file", "rows", "left_out", "trusted", "source")
-        return {
-            "schema": "gyrotc.import/1",
-            "gyrotc_version": __version__,
-            "serial": self.serial,
-            "axis": None,
-            "map": {k: v for k, v in self.map.model_dump(mode="json").items() if v not in (None, "", {})},
-            "runs": [{key: entry[key] for key in shown} for entry in self.runs],
-        }
+    def result(self) -> ImportedFiles:
+        """What `gyrotc import` says of it."""
+        return ImportedFiles(
+            gyrotc_version=__version__,
+            serial=self.serial,
+            axis=None,
+            map={k: v for k, v in self.map.model_dump(mode="json").items() if v not in (None, "", {})},
+            runs=tuple(
+                ImportedFile(
+                    file=entry["file"],
+                    rows=entry["rows"],
+                    left_out=entry["left_out"],
+                    trusted=tuple(entry["trusted"]),
+                    source=OriginalFile(**entry["source"]),
+                )
+                for entry in self.runs
+            ),
+        )
 
 
 def import_files(
