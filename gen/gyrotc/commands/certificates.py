@@ -1,12 +1,13 @@
-"""What leaves the laboratory with a unit: its certificate."""
+"""What leaves the laboratory with a unit: its certificate, and its correction in other forms."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast, get_args
 
 import typer
 
+from ..errors import InputError
 from .base import DirArg, OutOption, app, progress, tell
 
 
@@ -36,3 +37,29 @@ def certificate(
         tell(str(path))
     if not found.pdf:
         tell("no PDF: Chromium is not installed or did not print; print certificate.html", wrong=True)
+
+
+@app.command()
+def export(
+    folder: DirArg,
+    format: Annotated[str, typer.Option("--format", help="px4, ardupilot, or csv: the map as a table.")],
+    out: Annotated[Path, typer.Option("--out", help="The file.")],
+    axis_as: Annotated[
+        str, typer.Option("--axis-as", help="Axis of the autopilot for a gyro of one axis.")
+    ] = "x",
+    device: Annotated[int, typer.Option("--device", min=0, help="PX4: CAL_GYRO0_ID of the vehicle.")] = 0,
+) -> None:
+    """Write the correction in another form: parameters of PX4 (TC_G*) or ArduPilot (INS_TCAL*), or a table.
+
+    Autopilots know a cubic over temperature only: what it loses against the map is told, and stands in the file.
+
+    Example: gyrotc export result --format px4 --out gyro.params
+    """
+    from ..jobs.export import Format
+    from ..jobs.export import export as run
+
+    if format not in get_args(Format):
+        raise InputError("--format", repr(format), ", ".join(get_args(Format)))
+    for line in run(folder, cast(Format, format), out, axis_as=axis_as, device=device):
+        tell(line)
+    tell(str(out))

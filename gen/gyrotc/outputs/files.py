@@ -15,6 +15,7 @@ __all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
+_EXPORTED = (b"# gyrotc: ", b"serial,axis,temperature_c,slope_c_per_min,bias_dph")  # how exports begin
 
 unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""
@@ -65,7 +66,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuses to replace a file, named by `--json` or `--plots`, that gyrotc did not write.
+    """Refuses to replace a file, named by `--json`, `--plots` or `export --out`, that gyrotc did not write.
 
     Raises:
         InputError: There is such a file, or a folder.
@@ -78,7 +79,8 @@ def check_replaceable(path: Path) -> None:
         if not path.is_file():
             raise InputError(str(path), "is a folder", "the name of a file")
         with path.open("rb") as stream:
-            if _PAGE in stream.read(_HEAD):
+            head = stream.read(_HEAD)
+            if _PAGE in head or head.startswith(_EXPORTED):
                 return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:

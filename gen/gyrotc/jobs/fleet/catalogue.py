@@ -13,7 +13,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from ... import __version__
-from ...errors import InputError
+from ...errors import GyrotcError, InputError
 from ...model import Model, load_model
 from ...outputs import sha256, write_atomically
 from ...results.base import read_optional
@@ -81,6 +81,7 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
 
     Raises:
         InputError: The file there is no catalogue, or is damaged.
+        GyrotcError: It cannot be written.
     """
     counts = Counter((entry.serial, entry.axis) for entry in entries)
     made = [e for e in entries if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1]
@@ -105,6 +106,8 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
                         f"BEGIN; PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = 1; {SCHEMA}"
                     )
             yield base
+    except sqlite3.OperationalError as error:  # the disk, a lock
+        raise GyrotcError(f"{path}: {error}") from error
     except sqlite3.DatabaseError as error:
         raise InputError(
             str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
