@@ -57,7 +57,7 @@ class CheckResult:
         for axis, f in self.facts:
             yield _run_line(axis, f)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
-        yield f"{len(self.problems)} problems, {len(self.doubts)} doubts: {verdict}"
+        yield f"{_counted(self.problems, 'problem')}, {_counted(self.doubts, 'doubt')}: {verdict}"
 
     def result(self) -> Checked:
         """What `gyrotc check --json` writes."""
@@ -193,3 +193,7 @@ def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
         earth_rate_dph=f.earth.rate_dph if f.earth else None,
         earth_rate_sigma_dph=f.earth.sigma_dph if f.earth else None,
     )
+
+
+def _counted(things: Sequence[object], word: str) -> str:
+    return f"{len(things)} {word}" + "s" * (len(things) != 1)
