@@ -178,9 +178,11 @@ def test_stamps_of_a_computer_that_tremble_are_in_order(scatter: float, tmp_path
 def test_every_doubt_says_what_to_do_next() -> None:
     """By `advice`, or, with the line to paste or the place to look, in its own text."""
     told_in_text = {"shared_rows", "sign_reversed", "axes_exchanged", "stuck_temperature", "channel_copy"}
+    told_in_text |= {"thermometer_changed"}
     judge = Path(doubts_file).parent
     texts = "".join(
-        (judge / f"{name}.py").read_text("utf-8") for name in ("doubts", "recorded", "timing", "orientation")
+        (judge / f"{name}.py").read_text("utf-8")
+        for name in ("doubts", "recorded", "thermometers", "timing", "orientation")
     )
     ids = set(re.findall(r'(?:Doubt\(|"id": )"(\w+)"', texts)) | {"axes_exchanged", "jump_in_temperature"}
     assert len(ids) > 20

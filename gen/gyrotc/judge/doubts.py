@@ -29,6 +29,7 @@ from .recorded import (
     sign_findings,
     stuck_temperature_findings,
 )
+from .thermometers import thermometer_findings
 from .timing import time_findings
 
 __all__ = ["Doubt", "Envelope", "doubts_of_data_set", "looked_at", "where_of"]
@@ -152,7 +153,7 @@ def doubts_of_data_set(
     isothermal = list(temperature_findings(facts))
     for one in (*isothermal, *jump_findings(facts), *earth_rate_findings(dataset, facts)):
         yield Doubt(one["id"], "data set", one["text"], _of_jumps(one))
-    for one in contradiction_findings(facts):
+    for one in (*contradiction_findings(facts), *thermometer_findings(dataset)):
         yield _of_run(one)
     for shared, one in zip(dataset.shared, shared_rows_findings(dataset), strict=True):
         yield Doubt(one["id"], shared.file, one["text"], shared.marks)

@@ -18,6 +18,7 @@ from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA
 from ..model import Model
 from ..results.training import Training
 from .recorded import shared_rows_findings, sign_findings
+from .thermometers import thermometer_findings
 
 __all__ = [
     "contradiction_findings",
@@ -73,6 +74,7 @@ def findings_of(
     found += contradiction_findings(facts)
     found += shared_rows_findings(dataset)
     found += sign_findings(facts)
+    found += thermometer_findings(dataset)
     found += earth_rate_findings(dataset, facts)
     found += _weights(model)
     found += _outliers(result)
