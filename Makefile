@@ -162,6 +162,12 @@ cycles: setup
 dist: setup
 	@$(PYTHON) tools/archives.py build/dist
 
+## all pages as a site, with search, in build/site
+site:
+	@[ -x build/site-tools/bin/mkdocs ] || { python3 -m venv build/site-tools && \
+	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
+	@build/site-tools/bin/mkdocs build -q -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (with search: python3 -m http.server -d build/site)"
+
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
 packages: setup
 	@$(PYTHON) tools/packages.py build/packages
@@ -170,4 +176,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills mutants blind odd cycles packages dist clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills mutants blind odd cycles packages dist site clean
