@@ -14,9 +14,13 @@ from typing import Any
 
 import numpy as np
 from gyrotc.dataset import load
+from gyrotc.diagnose.attribute.single_cycle import cycle_of
+from gyrotc.diagnose.extend.refit import Effect
+from gyrotc.diagnose.extend.refitting import Refitting
+from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.paper.page import filled
 from gyrotc.train import TrainingData
-from gyrotc.train.fitting import front_end, samples_of
+from gyrotc.train.fitting import FitOptions, front_end, samples_of
 from real import with_exam
 
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
@@ -29,12 +33,11 @@ AVERAGE_S = 10.0
 Result = dict[str, Any]
 
 
-def diagnosed(data: Path, axis: str, out: Path, centers: int | None = None) -> Result:
+def diagnosed(data: Path, axis: str, out: Path) -> Result:
     """One run of the installed command."""
     command = [Path(sys.executable).with_name("gyrotc"), "diagnose", data, "--axis", axis, "--out", out]
-    size = [] if centers is None else ["--centers", str(centers)]
     done = subprocess.run(
-        [*command, "--average-s", str(AVERAGE_S), *size], check=True, capture_output=True, text=True
+        [*command, "--average-s", str(AVERAGE_S)], check=True, capture_output=True, text=True
     )
     print(done.stdout.splitlines()[0])
     return dict(json.loads((out / "diagnose.json").read_text("utf-8")))
@@ -44,6 +47,19 @@ def after(result: Result) -> float:
     """RMS on the unseen branch with the best states, named and shipped or not; without any the plain map's."""
     gain = result["single_cycle"]["gain"]
     return float(gain["exam_rms_after_dph"] if gain else result["baseline"]["exam_rms_dph"])
+
+
+def of_sizes(data: Path, axis: str) -> list[float]:
+    """RMS on the unseen branch with the best states, beside maps of all sizes."""
+    dataset = load(data, axis=axis)
+    records = records_of(dataset, "train", block_s=AVERAGE_S, average_s=AVERAGE_S)
+    effects = [Effect.of(state) for state in cycle_of(records).states]
+    found = []
+    for size in SIZES:
+        options = FitOptions(method="mrbf", centers=size, average_s=AVERAGE_S)
+        runs = Refitting(dataset, records, options, single_cycle=True).on_exam([effects])[0]
+        found.append(float(np.sqrt(np.mean(np.concatenate([run.after_dph for run in runs]) ** 2))))
+    return found
 
 
 def cubic(data: Path, axis: str) -> float:
@@ -63,33 +79,34 @@ def cubic(data: Path, axis: str) -> float:
     return float(np.sqrt(np.mean((exam.bias_dph - columns(exam) @ weights) ** 2)))
 
 
-def gains(results: dict[str, list[Result]], cubics: dict[str, float]) -> Iterator[str]:
+def gains(
+    results: dict[str, Result], spreads: dict[str, list[float]], cubics: dict[str, float]
+) -> Iterator[str]:
     """A row for each axis: unseen branch without and with what was named, over the sizes of the map."""
     yield (
         "| axis | verdict | cubic in T with dT/dt | map of (T, dT/dt) alone, default size "
         "| with what was named, default size | removed, 95 % | median over map sizes | smallest … largest | shipped |"
     )
     yield "| --- " * 9 + "|"
-    for axis, of_sizes in results.items():
-        first = of_sizes[0]
-        spread = [after(r) for r in of_sizes]
+    for axis, first in results.items():
+        spread = spreads[axis]
         gain = first["single_cycle"]["gain"]
         removed = gain["rms_removed_dph"] if gain else {"low": 0.0, "high": 0.0}
         cells = [
             axis, first["verdict"], f"{cubics[axis]:.0f}", f"{first['baseline']['exam_rms_dph']:.0f}",
-            f"{spread[0]:.0f}", f"{removed['low']:.0f} … {removed['high']:.0f}", f"{np.median(spread):.0f}",
+            f"{after(first):.0f}", f"{removed['low']:.0f} … {removed['high']:.0f}", f"{np.median(spread):.0f}",
             f"{min(spread):.0f} … {max(spread):.0f}", "yes" if first["extended"] else "no",
         ]  # fmt: skip
         yield "| " + " | ".join(cells) + " |"
 
 
-def tried(results: dict[str, list[Result]]) -> Iterator[str]:
+def tried(results: dict[str, Result]) -> Iterator[str]:
     """What was tried beside a map of T on the first 3130 s."""
     yield "| axis | beside a map of T | parameters (95 %) | RMS left in training, deg/h | criterion | resolved | |"
     yield "| --- " * 7 + "|"
-    for axis, of_sizes in results.items():
-        named = sorted(c["id"] for c in of_sizes[0]["causes"] if c["family"] != "noise")
-        cycle = of_sizes[0]["single_cycle"]
+    for axis, result in results.items():
+        named = sorted(c["id"] for c in result["causes"] if c["family"] != "noise")
+        cycle = result["single_cycle"]
         yield f"| {axis} | nothing | | {cycle['map_rms_dph']:.0f} | 0 | | |"
         for t in cycle["tried"]:
             ids = [s["id"] for s in t["states"]]
@@ -128,19 +145,19 @@ def main(source: Path, docs: Path, work: Path) -> None:
         print(f"{', '.join(absent)} absent in {source}: skipped")
         return
     data = _data(source, work, CYCLE)
-    cycles: dict[str, list[Result]] = {}
+    cycles: dict[str, Result] = {}
     for axis in "xyz":
-        folders = [work / f"diagnosis-{axis}" / str(n or "default") for n in SIZES]
-        cycles[axis] = [diagnosed(data, axis, f, n) for f, n in zip(folders, SIZES, strict=True)]
+        folder = work / f"diagnosis-{axis}"
+        cycles[axis] = diagnosed(data, axis, folder)
         for picture in ("residual", "before-and-after"):
-            svg = (folders[0] / "pictures" / f"{picture}.svg").read_text("utf-8")
+            svg = (folder / "pictures" / f"{picture}.svg").read_text("utf-8")
             (docs / "real" / f"diagnosis-{axis}-{picture}.svg").write_text(svg, "utf-8")
     rest = _data(source, work, ISOTHERMAL)
     still = {axis: diagnosed(rest, axis, work / f"diagnosis-still-{axis}") for axis in "xyz"}
     page = docs / "diagnosis-real.md"
     cubics = {axis: cubic(data, axis) for axis in cycles}
     parts: dict[str, Sequence[str]] = {
-        "gains": list(gains(cycles, cubics)),
+        "gains": list(gains(cycles, {axis: of_sizes(data, axis) for axis in cycles}, cubics)),
         "tried": list(tried(cycles)),
         "isothermal": list(isothermal(still)),
     }
