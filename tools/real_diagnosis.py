@@ -85,7 +85,7 @@ def gains(
     """A row for each axis: unseen branch without and with what was named, over the sizes of the map."""
     yield (
         "| axis | verdict | cubic in T with dT/dt | map of (T, dT/dt) alone, default size "
-        "| with what was named, default size | removed, 95 % | median over map sizes | smallest … largest | shipped |"
+        "| with the states, default size | removed, 95 % | median over map sizes | smallest … largest | shipped |"
     )
     yield "| --- " * 9 + "|"
     for axis, first in results.items():
@@ -108,6 +108,9 @@ def tried(results: dict[str, Result]) -> Iterator[str]:
         named = sorted(c["id"] for c in result["causes"] if c["family"] != "noise")
         cycle = result["single_cycle"]
         yield f"| {axis} | nothing | | {cycle['map_rms_dph']:.0f} | 0 | | |"
+        best = cycle["static"][0]
+        powers = ", ".join(_product(*power) for power in best["powers"])
+        yield f"| {axis} | no memory: {powers} | | {best['rms_dph']:.0f} | {best['criterion']:.1f} | | |"
         for t in cycle["tried"]:
             ids = [s["id"] for s in t["states"]]
             cells = [
@@ -116,6 +119,14 @@ def tried(results: dict[str, Result]) -> Iterator[str]:
                 "**named**" if sorted(ids) == named else "",
             ]  # fmt: skip
             yield "| " + " | ".join(cells) + " |"
+
+
+def _product(of_t: int, of_rate: int) -> str:
+    """A product of powers of T and r = dT/dt."""
+    factors = [
+        f"{name}^{power}" if power > 1 else name for name, power in (("T", of_t), ("r", of_rate)) if power
+    ]
+    return " ".join(factors)
 
 
 def _parameters(state: Result) -> str:

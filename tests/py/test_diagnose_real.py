@@ -23,9 +23,9 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
     (folder / "dataset.toml").write_text(
         f'schema = 1\nserial = "R1"\n{run}to_s = {cut_s}\n{run}from_s = {cut_s}\nrole = "exam"\n'
     )
-    done = gyrotc("diagnose", folder, "--axis", axis, "--average-s", 10, "--json", folder / "result.json")
+    done = gyrotc("diagnose", folder, "--axis", axis, "--average-s", 10, "--out", folder / "out")
     assert done.returncode == 0, done.stderr
-    return dict(json.loads((folder / "result.json").read_text()))
+    return dict(json.loads((folder / "out" / "diagnose.json").read_text()))
 
 
 def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(
@@ -35,6 +35,8 @@ def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(
     assert result["extended"]["exam_rms_dph"] < 0.5 * STATIC_MAP_DPH
     assert result["extended"]["terms"] == ["thermal_gradient", "thermal_gradient"]
     assert result["verdict"] == "not_testable", "one cycle does not tell a memory from a static dT/dt"
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "How much can be said" in page and "no memory: products of T and dT/dt" in page
     assert {"warm_up", "turn_on_offset", "ageing"} <= {
         c["id"] for c in result["considered"] if "not_testable" in c
     }

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from ..terms import CATALOGUE
 from .attribute.attribution import Attribution, attribute
@@ -157,8 +158,6 @@ def _channels(records: Records) -> Channels | None:
 
 def needs_finer(search: Search) -> bool:
     """Whether the next finer map explains what neither this one nor any memory does."""
-    from scipy.stats import chi2
-
     gains = Gains(search)
     finer = gains.whiten(search.bank.finer)
     added = [p for p in gains.added() if p.members[0].role == "columns"]
@@ -180,7 +179,7 @@ def needs_finer(search: Search) -> bool:
         return False
     y = gains.whiten(search.y) / gains.scale
     energy = float(((q[:, own].T @ (y - held @ (held.T @ y))) ** 2).sum())
-    return float(chi2.sf(energy, int(own.sum()))) < _FINER_P
+    return float(chdtrc(int(own.sum()), energy)) < _FINER_P
 
 
 def _of_map(candidate: Candidate) -> bool:

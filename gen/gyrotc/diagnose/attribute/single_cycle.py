@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ... import terms
 from ...train.spans import turning_points
@@ -175,7 +175,7 @@ def cycle_of(records: Records) -> Cycle:
     rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
     chosen = _averaged(fits, chosen, effective) if chosen.resolved else chosen
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
-    p_value = max(float(chi2.sf(ratio, _PRICE * len(chosen.members))), 1e-300)
+    p_value = max(float(chdtrc(_PRICE * len(chosen.members), max(ratio, 0.0))), 1e-300)
     refined = tuple(_refined(fits, chosen, effective))
     explained = fits.rest - fits.left(chosen.members)
     return Cycle(tried, static, turns, chosen, refined, rivals, rms, p_value, fits.rest, explained)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtr, chdtrc
 
 from ..detect.project import project
 from ..detect.scores import draw_null, score
@@ -53,7 +53,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
             found.append(NoiseFinding("noise_level", p, {"ratio": ratio}, text))
     gain = 2.0 * (best.log_likelihood - view.log_likelihood)
     if gain > _COLOUR_RATIO:
-        p = float(chi2.sf(gain, 2))
+        p = float(chdtrc(2, gain))
         found.append(
             NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared")
         )
@@ -63,7 +63,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
 
 
 def _two_sided(energy: float, freedom: int) -> float:
-    return float(min(1.0, 2.0 * min(chi2.sf(energy, freedom), chi2.cdf(energy, freedom))))
+    return float(min(1.0, 2.0 * min(chdtrc(freedom, energy), chdtr(freedom, energy))))
 
 
 def _described(search: Search) -> dict[str, float]:

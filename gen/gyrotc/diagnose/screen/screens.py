@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.ndimage import median_filter
+from scipy.special import fdtrc, ndtr, pdtrc
 
 from ...metrics import MAD_TO_SIGMA
 from ..orthonormal import orthonormal
@@ -56,7 +56,7 @@ def screen(records: Records) -> Screened:
     """Runs all screens."""
     masks, found, expected = _outliers(records)
     findings: list[tuple[str, float, dict[str, float]]] = []
-    p_outliers = float(stats.poisson.sf(found - 1, expected)) if found else 1.0
+    p_outliers = float(pdtrc(found - 1, expected)) if found else 1.0
     if found >= _MANY and p_outliers < _P_OUTLIERS:
         share = found / max(sum(int(m.sum()) for m in masks) + found, 1)
         findings.append(("outliers", p_outliers, {"count": float(found), "share": share}))
@@ -77,7 +77,7 @@ def _detrended(rate: Array) -> Array:
 def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, float]:
     """Hampel's rule with a scale that follows slow changes of the noise."""
     masks, found, expected = [], 0, 0.0
-    tail = 2.0 * float(stats.norm.sf(_OUTLIER))
+    tail = 2.0 * float(ndtr(-_OUTLIER))
     for run in records.runs:
         usable = run.usable
         rate = run.rate_dph[usable]
@@ -116,7 +116,7 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Arr
     left = float(((centred - q @ weights) ** 2).sum())
     freedom = logs.size - 1 - q.shape[1]
     f = float((weights**2).sum()) / rank / (left / freedom)
-    p = float(stats.f.sf(f, rank, freedom))
+    p = float(fdtrc(rank, freedom, f))
     beta, *_ = np.linalg.lstsq(x, logs, rcond=1e-8)
     sigma = np.exp(0.5 * (design @ beta - np.median(design @ beta)))
     low, high = np.quantile(sigma, [0.025, 0.975])
