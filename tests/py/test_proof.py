@@ -44,3 +44,16 @@ def test_files_that_the_page_names_exist() -> None:
         assert (ROOT / name).exists(), name
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", PAGE):
         assert (ROOT / "docs" / target).exists(), target
+
+
+def test_every_file_of_tests_answers_for_requirements() -> None:
+    """The other direction: none is missing in section 5, none that it names is gone, each id is one of section 4."""
+    listed = dict(re.findall(r"^\| `(tests/\S+)` \| ((?:R-[A-Z]+-\d+ ?)+)\|$", PAGE, re.MULTILINE))
+    there = [
+        *ROOT.glob("tests/c/test_*.c"),
+        *ROOT.glob("tests/prove/test_*.py"),
+        *ROOT.glob("tests/targets/test_*.py"),
+    ]
+    assert sorted(listed) == sorted(path.relative_to(ROOT).as_posix() for path in there)
+    ids = {name for name, _, _ in REQUIREMENTS}
+    assert {word for words in listed.values() for word in words.split()} <= ids
