@@ -31,6 +31,9 @@ _POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
 _SPANS = 5  # a single run is cut into so many
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
 _SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))  # of κ², which its prior keeps within
+_NOISES = np.exp(
+    np.linspace(np.log(0.7), np.log(4.0), 12)
+)  # of its variance over a patch, beside white noise
 _SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
 _LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
 _SIGNIFICANT = float(chdtri(2, 0.05))  # a level and a run that differs most: two degrees of freedom
@@ -164,23 +167,23 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
 
 
 def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float) -> tuple[float, float]:
-    """Least deviance and its κ² for a variance between runs."""
-    deviance = [
-        _deviance(squares, scale * variance + between + noise) + (float(np.log(scale)) / _SCALE_SD) ** 2
-        for scale in _SCALES
-    ]
-    k = int(np.argmin(deviance))
-    return deviance[k], float(_SCALES[k])
+    """Least deviance and its κ² for a variance between runs.
+
+    Means over a patch keep more of the noise than white noise would leave: its level is free, else κ² takes the rest.
+    """
+    least, scale = np.inf, 1.0
+    for level in _NOISES:
+        total = _SCALES[:, None] * variance + (between + level * noise)
+        deviance = np.sum(squares / total + np.log(total), axis=1) + (np.log(_SCALES) / _SCALE_SD) ** 2
+        k = int(np.argmin(deviance))
+        if deviance[k] < least:
+            least, scale = float(deviance[k]), float(_SCALES[k])
+    return least, scale
 
 
 def _of_few(runs: int) -> float:
     """Variance of the next run over that of so many: of Student's t with a degree of freedom less than runs."""
     return (runs - 1.0) / max(runs - 3.0, 1.0)
-
-
-def _deviance(squares: Floats, variance: Floats) -> float:
-    """−2 log likelihood of squared normal deviations, up to a constant."""
-    return float(np.sum(squares / variance + np.log(variance)))
 
 
 def _surprises(process: Process, held: TrainingData, fit: Fit) -> Floats:
