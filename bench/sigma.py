@@ -7,6 +7,7 @@ bit for bit (tests/py/test_sigma.py).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -180,22 +181,32 @@ def _add(
             found[state].append((error[masks[state]], sigma[masks[state]]))
 
 
-def coverage(say: Say, gyros: float = 1.0) -> dict[str, Any]:
-    """Figures of every campaign and of all together; `gyros` scales their numbers."""
+def coverage(say: Say, gyros: float = 1.0, workers: int | None = None) -> dict[str, Any]:
+    """Figures of every campaign and of all together.
+
+    Args:
+        gyros: Scales their numbers.
+        workers: Processes; None: as many as there are processors.
+    """
     rows, every = [], {state: [] for state in STATES}
-    for number, campaign in enumerate(CAMPAIGNS):
-        parts: list[dict[str, tuple[Floats, Floats]]] = []
-        count = max(1, round(gyros * campaign.gyros))
-        for seed in range(FIRST_SEED + 1000 * number, FIRST_SEED + 1000 * number + count):
-            say(f"{campaign.name}, gyro {seed}")
-            unit = gyro(campaign.scenario, seed, terms=campaign.terms)
-            parts.append(departures(unit, seed))
-        rows.append({"campaign": campaign.name, "gyros": count, "states": pooled(parts)})
-        for part in parts:
-            for state, pair in part.items():
-                every[state].append({state: pair})
+    with ProcessPoolExecutor(workers) as pool:
+        for number, campaign in enumerate(CAMPAIGNS):
+            parts: list[dict[str, tuple[Floats, Floats]]] = []
+            count = max(1, round(gyros * campaign.gyros))
+            seeds = range(FIRST_SEED + 1000 * number, FIRST_SEED + 1000 * number + count)
+            for seed, part in zip(seeds, pool.map(_looked_at, [campaign] * count, seeds), strict=True):
+                say(f"{campaign.name}, gyro {seed}")
+                parts.append(part)
+            rows.append({"campaign": campaign.name, "gyros": count, "states": pooled(parts)})
+            for part in parts:
+                for state, pair in part.items():
+                    every[state].append({state: pair})
     total = {state: pooled(parts)[state] for state, parts in every.items() if parts}
     return {"campaigns": rows, "together": {"gyros": sum(r["gyros"] for r in rows), "states": total}}
+
+
+def _looked_at(campaign: Campaign, seed: int) -> dict[str, tuple[Floats, Floats]]:
+    return departures(gyro(campaign.scenario, seed, terms=campaign.terms), seed)
 
 
 def pooled(parts: Sequence[dict[str, tuple[Floats, Floats]]]) -> dict[str, dict[str, float]]:

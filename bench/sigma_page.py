@@ -17,7 +17,10 @@ _HEAD = """## How well the uncertainty of corrections holds (`python -m bench do
 True bias less correction, in units of the 1 sigma of the same moment's snapshot, on {gyros} simulated gyros that
 nothing was tuned on (seeds from 100000 on), every block of 10 s. *Held*: outages of 10 s to 5 min at random places;
 *warming*: started anew at random places; *fallen back*: outages of up to 10 min. Behind each figure its standard error,
-gyros counted as independent: errors of one gyro's blocks are not. A normal error has 68.3 %, 95.4 % and 1.
+gyros counted as independent: errors of one gyro's blocks are not. A normal error has 68.3 %, 95.4 % and 1; aimed at
+were 68 and 95 % to 2 points, and 0.9 to 1.1. Where more than 68 % lie within 1 sigma while the square is near 1, errors
+are a mixture: sigma is one number for a cell of the envelope and for what few runs tell of a gyro, so that the middle
+is fuller and the tails are longer than of one normal error. Where less do, sigma is too small.
 """
 _COST = """### Instructions of a snapshot
 
