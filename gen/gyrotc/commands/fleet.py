@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,6 +33,13 @@ def fleet(
     tag: Annotated[
         str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")
     ] = "",
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs."),
+    ] = None,
+    gathered: Annotated[
+        bool, typer.Option("--gather", help="Only the summary of what shares have done.")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
@@ -41,18 +48,39 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..jobs.fleet import load_manifest, run_fleet, summary_of
+    from ..jobs.fleet import gather, load_manifest, run_fleet, run_share, share_of, summary_of
 
+    share = share_of(shard) if shard else None
+    if share and gathered:
+        raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
     with progress() as say:
         told = _Told(len(wanted.units), say)
-        entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, tag=tag, told=told)
+        if share:
+            entries = run_share(wanted, out, share, jobs=jobs, scheduler=scheduler, full=full, told=told)
+        elif gathered:
+            entries = gather(wanted, out, full=full, tag=tag, told=told)
+        else:
+            entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, tag=tag, told=told)
+    if share:
+        _tell_share(shard or "", entries)
+        return
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     _tell_comparison(summary)
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
-    if summary.failed:
-        raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed")
+    if summary.failed or summary.unfinished:
+        left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
+        raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed{left}")
+
+
+def _tell_share(name: str, entries: Sequence[FleetEntry]) -> None:
+    failed = sum(entry.status != "done" for entry in entries)
+    tell(
+        f"share {name}: {len(entries) - failed} of {len(entries)} done; gyrotc fleet --gather makes the summary"
+    )
+    if failed:
+        raise CheckFailed(f"{failed} of {len(entries)} gyros of the share failed")
 
 
 @app.command()

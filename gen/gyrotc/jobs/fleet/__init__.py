@@ -8,5 +8,9 @@ from .manifest import Fleet, Unit, load_manifest
 from .outliers import outliers
 from .page import summary_of
 from .run import run_fleet
+from .shards import gather, run_share, share_of
 
-__all__ = ["Fleet", "Unit", "catalogued", "load_manifest", "outliers", "run_fleet", "summary_of"]
+__all__ = [
+    "Fleet", "FleetOutlier", "Unit", "catalogued", "gather", "load_manifest", "outliers", "run_fleet", "run_share",
+    "share_of", "summary_of",
+]  # fmt: skip

@@ -45,8 +45,8 @@ class Unit:
     @property
     def refused(self) -> str:
         """Why no result folder may have this name; empty if it may."""
-        if self.folder.casefold() in (*SUMMARY, "catalogue"):
-            return "is the name of a file of the summary or of the catalogue; give the data set another name"
+        if self.folder.casefold() in (*SUMMARY, "catalogue", "shards"):
+            return "is the name of a file of the summary or a folder of the fleet; give the data set another name"
         if not self.folder.strip("-xyz") or self.folder.startswith("."):
             return "a name that is empty or begins with a dot is no name for a result"
         return ""

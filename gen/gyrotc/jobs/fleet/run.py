@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ...outputs import KINDS, Lock, deferred
@@ -18,7 +19,7 @@ from .page import write_summary
 from .pool import on_dask, on_processes
 from .unit import Task, done_before
 
-__all__ = ["run_fleet"]
+__all__ = ["checked_place", "done_already", "run_fleet", "summed", "tasks_of", "unfinished", "worked"]
 
 Told = Callable[[FleetEntry], None]
 
@@ -47,11 +48,7 @@ def run_fleet(
         InputError: A scheduler is named and Dask is not installed, or cannot be reached; `out` is, holds or lies in
             a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
-    place = final_place(out)
-    folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
-    check_apart(out, place, folders, whole=True)
-    check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
-    place.mkdir(parents=True, exist_ok=True)
+    place = checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
         entries = _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
@@ -65,31 +62,65 @@ def run_fleet(
                 lock.release()
 
 
+def checked_place(fleet: Fleet, out: Path) -> Path:
+    """The folder of a fleet, which is there afterwards; raises as `run_fleet`."""
+    place = final_place(out)
+    folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
+    check_apart(out, place, folders, whole=True)
+    check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
+    place.mkdir(parents=True, exist_ok=True)
+    return place
+
+
+def tasks_of(fleet: Fleet, out: Path, full: bool) -> list[Task]:
+    """A task for each unit; none of them carries the others to another process."""
+    program, common = program_of(), replace(fleet, units=())
+    return [Task(unit, common, out / unit.folder, full, program) for unit in fleet.units]
+
+
 def _run(
     fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
-    program = program_of()
-    tasks = [Task(unit, fleet, out / unit.folder, full, program) for unit in fleet.units]
-    entries: dict[int, FleetEntry] = {}
+    tasks = tasks_of(fleet, out, full)
+    entries = done_already(tasks, say)
+    if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
+        # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
+        write_summary(out, [entries.get(n) or unfinished(task) for n, task in enumerate(tasks)])
+    return summed(out, worked(tasks, entries, jobs, scheduler, say))
+
+
+def done_already(tasks: Sequence[Task], say: Told) -> dict[int, FleetEntry]:
+    """Entries of earlier calls that still hold, by the number of their task."""
+    entries = {}
     for number, task in enumerate(tasks):
         if known := done_before(task):
             entries[number] = known.as_kept()
             say(entries[number])
+    return entries
+
+
+def worked(
+    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, scheduler: str | None, say: Told
+) -> list[FleetEntry]:
+    """Does what has no entry yet; all entries in the order of the tasks."""
     waiting = [number for number in range(len(tasks)) if number not in entries]
-    if waiting and any((out / name).exists() for name in SUMMARY):
-        # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
-        write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
     left = [tasks[number] for number in waiting]
     for k, entry in on_dask(scheduler, left) if scheduler else on_processes(jobs, left):
         entries[waiting[k]] = entry
         say(entry)
-    found = list(_one_of_each_serial([entries[number] for number in range(len(tasks))]))
+    return [entries[number] for number in range(len(tasks))]
+
+
+def summed(out: Path, entries: Sequence[FleetEntry]) -> list[FleetEntry]:
+    """Writes the summary; the entries as it tells them."""
+    found = list(_one_of_each_serial(entries))
     write_summary(out, found)
     return found
 
 
-def _unfinished(task: Task) -> FleetEntry:
+def unfinished(task: Task) -> FleetEntry:
+    """The entry of a unit that was not reached."""
     return FleetEntry(
         name=task.unit.name,
         axis=task.unit.axis,

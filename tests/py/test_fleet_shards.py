@@ -1,0 +1,104 @@
+"""A fleet in shares: the same bytes as in one piece, whatever is killed in between."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Command
+from gyrotc.errors import InputError
+from gyrotc.jobs.fleet import Fleet, Unit, gather, load_manifest, run_fleet, run_share, share_of
+from gyrotc.jobs.fleet import pool as pools
+from gyrotc.jobs.fleet.run import tasks_of
+from gyrotc.jobs.fleet.shards import Share, mine
+from gyrotc.jobs.fleet.unit import Task, do_unit
+from gyrotc.outputs import MARKER
+from gyrotc.results.fleet import FleetEntry
+from gyrotc.train.fitting import FitOptions
+from recordings import columns, toml, write_csv
+
+N = 3
+
+
+def gyro(folder: Path, serial: str, *, seed: int) -> None:
+    write_csv(folder / "run-01.csv", columns(720, seed=seed))
+    head = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"'
+    (folder / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """All files of a fleet but markers, shares, and the catalogue's own pages."""
+    files = (path for path in out.rglob("*") if path.is_file() and path.name != MARKER)
+    found = {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+    return {
+        name: data for name, data in found.items() if not name.startswith("shards/") and ".sqlite" not in name
+    }
+
+
+@pytest.fixture(scope="module")
+def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four gyros, of which one has no recordings."""
+    folder = tmp_path_factory.mktemp("lot")
+    for k in range(4):
+        gyro(folder / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    (folder / "d" / "RLG-3" / "run-01.csv").write_text("time_s,rate_dph\n")
+    run_fleet(load_manifest(folder / "d"), folder / "whole")
+    return folder
+
+
+def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
+    fleet, out = load_manifest(lot / "d"), lot / "shares"
+    told = gyrotc("fleet", lot / "d", "--out", out, "--shard", f"1/{N}")
+    assert f"share 1/{N}" in told.stdout and not (out / "fleet.json").exists()
+    early = gather(fleet, out)
+    assert {e.status for e in early if e.name not in told.stdout} <= {"unfinished"}
+    for k in range(2, N + 1):
+        run_share(fleet, out, Share(k, N), jobs=1)
+    done = gyrotc("fleet", lot / "d", "--out", out, "--gather")
+    assert done.returncode == 1 and "RLG-3: failed" in done.stdout
+    assert contents(out) == contents(lot / "whole")
+
+
+def test_every_unit_is_in_one_share_of_any_number() -> None:
+    units = tuple(Unit(Path(f"/lot/RLG-{k:05d}"), None) for k in range(1000))
+    fleet = Fleet(units, FitOptions(), None, None)
+    for of in (1, 2, 7, 50):
+        parts = [mine(fleet, Share(k, of)).units for k in range(1, of + 1)]
+        assert sorted(u.folder for part in parts for u in part) == [u.folder for u in units]
+        assert max(map(len, parts)) < 1000 / of + 6.0 * (1000 / of) ** 0.5 + 1
+
+
+def test_a_task_does_not_carry_the_fleet(tmp_path: Path) -> None:
+    sizes = []
+    for count in (10, 10000):
+        units = tuple(Unit(tmp_path / f"RLG-{k:05d}", None) for k in range(count))
+        sizes.append(len(pickle.dumps(tasks_of(Fleet(units, FitOptions(), None, None), tmp_path, False)[0])))
+    assert sizes[0] == sizes[1] < 5000
+
+
+def _dies_once(task: Task) -> FleetEntry:
+    mark = task.out.parent / f"{task.unit.name}.died"
+    if task.unit.name == "RLG-1" and not mark.exists():
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return do_unit(task)
+
+
+def test_a_unit_whose_process_is_killed_is_done_again(
+    lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pools, "do_unit", _dies_once)
+    entries: Any = run_fleet(load_manifest(lot / "d"), tmp_path / "out", jobs=1)
+    assert (tmp_path / "out" / "RLG-1.died").exists()
+    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "1/3/5", "-1/3", "1/1000000"])
+def test_what_is_no_share_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="--shard"):
+        share_of(text)
