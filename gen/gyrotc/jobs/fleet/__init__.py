@@ -11,6 +11,6 @@ from .run import run_fleet
 from .shards import gather, run_share, share_of
 
 __all__ = [
-    "Fleet", "FleetOutlier", "Unit", "catalogued", "gather", "load_manifest", "outliers", "run_fleet", "run_share",
+    "Fleet", "Unit", "catalogued", "gather", "load_manifest", "outliers", "run_fleet", "run_share",
     "share_of", "summary_of",
 ]  # fmt: skip
