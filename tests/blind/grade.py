@@ -30,6 +30,7 @@ def grade(
         "named": [c["id"] for c in physical],
         "noise": [c["id"] for c in result["causes"] if c["family"] == "noise"],
         "equivalent": [c["equivalent"] for c in physical],
+        "said": _said(hidden, physical),
         "seconds": result.get("seconds"),
     }
     if result["verdict"] == "error":
@@ -39,6 +40,18 @@ def grade(
     row["limit_ratio"] = _limit_ratio(hidden, result)
     row["gain"] = _gain(hidden, campaign, result, physical)
     return row
+
+
+def _said(hidden: Hidden, physical: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Every cause with a stated probability in the place of a named one, and whether it is hidden.
+
+    In the place of the right cause only one can be true; another one that is hidden beside it is true, too.
+    """
+    return [
+        {"id": id, "p": p, "true": id in hidden.names}
+        for cause in physical
+        for id, p in (cause.get("probabilities") or {}).items()
+    ]
 
 
 def _parameters(hidden: Hidden, physical: list[dict[str, Any]]) -> list[dict[str, float]]:

@@ -158,7 +158,8 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for name, goal, select, hit, bound, kind in CHECKS:
         out += _share(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
-    return out + _parameters_met(rows) + _sets(rows) + _gains(rows) + _honesty(rows) + _time(rows)
+    out += _parameters_met(rows) + _sets(rows) + _reliability(rows)
+    return out + _gains(rows) + _honesty(rows) + _time(rows)
 
 
 def _share(name: str, goal: str, hits: Sequence[bool], bound: float, kind: str) -> list[dict[str, Any]]:
@@ -216,6 +217,24 @@ def _time(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return _value(
         "median CPU time of a diagnosis, bank cached, s", "≤ 3", middle, middle <= 3.0, len(seconds)
     )
+
+
+_BINS = ((0.1, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.0 + 1e-9))  # of stated probabilities
+
+
+def _reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """How often what was said with a probability is true, over all recordings, clean and foreign ones among them."""
+    said = [one for row in rows for one in row.get("said", [])]
+    out: list[dict[str, Any]] = []
+    for low, high in _BINS:
+        inside = [one for one in said if low <= one["p"] < high]
+        if not inside:
+            continue
+        mean = float(np.mean([one["p"] for one in inside]))
+        name = f"true of what was said with {low:.0%}-{min(high, 1.0):.0%}, on average {mean:.0%}"
+        for entry in _share(name, f"{mean:.0%}", [one["true"] for one in inside], mean, "min"):
+            out.append({**entry, "met": entry["low"] <= mean <= entry["high"]})
+    return out
 
 
 def _told(row: Row) -> bool:

@@ -349,6 +349,9 @@ REFUSED: dict[str, Refused] = {
     "pulse weight zero": Refused(
         description(head=HEAD + "\npulse_weight_arcsec = 0.0"), ("pulse_weight_arcsec",)
     ),
+    "temperature late by days": Refused(
+        description(head=HEAD + "\ntemperature_late_s = 86400.0"), ("temperature_late_s", "3600")
+    ),
     "compute without latitude": Refused(
         description(
             RUN + "\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0", head=HEAD + '\nearth_rate = "compute"'

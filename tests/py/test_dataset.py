@@ -268,6 +268,27 @@ def test_pulses_become_the_mean_rate_since_the_last_row(tmp_path: Path) -> None:
     assert angle == pytest.approx(0.25 * table["pulses"][1:].sum())
 
 
+@pytest.mark.parametrize("late_s", [25.0, -40.0])
+def test_a_late_temperature_is_taken_back(tmp_path: Path, late_s: float) -> None:
+    time = np.arange(0.0, 1000.0, 10.0)
+    time = np.r_[time, time + 3000.0]  # with a gap of half an hour, across which nothing is made up
+
+    def true_c(t: np.ndarray) -> np.ndarray:
+        return 20.0 + 1e-3 * t
+
+    table = {"time_s": time, "temperature_c": true_c(time - late_s), "rate_dph": np.sin(time)}
+    write_csv(tmp_path / "RLG-1" / "a.csv", table)
+    text = toml('file = "a.csv"', head=f'schema = 1\nserial = "A"\ntemperature_late_s = {late_s}')
+    (tmp_path / "RLG-1" / "dataset.toml").write_text(text)
+    dataset = load(tmp_path / "RLG-1")
+    rows = dataset.runs[0].rows()
+    np.testing.assert_allclose(rows.temperature_c, true_c(rows.time_s), atol=1e-9)
+    np.testing.assert_allclose(rows.rate_dph, np.sin(rows.time_s), atol=1e-9)
+    lost = 2 * np.ceil(abs(late_s) / 10.0)
+    assert time.size - lost - 2 <= rows.time_s.size <= time.size - lost
+    assert any("temperature_late_s" in warning for warning in dataset.warnings)
+
+
 def test_axis_chooses_its_column(tmp_path: Path) -> None:
     base = columns()
     table = {"time_s": base["time_s"], "temperature_c": base["temperature_c"], "supply_v": base["time_s"]}

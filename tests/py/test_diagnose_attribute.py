@@ -15,7 +15,7 @@ from gyrotc.diagnose.attribute.misfit import misfit
 from gyrotc.diagnose.attribute.overlap import overlap
 from gyrotc.diagnose.attribute.pairs import best_of, clear_pair, makes_sense
 from gyrotc.diagnose.attribute.refine import Refined, model_columns, refine
-from gyrotc.diagnose.attribute.rivals import rivals_of
+from gyrotc.diagnose.attribute.rivals import EQUIVALENT, Rival, probabilities_of, rivals_of
 from gyrotc.diagnose.detect.search import Search
 from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
 from numpy.typing import NDArray
@@ -193,6 +193,28 @@ def test_rivals_are_near_in_the_criterion() -> None:
     ]
     first, second = rivals_of(singles, pairs, pairs[0].members, 400)
     assert [r.id for r in first] == [] and [r.id for r in second] == ["ageing"]
+
+
+def test_what_is_called_equal_and_the_probabilities_agree() -> None:
+    """A rival at the edge of what counts as equal has 1 in 10; several farther ones together make a case, too."""
+    at_edge = probabilities_of("hysteresis", [Rival("ageing", EQUIVALENT)])
+    assert at_edge == pytest.approx({"hysteresis": 0.9, "ageing": 0.1})
+    assert probabilities_of("hysteresis", [Rival("ageing", 0.0)])["ageing"] == pytest.approx(0.5)
+    assert list(probabilities_of("hysteresis", [Rival("ageing", 60.0)])) == ["hysteresis"], (
+        "too unlikely to tell"
+    )
+    same = [Rival("auxiliary", 1.0, "supply_v"), Rival("auxiliary", 2.0, "pressure_hpa")]
+    assert probabilities_of("auxiliary", same) == {"auxiliary": 1.0}, "another channel is no other cause"
+    size, far = 400, EQUIVALENT + 1.0
+    singles = [_point(100.0, ("hysteresis", 1.0))]
+    price = singles[0].criterion(size)
+    for id in ("thermal_gradient", "warm_up", "ageing"):
+        one = _point(0.0, (id, 1.0))
+        singles.append(_point(price - far - one.criterion(size), (id, 1.0)))
+    [near] = rivals_of(singles[:2], [], singles[0].members, size)
+    assert near == (), "one alone is ruled out"
+    [near] = rivals_of(singles, [], singles[0].members, size)
+    assert near, "three together are not"
 
 
 def test_a_parabola_is_read_exactly() -> None:

@@ -78,8 +78,13 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
     if cause.equivalent:
         channels = f" ({', '.join(cause.equivalent_channels)})" if cause.equivalent_channels else ""
         yield f"  as likely on these runs: {', '.join(cause.equivalent)}{channels}"
+    if cause.equivalent and cause.probabilities:
+        odds = ", ".join(f"{name} {share:.0%}" for name, share in cause.probabilities.items())
+        yield f"  probabilities: {odds}"
     if cause.separate_by:
         yield f"  to tell them apart: {cause.separate_by}"
+    if cause.repair:
+        yield f"  repair, a line of dataset.toml: {cause.repair}"
     if cause.gain:
         yield from _gain_lines(cause.gain)
 

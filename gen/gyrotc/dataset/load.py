@@ -111,6 +111,7 @@ def survey(  # long: a reader is told everything that it needs, by name
                 earth=_earth(description, index, axis, problems),
                 applied=applied,
                 row_period_s=recording.row_period_s,
+                temperature_late_s=description.temperature_late_s,
             )
             runs_by_entry[index] = _run(folder, entry, recording, reader)
     runs = list(runs_by_entry.values())
@@ -124,6 +125,11 @@ def survey(  # long: a reader is told everything that it needs, by name
     trusted = judge(doubted, trust_units or description.trust_units, problems)
     warnings += [f"{name}: units are trusted: {text}" for name, text in trusted]
     trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
+    if description.temperature_late_s:
+        warnings.append(
+            f"temperature_late_s = {description.temperature_late_s:g}: every rate goes with the temperature that was "
+            "recorded so many seconds later"
+        )
     dataset = _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings), trusted_texts)
     return replace(
         dataset,

@@ -21,8 +21,9 @@ from .source import Source
 from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, faults, rate_faults
 
-__all__ = ["Reader", "Recording", "open_file", "open_recording"]
+__all__ = ["Reader", "Recording", "in_time", "open_file", "open_recording"]
 
+_LONGEST_GAP = 10.0  # row periods across which a temperature is interpolated
 _SHORTEST_S = 1e-5  # no gyro is recorded faster; a time scale taken wrong makes blocks of 10^12 rows
 
 
@@ -60,6 +61,7 @@ class Reader:
         pulse_weight_arcsec: Angle of one pulse, arcsec; used where pulses were counted.
         earth: Earth's rate to take off.
         applied: Correction to add back.
+        temperature_late_s: How much later than the rate the temperature was recorded, s.
     """
 
     file: Source
@@ -71,6 +73,7 @@ class Reader:
     earth: EarthRate | None
     applied: Applied | None
     row_period_s: float
+    temperature_late_s: float = 0.0
 
     def __call__(self) -> Rows:
         """All rows.
@@ -97,7 +100,18 @@ class Reader:
         if self.applied is not None:
             rate = rate + self.applied.correction_dph(rows, self.row_period_s)
             rows = Rows(time, rows.temperature_c, rate, channels)
-        return rows
+        return in_time(rows, self.temperature_late_s, self.row_period_s) if self.temperature_late_s else rows
+
+
+def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
+    """The rows with the temperature that was recorded `late_s` later; without those for which there is none."""
+    then = rows.time_s + late_s
+    after = np.searchsorted(rows.time_s, then).clip(1, len(rows.time_s) - 1)
+    known = (then >= rows.time_s[0]) & (then <= rows.time_s[-1])
+    known &= np.diff(rows.time_s)[after - 1] <= _LONGEST_GAP * row_period_s
+    temperature = np.interp(then, rows.time_s, rows.temperature_c)
+    channels = {name: values[known] for name, values in rows.channels.items()}
+    return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels)
 
 
 def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[str]) -> dict[str, Floats]:

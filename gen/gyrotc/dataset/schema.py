@@ -175,6 +175,7 @@ class Description(_Part):
     axis_sigma_deg: Level = 0.1
     applied_table: Annotated[str, Field(pattern="^(none|[0-9a-f]{64})$")] = "none"
     pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    temperature_late_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
     columns: Columns = Columns()
     units: dict[Name, Name] = {}
     trust_units: bool = False

@@ -52,6 +52,7 @@ def next_steps(
         steps.append(f"Against it: {'; '.join(remedies)}.")
     elif verdict != "ambiguous":
         steps.append(_STEPS[verdict])
+    steps += [f"Paste {c.repair} into dataset.toml and build again." for c in causes if c.repair]
     named = [CATALOGUE[c.id].words for c in causes if c.id in CATALOGUE]
     steps += dict.fromkeys(words.advice for words in named if words.advice)
     missing = [text for i in untestable if (text := CATALOGUE[i].words.recording)]

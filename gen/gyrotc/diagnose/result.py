@@ -140,7 +140,10 @@ def _extended_model(
     front = front_end(runs, options.block_s)
     longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
     front = replace(front, stuck_s=stuck_after_s(longest_s))
-    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
+    bumps = extension.bumps
+    plain = model_of(
+        dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps
+    )
     entries = []
     for effect in extension.shipped:
         if CATALOGUE[effect.id].table is None:
@@ -156,10 +159,18 @@ def _extended_model(
     left_out = extension.after if extension.measured_on == "left out" else None
     spans = training_spans(runs, extension.samples)
     training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
+    training = _of_whole_map(training, plain)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
-    seen = {"guards": guards, "effects_dph": added_range(play_runs(dataset, runs, front), extension.shipped)}
-    return Model.from_dict({**_with_terms(plain, entries, extension.samples, runs), **seen}), training
+    told = {"guards": guards, "effects_dph": added_range(play_runs(dataset, runs, front), extension.shipped)}
+    return Model.from_dict({**_with_terms(plain, entries, extension.samples, runs), **told}), training
+
+
+def _of_whole_map(training: Training, plain: Model) -> Training:
+    """What training says of its map, with the bumps that have joined it."""
+    more = plain.n_centers - training.centers
+    sizes = {"centers": plain.n_centers, "table_bytes": training.table_bytes + 20 * more}
+    return training.model_copy(update={**sizes, "sum_abs_weights_dph": plain.sum_abs_weights_dph})
 
 
 def _with_terms(

@@ -186,7 +186,14 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         separable_from_d=analysis.separations[k],
     )
     channels = tuple(r.channel for r in near if r.channel is not None)
-    told = {"channel": cause.candidate.channel, "equivalent_channels": channels or None}
+    repair = CATALOGUE[id].repair
+    values = {name: interval.value for name, interval in cause.parameters.items()}
+    told: dict[str, str | tuple[str, ...] | dict[str, float] | None] = {
+        "probabilities": attribution.probabilities[k] if k < len(attribution.probabilities) else None,
+        "repair": None if repair is None else repair(cause.candidate.values | values),
+        "channel": cause.candidate.channel,
+        "equivalent_channels": channels or None,
+    }
     return named.model_copy(update={name: value for name, value in told.items() if value is not None})
 
 
@@ -215,7 +222,7 @@ def _extended(extension: Extension) -> ExtendedModel | None:
     left = extension.rate_left_out
     return ExtendedModel(
         exam_rms_dph=extension.total.rms_after,
-        centers=extension.extended.n_centers,
+        centers=extension.centers,
         terms=tuple(e.id for e in extension.shipped if CATALOGUE[e.id].table is not None),
         model=None,
         gain=extension.total.result(),

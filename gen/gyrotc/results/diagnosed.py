@@ -96,9 +96,15 @@ class NamedCause(Part):
     parameters: dict[str, Estimate] = Field(description="fitted parameters by name")
     equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
     separate_by: str | None = Field(description="the experiment that would tell them apart")
+    probabilities: dict[str, float] | None = Field(
+        default=None, description="of this cause and of the others in its place, by id; those above 1 %"
+    )
     gain: GainOnUnseen | None = Field(description="null for noise")
     signature: str = Field(description="how it shows")
     remedy: str = Field(description="what helps against it")
+    repair: str | None = Field(
+        default=None, description="line of `dataset.toml` that takes it out of the recordings"
+    )
     separable_from_d: dict[str, float] | None = Field(
         default=None, description="size, in standard deviations, from which each other cause is ruled out"
     )

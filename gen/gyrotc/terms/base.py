@@ -142,7 +142,7 @@ class Cause:
         needs: What recordings must offer.
         search: How diagnosis looks for it; None: it is simulated only.
         table: How it stands in a table; None: no table holds it.
-        centers: Number of Gaussians with which a finer map holds it; None: a map is not what mends it.
+        finer_map: A finer map holds it.
         cavity: Simulation: temperature that the bias acts on instead of `scene.cavity_c`, C.
         bias: Simulation: what it adds to the bias, deg/h; may draw from the generator (once for each run).
         record: Simulation: what the sensor shows instead of `scene.sensed_c`, C.
@@ -151,6 +151,7 @@ class Cause:
         mended: For kind "input" without a table: what the map would see had the recording been right, from times
             in s, temperature in C, its rate in C/min and the parameters.
         unseen_s: How much of either end of a run the cause puts out of sight, s.
+        repair: The line of `dataset.toml` that takes it out of recordings.
     """
 
     id: str
@@ -164,7 +165,7 @@ class Cause:
     needs: Needs = Needs()
     search: SearchRule | None = None
     table: Tabled | None = None
-    centers: int | None = None
+    finer_map: bool = False
     cavity: Callable[[Scene, Values], Array] | None = None
     bias: Callable[[Scene, Values, np.random.Generator], Array] | None = None
     record: Callable[[Scene, Values], Array] | None = None
@@ -172,6 +173,7 @@ class Cause:
     amplitudes: Callable[[Array], dict[str, float]] | None = None
     mended: Callable[[Array, Array, Array, Values], tuple[Array, Array]] | None = None
     unseen_s: Callable[[Values], float] | None = None
+    repair: Callable[[Values], str] | None = None
 
     def nonlinear(self) -> tuple[Parameter, ...]:
         """Parameters that `features` takes."""
@@ -186,4 +188,4 @@ class Cause:
     @property
     def shipped(self) -> bool:
         """Whether an extended model can hold it: as a term, or by a finer map."""
-        return self.table is not None or self.centers is not None
+        return self.table is not None or self.finer_map

@@ -45,6 +45,10 @@ def _unseen_s(values: Values) -> float:
     return abs(values["shift_s"]) + _MARGIN_S
 
 
+def _repair(values: Values) -> str:
+    return f"temperature_late_s = {values['shift_s']:.0f}"
+
+
 CAUSE = Cause(
     id="time_misalignment",
     family="thermal_memory",
@@ -60,7 +64,8 @@ CAUSE = Cause(
         remedy="mend the clocks or the filter of the recording; no term on the target",
         experiment=RATES,
         beside={"cavity_lag": CORNERS, "thermal_gradient": CORNERS},
-        advice="Mend the clocks or filters of the recording; no term on the target stands for them.",
+        advice="Mend the clocks or filters of the recording; no term on the target stands for them, where the "
+        "thermometer is read in time.",
     ),
     search=SearchRule(
         price=2,
@@ -74,6 +79,7 @@ CAUSE = Cause(
     ),
     mended=_mended,
     unseen_s=_unseen_s,
+    repair=_repair,
     record=_record,
     features=_features,
 )

@@ -34,6 +34,7 @@ from . import (
     predict,
     uncertainty,
 )
+from .bumps import Bumps
 from .channels import chosen_channels, seen_by_target, with_channels
 from .data import joined
 from .guards import AGREE_S, longest_same_s, stuck_after_s
@@ -270,10 +271,12 @@ def model_of(  # long: one line for each field of model.json
     front: FrontEnd,
     options: FitOptions,
     added: NDArray[np.float64] | float = 0.0,
+    bumps: Bumps | None = None,
 ) -> Model:
     """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data.
 
-    `added`: what terms, which are not in it yet, add to the map at each sample, deg/h.
+    `added`: what terms and bumps, which are not in it yet, add to the map at each sample, deg/h. `bumps`: those that
+    join the map.
     """
     started = [run.started for run in runs if run.started is not None]
     meta = dict(dataset.meta)
@@ -299,7 +302,7 @@ def model_of(  # long: one line for each field of model.json
             "scale": fitted.scale,
             "envelope": fitted.envelope,
             "coverage": coverage(data, fitted, _COVERAGE_CELLS),
-            "networks": [_snapped(n, fitted.scale) for n in fitted.networks],
+            "networks": [_snapped(n, fitted.scale) for n in _joined(fitted, bumps)],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
             "stuck_s": front.stuck_s,
@@ -328,6 +331,13 @@ def _uncertainty(
         return uncertainty(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
     except TrainingFailed:
         return None
+
+
+def _joined(fitted: Fit, bumps: Bumps | None) -> Sequence[Mapping[str, Any]]:
+    """The networks, with bumps where there are any."""
+    if bumps is None:
+        return fitted.networks
+    return [bumps.beside(network, fitted.scaling.half_range_c) for network in fitted.networks]
 
 
 def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, Any]:

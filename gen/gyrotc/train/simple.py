@@ -20,7 +20,7 @@ __all__ = ["SIMPLE", "design", "fit_simple", "solve", "without_rate"]
 
 Floats = NDArray[np.float64]
 
-_FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
+FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "constant": ((0, 0),),
     "linear": ((0, 0), (1, 0)),
@@ -42,7 +42,7 @@ def without_rate(fitted: Network) -> dict[str, Any]:
         **fitted,
         "linear": [fitted["linear"][0], 0.0],
         "centers": [[center, 0.0] for center, _ in fitted["centers"]],
-        "widths": [[width, _FLAT] for width, _ in fitted["widths"]],
+        "widths": [[width, FLAT] for width, _ in fitted["widths"]],
     }
 
 
@@ -74,7 +74,7 @@ def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float
         extra, z, width, weights = _as_gaussians(by_power[2, 0], by_power[3, 0], _TOLERANCE * floor)
         w0, linear[0] = w0 + extra[0], linear[0] + extra[1]
         centers = np.stack([scaling.center_c + scaling.half_range_c * z, np.zeros(len(z))], axis=1)
-        widths = np.stack([np.full(len(z), width), np.full(len(z), _FLAT)], axis=1)
+        widths = np.stack([np.full(len(z), width), np.full(len(z), FLAT)], axis=1)
     means = len(average(data, average_s))
     return Outcome(
         networks=(network(w0, linear, centers, widths, weights),),

@@ -22,7 +22,7 @@ from .gains import Gains, Point
 from .misfit import misfit
 from .pairs import best_of, clear_pair, makes_sense
 from .refine import Refined, model_columns, refine
-from .rivals import Rival, rivals_of
+from .rivals import Rival, probabilities_of, ranked_rivals, rivals_of
 
 __all__ = ["Attribution", "attribute", "choose"]
 
@@ -42,7 +42,8 @@ class Attribution:
         first: The search before any cause is taken, best first.
         causes: The chosen causes, strongest first.
         p_values: The p-value of each cause, adjusted for the whole search.
-        rivals: For each, other causes in its place, nearest first.
+        rivals: For each, other causes in its place that explain the recordings as well, nearest first.
+        probabilities: For each, of every cause in its place, itself first, by id.
         gain: Twice the log-likelihood ratio of all causes together.
         misfit_p: p-value of what is left against the dictionary.
         share: Share of the detectable structure that the causes explain.
@@ -59,6 +60,7 @@ class Attribution:
     share: float
     last: list[Found]
     other: Contest
+    probabilities: tuple[dict[str, float], ...] = ()
 
     @property
     def detected(self) -> bool:
@@ -102,7 +104,9 @@ def attribute(search: Search) -> Attribution:
             stage = _deeper(search, gains, stage, pair.members)
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
-    rivals = rivals_of(singles, pairs, tuple(stage.chosen[k] for k in order), gains.size)
+    taken = tuple(stage.chosen[k] for k in order)
+    rivals = rivals_of(singles, pairs, taken, gains.size)
+    ranked = ranked_rivals(singles, pairs, taken, gains.size)
     return Attribution(
         first=first,
         causes=refined,
@@ -112,12 +116,15 @@ def attribute(search: Search) -> Attribution:
         misfit_p=stage.misfit_p,
         share=stage.share,
         last=stage.found,
-        other=contest(
-            gains,
-            refined,
-            [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(refined, rivals, strict=True)],
-        ),
+        other=_contest(gains, refined, rivals),
+        probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, ranked, strict=True)),
     )
+
+
+def _contest(gains: Gains, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]) -> Contest:
+    """The best shape that no cause has, against the causes or any other one that does as well in their place."""
+    others = [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(causes, rivals, strict=True)]
+    return contest(gains, causes, others)
 
 
 def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:

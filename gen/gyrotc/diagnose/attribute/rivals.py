@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,18 @@ import numpy as np
 from ..signatures.candidates import Candidate
 from .gains import Point
 
-__all__ = ["EQUIVALENT", "Rival", "rivals_of"]
+__all__ = ["EQUIVALENT", "Rival", "probabilities_of", "ranked_rivals", "rivals_of"]
 
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
 below e^4, about 50 to 1, name no cause."""
+
+_TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
+"""How much of a difference of the criterion counts in odds: so that one other explanation at the edge of what counts as
+equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
+
+_SURE = 0.9  # probability from which one cause is told as the explanation
+_TOLD = 0.01  # smaller ones are not worth a line
 
 _Kind = tuple[str, str]  # cause and channel ("" for none)
 
@@ -30,7 +38,37 @@ class Rival:
 def rivals_of(
     singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
 ) -> tuple[tuple[Rival, ...], ...]:
-    """Other causes in the place of each chosen one, everything else kept in kind."""
+    """Other causes in the place of each chosen one that explain the recordings as well, nearest first.
+
+    These are all within `EQUIVALENT`, and as many more as it takes until they and the chosen one have 0.9.
+    """
+    return tuple(_near(ranked) for ranked in ranked_rivals(singles, pairs, chosen, size))
+
+
+def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
+    """Of the causes in one place, by id, the chosen one first; those below 1 in 100 are not told."""
+    odds = {chosen: 1.0}
+    for rival in ranked:
+        if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause
+            odds[rival.id] = _odds(rival)
+    total = sum(odds.values())
+    return {id: value / total for id, value in odds.items() if id == chosen or value / total >= _TOLD}
+
+
+def _odds(rival: Rival) -> float:
+    return float(np.exp(-0.5 * _TEMPER * rival.distance))
+
+
+def _near(ranked: Sequence[Rival]) -> tuple[Rival, ...]:
+    odds = np.array([1.0, *map(_odds, ranked)])
+    enough = int(np.searchsorted(np.cumsum(odds) / odds.sum(), _SURE))
+    return tuple(r for k, r in enumerate(ranked) if k < enough or r.distance <= EQUIVALENT)
+
+
+def ranked_rivals(
+    singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
+) -> tuple[tuple[Rival, ...], ...]:
+    """Other causes in the place of each chosen one, everything else kept in kind: all of them, nearest first."""
     kinds = [_kind(c) for c in chosen]
     pool = singles if len(chosen) == 1 else pairs
     if len(chosen) > 2:
@@ -55,9 +93,7 @@ def rivals_of(
             if rest != [kinds[k]]:
                 near[rest[0]] = max(near.get(rest[0], -np.inf), value)
         ranked = sorted(near.items(), key=lambda item: -item[1])
-        out.append(
-            tuple(Rival(id, own - v, channel or None) for (id, channel), v in ranked if own - v <= EQUIVALENT)
-        )
+        out.append(tuple(Rival(id, own - v, channel or None) for (id, channel), v in ranked))
     return tuple(out)
 
 

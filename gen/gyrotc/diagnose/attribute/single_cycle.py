@@ -135,7 +135,7 @@ class Cycle:
     def attribution(self, before: Attribution) -> Attribution:
         """The attribution with this cycle's causes in place of those of the search."""
         if self.chosen is None or not self.causes:
-            return replace(before, causes=(), p_values=(), rivals=())
+            return replace(before, causes=(), p_values=(), rivals=(), probabilities=())
         share = 1.0 - (self.chosen.rms_dph / self.rms_dph) ** 2
         count = len(self.causes)
         return replace(
@@ -143,6 +143,7 @@ class Cycle:
             causes=self.causes,
             p_values=(self.p_value,) * count,
             rivals=(self.rivals, *((),) * (count - 1)),
+            probabilities=(),
             share=share,
         )
 

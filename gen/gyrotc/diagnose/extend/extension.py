@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from ...dataset import Dataset
 from ...metrics import Averages
 from ...train import Fit, TrainingData
+from ...train.bumps import Bumps
 from ...train.data import joined
 from ...train.fitting import FitOptions
 from ..attribute.refine import Refined
 from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
-from .refit import Effect, samples, scored_means
+from .refit import Effect, samples, scored_means, with_bumps
 from .refitting import FEW_RUNS, Chain, Refitting, folds_of
 from .shipping import Shipping, shipping
 
@@ -70,6 +71,17 @@ class Extension:
     before: list[Averages]
     after: list[Averages]
 
+    @property
+    def centers(self) -> int:
+        """Number of centers of the extended map; 0 if none is shipped."""
+        own = len(self.bumps.centers_c) if self.bumps is not None else 0
+        return own + (self.extended.n_centers if self.extended is not None else 0)
+
+    @property
+    def bumps(self) -> Bumps | None:
+        """Those of a finer map, where one is shipped."""
+        return next((e.bumps for e in self.shipped if e.bumps is not None), None)
+
 
 def extend(
     dataset: Dataset,
@@ -83,7 +95,7 @@ def extend(
     """Refits the model with the causes and measures the gain."""
     say("measuring the gain")
     refitting = Refitting(dataset, records, options, single_cycle=single_cycle)
-    effects = [Effect.of(c) for c in causes]
+    effects = with_bumps(refitting.train, [Effect.of(c) for c in causes])
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
     if single_cycle and effects:  # found together: one alone is another model

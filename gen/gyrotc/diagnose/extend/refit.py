@@ -15,14 +15,24 @@ from ...frontend import blocks_since_power_on
 from ...metrics import Averages, average
 from ...terms import CATALOGUE, Cause, Scene
 from ...terms.recursion import Course, CourseChannel, TermOutcome
-from ...train import Fit, TrainingData, fit, predict
+from ...train import Fit, TrainingData, TrainingFailed, fit, predict
+from ...train.bumps import Bumps, find_bumps
 from ...train.channels import channel_shown
-from ...train.data import joined
+from ...train.data import cleaned, joined, scaling_of
 from ...train.fitting import FrontEnd, samples_of
 from ...train.simple import without_rate
 from ..attribute.refine import Refined
 
-__all__ = ["Effect", "Played", "added_range", "fit_extended", "play_runs", "samples", "scored_means"]
+__all__ = [
+    "Effect",
+    "Played",
+    "added_range",
+    "fit_extended",
+    "play_runs",
+    "samples",
+    "scored_means",
+    "with_bumps",
+]
 
 Array = NDArray[np.float64]
 
@@ -31,11 +41,12 @@ _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """A cause with its fitted parameters, as the replay applies it."""
+    """A cause with its fitted parameters, as the replay applies it; a finer map with its bumps."""
 
     id: str
     values: dict[str, float]
     channel: str | None = None
+    bumps: Bumps | None = None
 
     @staticmethod
     def of(cause: Refined) -> Effect:
@@ -141,7 +152,27 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
             temperature, slope = term.mended(data.time_s, temperature, slope, effect.values)
         elif term.kind == "add":
             added = added + _simulated(run, effect)
+    for effect in effects:  # of the temperature that the map sees
+        if effect.bumps is not None:
+            added = added + effect.bumps(temperature)
     return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
+
+
+def with_bumps(
+    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
+) -> list[Effect]:
+    """The effects, the bumps of a finer map found beside the others on the samples `kept` (default: all)."""
+    if not any(effect.term.finer_map for effect in effects):
+        return list(effects)
+    parts = [samples(run, [e for e in effects if not e.term.finer_map]) for run in runs]
+    if kept is not None:
+        parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
+    data = cleaned(joined(parts))
+    try:
+        found = find_bumps(data, scaling_of(data))
+    except TrainingFailed:
+        return list(effects)
+    return [replace(effect, bumps=found) if effect.term.finer_map else effect for effect in effects]
 
 
 def added_range(runs: Sequence[Played], effects: Sequence[Effect]) -> list[float]:
@@ -177,9 +208,6 @@ def fit_extended(
     parts = [samples(run, effects) for run in runs]
     if kept is not None:
         parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
-    finer = [e.term.centers for e in effects if e.term.centers is not None]
-    if finer:
-        arguments = arguments | {"centers": max(finer)}
     data = joined(parts)
     return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
 

@@ -19,7 +19,7 @@ from ..attribute.refine import Refined
 from ..attribute.single_cycle import cycle_of
 from ..pipeline import search_of
 from ..screen.blocks import Records
-from .refit import Effect, Played, fit_extended, play_runs, scored_means
+from .refit import Effect, Played, fit_extended, play_runs, scored_means, with_bumps
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 
@@ -88,7 +88,7 @@ class Refitting:
     def left_out(self, held: list[Mask], count: int) -> Chain:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
         kept = [~m for m in held]
-        effects = [Effect.of(c) for c in self._chosen(held, count)]
+        effects = with_bumps(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
         stages = (effects[:k] for k in range(count + 1))
         return [
             self._residuals(kept, self.train, held, stage, beside=k > 0) for k, stage in enumerate(stages)
