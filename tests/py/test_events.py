@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose.screen.events import Event, accepted, events_of
+from gyrotc.diagnose.screen.turned import turned_runs
 from gyrotc.frontend.lasting_steps import steps_of
 from recordings import toml, write_csv
 
@@ -98,3 +100,45 @@ def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
     assert found["burst"].time_s[0] == pytest.approx(900.0, abs=5.0) and found["burst"].leave_out is not None
     assert found["dropout"].size[0] == pytest.approx(301.0, abs=2.0)
     assert found["thermometer_lost"].leave_out == pytest.approx((1500.0, 1800.0), abs=2.0)
+
+
+def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path:
+    """Four runs with ramps, an hour later in the programme each; the third is changed."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    for k in range(4):
+        columns = recording(rng, 1)
+        if k == 2 and change is not None:
+            change(columns)
+        write_csv(folder / f"{k}.csv", columns)
+    head = 'schema = 1\nserial = "A"\nearth_rate = "removed"'
+    (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(4)), head=head), "utf-8")
+    return folder
+
+
+def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = 1.3 * columns["rate_dph"]
+
+    dataset = load(ramps(tmp_path, louder))
+    (event,) = turned_runs(dataset)
+    assert (event.id, event.file, event.unit) == ("gain_change", "2.csv", "times")
+    assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
+    assert event.result().exclude is None, "the whole run goes, by its entry"
+    assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
+
+
+def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:
+    def turned(columns: Columns) -> None:
+        columns["rate_dph"] = -columns["rate_dph"]
+
+    (event,) = turned_runs(load(ramps(tmp_path, turned)))
+    assert (event.id, event.file) == ("sign_reversed", "2.csv")
+
+
+def test_runs_that_agree_are_told_nothing_of(tmp_path: Path) -> None:
+    def shifted(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] + 0.01
+
+    assert turned_runs(load(ramps(tmp_path))) == []
+    assert turned_runs(load(ramps(tmp_path, shifted))) == [], "an offset is no gain"

@@ -26,6 +26,7 @@ from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
 from .screen.events import Event, accepted, events_of
 from .screen.gather import records_of
+from .screen.turned import turned_runs
 from .summary import not_testable, result_of
 from .verdict import holds
 
@@ -78,7 +79,7 @@ def diagnose(
     say = progress or (lambda _: None)
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    events = events_of(whole)
+    events = [*turned_runs(dataset), *events_of(whole)]
     found = _diagnosed(
         accepted(whole, events) if accept_events else whole, options or _options_of(model), say
     )

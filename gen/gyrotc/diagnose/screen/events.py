@@ -26,6 +26,7 @@ _BURST_ROWS = 10  # fewer are outliers
 _JOINED = 1.5  # row periods between rows of one burst
 _LOST_S = 60.0  # a thermometer that stands still, or no rows, for longer
 _STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
+_OF_RUNS = ("sign_reversed", "axes_exchanged", "gain_change")
 _BLOCK_S = 10.0  # over which the level around a burst is taken
 
 
@@ -34,7 +35,8 @@ class Event:
     """One event.
 
     Attributes:
-        id: step, step_and_recover, burst, dropout, thermometer_jump or thermometer_lost.
+        id: step, step_and_recover, burst, dropout, thermometer_jump, thermometer_lost, or of a run as a whole
+            sign_reversed, axes_exchanged, gain_change.
         run: Number of its run among the training runs.
         file: Of that run.
         time_s: Value, and the limits between which it lies, s on the file's clock.
@@ -52,9 +54,14 @@ class Event:
     text: str
     leave_out: tuple[float, float] | None
 
+    @property
+    def whole_run(self) -> bool:
+        """Whether it is about a run as a whole, which then is left out as such."""
+        return self.id in _OF_RUNS
+
     def result(self) -> FoundEvent:
         """For the result."""
-        out = self.leave_out
+        out = None if self.whole_run else self.leave_out
         line = (
             f'exclude = [{{from_s = {out[0]!r}, to_s = {out[1]!r}, reason = "{self.id}"}}]' if out else None
         )
@@ -94,13 +101,15 @@ def events_of(dataset: Dataset) -> list[Event]:
 def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:
     """The data set without what the events say to leave out."""
     training = [run for run in dataset.runs if run.role == "train"]
+    whole = {event.file for event in events if event.whole_run}
+    kept = [run for run in dataset.runs if run.role != "train" or run.file not in whole]
 
     def without(run: Run) -> Run:
-        of_run = [e for e in events if e.leave_out is not None and training[e.run] is run]
+        of_run = [e for e in events if e.leave_out is not None and not e.whole_run and training[e.run] is run]
         gaps = tuple(Exclusion(*e.leave_out, e.id) for e in of_run if e.leave_out is not None)
         return replace(run, exclude=(*run.exclude, *gaps))
 
-    return replace(dataset, runs=tuple(map(without, dataset.runs)))
+    return replace(dataset, runs=tuple(map(without, kept)))
 
 
 def _steps(run: Run, steps: Sequence[Step], first_s: float, last_s: float) -> Iterator[Event]:
