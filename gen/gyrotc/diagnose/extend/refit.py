@@ -20,6 +20,7 @@ from ...train.bumps import Bumps, find_bumps
 from ...train.channels import channel_shown
 from ...train.data import cleaned, joined, scaling_of
 from ...train.fitting import FrontEnd, samples_of
+from ...train.process import fit_process
 from ...train.simple import without_rate
 from ..attribute.refine import Refined
 
@@ -36,6 +37,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
 _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 
@@ -209,7 +211,42 @@ def fit_extended(
     if kept is not None:
         parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
     data = joined(parts)
+    offsets = [e.values["std_dph"] for e in effects if e.term.kind == "random"]
+    if offsets:
+        data = levelled(data, max(offsets))
     return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
+
+
+def levelled(data: TrainingData, std_dph: float) -> TrainingData:
+    """Samples without the offset of each run, as far as a map of the evidence process beside them says what it is.
+
+    Args:
+        data: Samples of one run or more.
+        std_dph: Standard deviation of the offsets, deg/h.
+    """
+    out = data
+    _, index = np.unique(data.run, return_inverse=True)
+    count = np.bincount(index)
+    for _ in range(_LEVELLINGS):
+        try:
+            samples = cleaned(out)
+            process = fit_process(samples, scaling_of(samples))
+        except TrainingFailed:
+            break
+        at = scaling_of(samples).normalise(data.temperature_c, data.slope_c_per_min)
+        left = data.bias_dph - process.mean_dph(*at)
+        share = std_dph**2 / (std_dph**2 + float(np.var(left)) / count)
+        offset = share * np.bincount(index, left) / count
+        out = replace(data, bias_dph=data.bias_dph - (offset - offset.mean())[index])
+    return out
+
+
+def _re_zeroed(rest: Array, time_s: Array, effects: Sequence[Effect]) -> Array:
+    """Residuals after a rest at their start: its mean counts as far as the offsets are larger than its noise."""
+    variance = max(e.values["std_dph"] for e in effects if e.term.kind == "random") ** 2
+    first = rest[time_s < time_s[0] + _RE_ZERO_S]
+    noise = float(np.mean(np.diff(rest) ** 2)) / 2.0 / len(first) if len(rest) > 1 else 0.0
+    return np.asarray(rest - first.mean() * variance / (variance + noise))
 
 
 def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
@@ -240,7 +277,7 @@ def scored_means(
         data = samples(run, effects)
         rest = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
         if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
-            rest = rest - rest[data.time_s < data.time_s[0] + _RE_ZERO_S].mean()
+            rest = _re_zeroed(rest, data.time_s, effects)
         out.append(
             average(
                 data.time_s,
