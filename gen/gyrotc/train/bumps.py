@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.optimize import least_squares
 
 from ..metrics import MAD_TO_SIGMA
 from .data import Scaling, TrainingData
@@ -163,6 +161,8 @@ class _Search:
 
     def _refined(self, x: Floats) -> tuple[Floats, float]:
         """Places and widths by least squares, and the sum of squares that is left."""
+        from scipy.optimize import least_squares
+
         n = x.size // 2
         low = np.r_[np.full(n, self.range[0] - _BEYOND_C), np.full(n, np.log(_LIMITS_C[0]))]
         high = np.r_[np.full(n, self.range[1] + _BEYOND_C), np.full(n, np.log(_LIMITS_C[1]))]
@@ -191,6 +191,8 @@ class _Search:
 
 def _splines(t: Floats, span: tuple[float, float], step_c: float) -> Floats:
     """Cubic B-splines over a range with knots about `step_c` apart."""
+    from scipy.interpolate import BSpline  # with what it imports: not for diagnoses without a finer map
+
     inner = np.linspace(span[0] - 1e-6, span[1] + 1e-6, max(3, 1 + round((span[1] - span[0]) / step_c)))
     knots = np.r_[[inner[0]] * 3, inner, [inner[-1]] * 3]
     return np.asarray(BSpline.design_matrix(np.clip(t, *span), knots, 3).toarray())
