@@ -15,9 +15,9 @@ from gyrotc.dataset import load
 from gyrotc.train import Fit, TrainingData, fit, predict
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guard import objection
-from gyrotc.train.ladder import RUNGS
+from gyrotc.train.ladder import RUNGS, Ladder
 from gyrotc.train.simple import SIMPLE, fit_simple
-from gyrotc.train.spans import history_folds
+from gyrotc.train.spans import Fold, history_folds
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 
@@ -73,6 +73,26 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
     assert finding["id"] == "does_not_generalise"
     assert "3 whole runs" in finding["text"] and "Repeat" in finding["text"]
     assert "nothing is shown to be better" in found.reason
+
+
+def ladder(**rms: list[float]) -> Ladder:
+    """What each rung leaves on four runs; others leave what a constant does. The noise is 1."""
+    table = np.array([rms.get(name, rms["constant"]) for name in RUNGS]).T
+    whole = np.ones(4, dtype=bool)
+    folds = [Fold("run", k, k, whole, whole) for k in range(4)]
+    return Ladder(folds, table, 0.5 * np.log(table**2 + 1.0), 1.0, np.arange(4))
+
+
+def test_what_is_within_a_standard_error_but_worse_than_a_cubic_is_not_taken() -> None:
+    """Four stretches that scatter have a standard error of a third: simpler is no reason to lose that."""
+    constant, cubic = [900.0, 1100.0, 1000.0, 950.0], [20.0, 90.0, 30.0, 60.0]
+    scattered = [45.0, 60.0, 80.0, 55.0]
+    assert ladder(constant=constant, linear=scattered, cubic=cubic).chosen() == "cubic"
+    assert ladder(constant=constant, linear=[10.0, 40.0, 15.0, 30.0], cubic=cubic).chosen() == "linear"
+    assert ladder(constant=constant, mrbf_t=[19.0, 91.0, 29.0, 60.0], cubic=cubic).chosen() == "cubic"
+    assert ladder(constant=constant, cubic=cubic, cubic_slope=[x * 0.995 for x in cubic]).chosen() == "cubic"
+    assert ladder(constant=constant, linear=[1.1, 0.95, 1.2, 0.9], cubic=[1.0] * 4).chosen() == "linear"
+    assert ladder(constant=[30.0, 40.0, 35.0, 20.0], cubic=[300.0, 5.0, 400.0, 9.0]).chosen() == "constant"
 
 
 def test_no_fold_is_a_random_sample_and_every_one_keeps_its_distance() -> None:
