@@ -133,6 +133,13 @@ lot: setup
 uncertainty: setup
 	@$(PYTHON) -m bench.budget docs
 
+## what channels gain on simulated gyros, beside other methods (in build/bench, minutes a gyro): docs/results-channels.md
+signals:
+	@tools/setup.sh test
+	@[ -x build/bench/bin/python ] || python3 -m venv build/bench
+	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
+	@build/bench/bin/python -m bench.signals docs
+
 ## a thousand gyros through gyrotc fleet, a million calibrations in a catalogue: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
@@ -176,4 +183,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import fleet lot uncertainty kills mutants blind odd cycles packages dist site clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot uncertainty kills mutants blind odd cycles packages dist site clean

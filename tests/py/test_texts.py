@@ -298,6 +298,7 @@ def _write_unit(
     for name, content in {
         "evaluate": evaluation,
         "verify": verification,
+        "training": _TRAINING,
         "manifest": _MANIFEST,
         "limits": _LIMITS,
         "changes": _CHANGES,
@@ -324,6 +325,52 @@ def test_the_report_of_a_build_and_of_axes(
     _same_page(axes)
 
 
+_TRAINING: dict[str, Any] = {
+    "schema": "gyrotc.fit/1",
+    "gyrotc_version": "1",
+    "serial": "s",
+    "axis": None,
+    "units": {"declared": {}, "trusted": []},
+    "method": "mrbf",
+    "seed": 0,
+    "samples": 10,
+    "block_s": 10.0,
+    "average_s": 100.0,
+    "centers": 1,
+    "table_bytes": 20,
+    "sum_abs_weights_dph": 1.0,
+    "predicted_rms_ratio": None,
+    "prediction_withheld": "text",
+    "noise_floor_dph": None,
+    "spans": [],
+    "left_out": None,
+    "left_out_spans": [],
+    "noise": {
+        "quantisation_arcsec": None,
+        "arw_deg_per_sqrt_h": None,
+        "bias_instability_dph": None,
+        "rate_random_walk_dph_per_sqrt_h": None,
+        "allan": [],
+    },
+    "sensitivity": {"bias_dph_per_c": None, "bias_dph_per_c_per_min": None, "residual_rms_dph": None},
+    "ladder": [],
+    "reason": "text",
+    "generalises": None,
+    "findings": [],
+    "curves": {},
+    "channels": [
+        {"name": "text", "verdict": "refused", "reason": "text"},
+        {
+            "name": "text",
+            "verdict": "taken",
+            "reason": "text",
+            "slope_dph_per_unit": 1e-3,
+            "left_out_rms_before_dph": 2e-3,
+            "left_out_rms_after_dph": 1e-3,
+            "share_of_variance": 0.5,
+        },
+    ],
+}
 _INTERVAL = {"value": 1.0, "low": 0.5, "high": 2.0}
 _DIAGNOSIS: dict[str, Any] = {
     "schema": "gyrotc.diagnose/1",
