@@ -140,6 +140,11 @@ signals:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench.signals docs
 
+## new units from one run and their lot, beside simple ways (a quarter of an hour; SEED=n repeats a draw): docs/results.md
+lot-prior: setup
+	@$(PYTHON) -c "import sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench]"
+	@$(PYTHON) -m bench.lot_prior docs $${SET_SEED:+"$$SET_SEED"}
+
 ## a thousand gyros through gyrotc fleet, a million calibrations in a catalogue: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench.fleet docs
@@ -183,4 +188,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot uncertainty kills mutants blind odd cycles packages dist site clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind odd cycles packages dist site clean

@@ -25,6 +25,8 @@ from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.fleet import FleetEntry, FleetSummary
 from gyrotc.results.imported import ImportedFiles
 from gyrotc.results.limits import HeldLimits
+from gyrotc.results.lot import Lot
+from gyrotc.results.lot_plan import LotPlan
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.marker import Marker
 from gyrotc.results.planned import Plan
@@ -51,6 +53,8 @@ RESULTS: dict[str, type[Part]] = {
     "fleet": FleetSummary,
     "import": ImportedFiles,
     "limits": HeldLimits,
+    "lot": Lot,
+    "lot-plan": LotPlan,
     "manifest": Manifest,
     "plan": Plan,
     "result": Marker,

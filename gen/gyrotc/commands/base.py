@@ -104,6 +104,10 @@ BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, 
 NumericOption = Annotated[
     str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
 ]
+LotOption = Annotated[
+    Path | None,
+    typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs."),
+]
 AppliedOption = Annotated[
     Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import CheckFailed, InputError
-from .base import JsonOption, OutOption, app, progress, tell, time_left, write_json
+from .base import JsonOption, LotOption, OutOption, app, progress, tell, time_left, write_json
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
@@ -40,6 +41,7 @@ def fleet(
     gathered: Annotated[
         bool, typer.Option("--gather", help="Only the summary of what shares have done.")
     ] = False,
+    lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
@@ -49,11 +51,14 @@ def fleet(
     Example: gyrotc fleet recordings --out fleet
     """
     from ..jobs.fleet import gather, load_manifest, run_fleet, run_share, share_of, summary_of
+    from ..jobs.lot import load_lot
 
     share = share_of(shard) if shard else None
     if share and gathered:
         raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
+    if lot is not None:
+        wanted = replace(wanted, options=replace(wanted.options, lot=load_lot(lot)))
     with progress() as say:
         told = _Told(len(wanted.units), say)
         if share:

@@ -19,6 +19,7 @@ from .base import (
     ChannelsOption,
     DatasetArg,
     JsonOption,
+    LotOption,
     MethodOption,
     NumericOption,
     OutOption,
@@ -39,6 +40,7 @@ from .results import (
     evaluation_table,
     ladder_lines,
     limit_lines,
+    lot_lines,
     span_lines,
     summary,
     verify_table,
@@ -70,6 +72,7 @@ def build(
     limits: Annotated[
         Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met.")
     ] = None,
+    lot: LotOption = None,
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
     ] = None,
@@ -77,15 +80,17 @@ def build(
         bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
     ] = False,
     json_file: JsonOption = None,
-) -> None:
+) -> None:  # long: the options of the main job, handed on one by one
     """The main job: check, fit, emit, verify, evaluate, report.
 
     Example: gyrotc build recordings --out result
     """
     from ..jobs.build import build as run
+    from ..jobs.lot import load_lot
     from ..train.fitting import FitOptions
 
-    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels)
+    shared = load_lot(lot) if lot else None
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
     with progress() as say:
         results = run(
             dataset,
@@ -126,6 +131,7 @@ def _print_built(result: Built) -> None:
         *span_lines(result.training),
         *ladder_lines(result.training),
         *channel_lines(result.training),
+        *lot_lines(result.training),
     ):
         tell(line)
     for name, reason in result.refused.items():

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..outputs import result_folder
-from .base import JsonOption, SeedOption, app, progress, show, tell, write_json
+from ..errors import InputError
+from ..outputs import json_text, result_folder, write_atomically
+from .base import JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .plan_lines import limits_of, pair_of, plan_parts
 
 
@@ -36,13 +38,18 @@ def plan(
     add_thermometer: Annotated[
         bool, typer.Option("--add-thermometer", help="Where a further thermometer would tell most.")
     ] = False,
+    lot: LotOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Say what a programmed profile will be able to tell, before it is run.
+    """Say what a programmed profile will be able to tell, before it is run; with a lot, the shortest programme.
 
     Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
+    Example: gyrotc plan paper --lot lot.json --require accuracy=2e-4 --out programme
     """
+    if lot is not None:
+        _plan_with_lot(profile, lot, require or (), out, json_file)
+        return
     from ..pages.plan_page import write_plan
     from ..plan import plan as run
 
@@ -66,3 +73,33 @@ def plan(
             show(part)
     if out is not None:
         tell(f"report: {out / 'report.html'}")
+
+
+def _plan_with_lot(
+    scenario: str, path: Path, require: Sequence[str], out: Path | None, json_file: Path | None
+) -> None:
+    """`gyrotc plan --lot`: the shortest chamber programme of an accuracy, as a file and in words."""
+    from ..jobs.lot import load_lot
+    from ..plan.with_lot import plan_with_lot, programme_csv, programme_text
+
+    required = limits_of(require)
+    if set(required) != {"accuracy"}:
+        raise InputError("--require", ", ".join(required) or "nothing", "with --lot: accuracy=... in deg/h")
+    with result_folder(out, "plan") if out else nullcontext() as stage:
+        result = plan_with_lot(load_lot(path), scenario, required["accuracy"])
+        if stage:
+            write_atomically(stage.folder / "plan.json", json_text(result.content()))
+            write_atomically(stage.folder / "programme.csv", programme_csv(result.with_lot))
+            write_atomically(stage.folder / "programme.txt", programme_text(result.with_lot))
+    write_json(json_file, result.content())
+    tell(f"the lot alone, before any run: {result.before_dph:.3g} deg/h (1 sigma over the envelope)")
+    for name, found in (("with the lot", result.with_lot), ("without", result.without)):
+        short = "" if found.reached else ", which is all that a day reaches"
+        tell(
+            f"{name}: {found.hours:.1f} h for {found.sigma_dph:.3g} deg/h, RMS {found.rms_over_floor:.3f} x noise "
+            f"floor{short}"
+        )
+    for line in programme_text(result.with_lot).splitlines():
+        tell(line)
+    if out is not None:
+        tell(f"{out / 'programme.csv'}: set points over time")

@@ -51,6 +51,12 @@ def span_lines(training: Training) -> Iterator[str]:
             yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
 
 
+def lot_lines(training: Training) -> Iterator[str]:
+    """What came from the lot and what from the unit's own runs."""
+    if training.lot is not None:
+        yield f"lot: {training.lot.text}"
+
+
 def ladder_lines(training: Training) -> Iterator[str]:
     """Which correction was chosen, why, and what each leaves on history that it has not seen."""
     if training.ladder:

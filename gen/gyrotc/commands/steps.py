@@ -21,6 +21,7 @@ from .base import (
     DatasetArg,
     DirArg,
     JsonOption,
+    LotOption,
     MethodOption,
     NumericOption,
     OutOption,
@@ -40,6 +41,7 @@ from .results import (
     evaluation_table,
     file_notes,
     ladder_lines,
+    lot_lines,
     prediction_line,
     span_lines,
     verify_notes,
@@ -62,6 +64,7 @@ def fit(
     channels: ChannelsOption = False,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
+    lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
@@ -69,10 +72,13 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..dataset import load
+    from ..jobs.lot import load_lot
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
-    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels)
+    options = FitOptions(
+        method, seed, centers, rho, block_s, average_s, channels, load_lot(lot) if lot else None
+    )
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
@@ -85,6 +91,7 @@ def fit(
         *span_lines(fitted.training),
         *ladder_lines(fitted.training),
         *channel_lines(fitted.training),
+        *lot_lines(fitted.training),
     ):
         tell(line)
     for finding in fitted.training.findings:

@@ -107,6 +107,8 @@ def build(
     say = progress or (lambda _: None)
     say("reading")
     known = applied_of(applied) if applied else None
+    if extend and options.lot is not None:
+        raise InputError("--extend", "with --lot: a lot knows maps alone", "one of the two")
     order = _Order(numerics, extend, load_limits(limits) if limits else None, previous)
     axes = axes_of(source) if axis == "all" else ()
     if axis == "all" and not axes:

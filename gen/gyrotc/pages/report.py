@@ -22,6 +22,7 @@ from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
 from ..train.left_out import exclude_text
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
+from .prior_plots import prior_and_posterior
 from .unit import UnitResults, unit_in
 from .words import (
     bound_words,
@@ -135,6 +136,7 @@ def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:
         "bias": _bias_picture(folder, unit),
         "map": map_with_centers(unit.model),
         "curve": curve_by_size(unit.training) if unit.training else None,
+        "lot": prior_and_posterior(unit.training) if unit.training else None,
         "allan": allan_deviation(unit.training.noise) if unit.training else None,
     }
 

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from .base import Amount, Axis, Count, Figure, Part, Result
 from .evaluation import FoundIn, Pooled
+from .lot import LotUse
 
 __all__ = [
     "AllanPoint",
@@ -15,6 +16,7 @@ __all__ = [
     "ChannelTried",
     "DeclaredUnits",
     "LeftOutRows",
+    "MapMeans",
     "NoiseTerms",
     "Outliers",
     "Rung",
@@ -116,6 +118,17 @@ class Outliers(Part):
     stretches: tuple[LeftOutRows, ...] = Field(description="the first 200")
 
 
+class MapMeans(Part):
+    """What the runs say of the map, gathered: what a lot is learnt from."""
+
+    temperature_c: tuple[float, ...] = Field(description="of each mean, C")
+    slope_c_per_min: tuple[float, ...] = Field(description="its dT/dt, C/min")
+    bias_dph: tuple[float, ...] = Field(description="its bias, deg/h")
+    count: tuple[float, ...] = Field(description="how many means of `mean_s` are behind it")
+    sigma_dph: _Length = Field(description="noise of one of these, deg/h")
+    mean_s: _Length = Field(description="their length, s")
+
+
 class Training(Result):
     """How a model was fitted (`gyrotc fit`)."""
 
@@ -158,3 +171,7 @@ class Training(Result):
     outliers: Outliers | None = Field(
         default=None, description="rows that were left out; absent of an extended model"
     )
+    means: MapMeans | None = Field(
+        default=None, description="what the runs say of the map; absent of an extended model"
+    )
+    lot: LotUse | None = Field(default=None, description="with `--lot`: what the lot did for this unit")

@@ -13,6 +13,8 @@ from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
 from .linear import fit_mlr, fit_poly
+from .lot.prior import LotPrior
+from .lot.use import WithLot, fit_with_lot
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .ols import SIZE_RULES, fit_ols
 from .process import TrainingFailed
@@ -58,7 +60,9 @@ def fit(
     size_rule: str | None = None,
     average_s: float = 100.0,
     power_on: NDArray[np.int64] | None = None,
-) -> Fit:
+    lot: LotPrior | None = None,
+    serial: str = "",
+) -> Fit:  # long: the ways to a map, one after the other
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
 
     Args:
@@ -71,6 +75,9 @@ def fit(
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
         power_on: For the ladder: number of the power-on of each run, by its index; None: each run is one.
+        lot: What units of the type share; for `AUTO` and "mrbf" without a number of centers. A unit that does not fit
+            it is fitted without it, with a finding.
+        serial: The unit's, to tell whether the lot has seen it.
 
     Raises:
         InputError: Bad samples or arguments.
@@ -83,7 +90,13 @@ def fit(
     findings: list[dict[str, object]] = []
     rows: list[dict[str, object]] = []
     reason = ""
-    if np.ptp(samples.temperature_c) < LEAST_SPAN_C:
+    given: WithLot | None = None
+    if lot is not None and method in (AUTO, "mrbf") and centers is None:
+        given = fit_with_lot(samples, scaling, lot, serial, seed=seed, average_s=average_s)
+        findings += given.findings
+    if given is not None and given.map is not None:
+        (outcome, scaling), method, reason = given.map, "mrbf", "the unit fits its lot"
+    elif np.ptp(samples.temperature_c) < LEAST_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
         method = "constant" if method == AUTO else method
@@ -100,7 +113,9 @@ def fit(
     bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
     residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
     floor = floor_dph(samples, residual, average_s)
-    return Fit(method, outcome, scaling, findings, floor, average_s, mean, rows, reason)
+    return Fit(
+        method, outcome, scaling, findings, floor, average_s, mean, rows, reason, given.use if given else None
+    )
 
 
 def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:

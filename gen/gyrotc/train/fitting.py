@@ -21,7 +21,8 @@ from ..frontend import Blocks, run_blocks
 from ..metrics import Averages, pooled
 from ..model import Model
 from ..results.evaluation import FoundIn
-from ..results.training import DeclaredUnits, LeftOutRows, NoiseTerms, Rung, Training
+from ..results.lot import Lot
+from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
 from . import (
     AUTO,
     NETWORK_METHODS,
@@ -36,9 +37,11 @@ from . import (
 )
 from .bumps import Bumps
 from .channels import chosen_channels, seen_by_target, with_channels
-from .data import joined
+from .data import cleaned, joined, scaling_of
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .left_out import outliers_of, stretches_left_out
+from .lot.means import unit_means
+from .lot.prior import prior_of
 from .noisefloor import noise_terms, sensitivities, stretches
 from .rules import rezero_dph
 from .spans import Span, training_spans
@@ -65,6 +68,7 @@ _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse 
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
 # of T and of dT/dt: 80 words in a table; an odd number of slopes, so that rest has cells of its own
 _UNCERTAINTY_CELLS = (8, 5)
+_MEANS_DIGITS = 8  # of gathered means: a bias may be a million times its noise
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
@@ -84,6 +88,7 @@ class FitOptions:
     block_s: float = 10.0
     average_s: float = 100.0
     channels: bool = False
+    lot: Lot | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +168,10 @@ def fit_dataset(
             f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
         )
         raise InputError("--method", repr(options.method), expected)
+    if options.lot is not None and options.lot.axis != dataset.axis:
+        raise InputError(
+            "--lot", f"of axis {options.lot.axis}", f"a lot of axis {dataset.axis}, as the recordings"
+        )
     runs = [run for run in dataset.runs if run.role == "train"]
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
@@ -193,13 +202,15 @@ def fit_dataset(
         choice = chosen_channels(dataset, data, whole, power_ons(stretches), options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
-    fitted = _fit(data, options, power_on=power_ons(stretches))
+    fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
     spans = training_spans(stretches, data)
-    left_out = _left_out(data, spans, replace(options, method=fitted.method), say) if spans else None
+    lot = options.lot if fitted.lot and fitted.lot.accepted else None
+    left_out = _left_out(data, spans, replace(options, method=fitted.method, lot=lot), say) if spans else None
     front = replace(front, stuck_s=stuck_after_s(longest_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
-    told: dict[str, Any] = {"outliers": outliers_of(left_out_rows, data)}
+    told: dict[str, Any] = {"outliers": outliers_of(left_out_rows, data), "means": _means(data, fitted)}
+    told |= {"lot": fitted.lot} if fitted.lot else {}
     if choice:
         told["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
@@ -217,7 +228,27 @@ def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
     return np.array([files.index(run.file) for run in runs], dtype=np.int64)
 
 
-def _fit(data: TrainingData, options: FitOptions, *, power_on: NDArray[np.int64] | None = None) -> Fit:
+def _means(data: TrainingData, fitted: Fit) -> MapMeans:
+    """What a lot is learnt from, in as many digits as its noise leaves."""
+    samples = cleaned(data)
+    found, mean_s = unit_means(samples, scaling_of(samples), fitted.outcome.process)
+
+    def rounded(values: NDArray[np.float64]) -> tuple[float, ...]:
+        return tuple(float(f"{v:.{_MEANS_DIGITS}g}") for v in values)
+
+    return MapMeans(
+        temperature_c=rounded(found.temperature_c),
+        slope_c_per_min=rounded(found.slope_c_per_min),
+        bias_dph=rounded(found.bias_dph),
+        count=rounded(found.count),
+        sigma_dph=found.sigma_dph,
+        mean_s=mean_s,
+    )
+
+
+def _fit(
+    data: TrainingData, options: FitOptions, *, power_on: NDArray[np.int64] | None = None, serial: str = ""
+) -> Fit:
     return fit(
         data,
         method=options.method,
@@ -226,6 +257,8 @@ def _fit(data: TrainingData, options: FitOptions, *, power_on: NDArray[np.int64]
         rho=options.rho,
         average_s=options.average_s,
         power_on=power_on,
+        lot=prior_of(options.lot) if options.lot else None,
+        serial=serial,
     )
 
 
@@ -288,6 +321,8 @@ def model_of(  # long: one line for each field of model.json
     meta["earth_rate"] = _earth_rate(dataset)
     mean = float(np.average(data.bias_dph, weights=data.weight))
     warnings = [*dataset.warnings, earth_rate_warning(dataset.earth_rate, mean)]
+    if fitted.lot is not None:
+        meta["lot"] = f"{fitted.lot.checksum[:16]}: {fitted.lot.text}"
     meta["warnings"] = [warning for warning in warnings if warning]
     known = _uncertainty(data, fitted, front.block_s, added)
     return Model.from_dict(

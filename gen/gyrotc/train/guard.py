@@ -44,6 +44,8 @@ def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average
         if apart.max() > _SIGMAS:
             k = int(np.argmax(apart))
             return f"it leaves the process that it stands for by {apart[k]:.3g} sigma at {_place(t[k], r[k])}"
+        if process.asked is not None:  # a lot knows what lies beyond the unit's own means
+            return ""
     means = average(samples, average_s).bias_dph
     low, high = float(means.min()), float(means.max())
     beyond = np.maximum(low - values, values - high)

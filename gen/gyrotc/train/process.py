@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from ..metrics import MAD_TO_SIGMA
 from .data import Bins, Scaling, TrainingData, average, gather
 from .residual_noise import difference_sigma
 
-__all__ = ["MEAN_S", "Process", "TrainingFailed", "conditioned", "fit_process"]
+__all__ = ["MEAN_S", "Asked", "MapModel", "Process", "TrainingFailed", "conditioned", "fit_process"]
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +46,39 @@ class TrainingFailed(GyrotcError):
     """The equations of a fit could not be solved, or what came out must not be used; the text says why."""
 
 
+class MapModel(Protocol):
+    """What is asked of a model of the map in standardised units: the evidence model, or a lot with a unit's runs."""
+
+    @property
+    def log_parameters(self) -> Floats: ...
+    @property
+    def sigma(self) -> float: ...
+    @property
+    def freedom(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def evaluations(self) -> int: ...
+    def mean(self, t: Floats, r: Floats) -> Floats: ...
+    def variance(self, t: Floats, r: Floats) -> Floats: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Where corrections will be asked for, as a lot's units show it.
+
+    Attributes:
+        temperature_c, slope_c_per_min: Places, shape (n,).
+        share: Of the time, the same shape.
+        between_dph: Standard deviation of the constant from power-on to power-on, by the lot's units, deg/h.
+    """
+
+    temperature_c: Floats
+    slope_c_per_min: Floats
+    share: Floats
+    between_dph: float
+
+
 @dataclass(frozen=True, slots=True)
 class Process:
     """A conditioned process and the samples that it has seen.
@@ -59,9 +93,10 @@ class Process:
         kept: False for outliers.
         center, spread: deg/h.
         seconds: Length of a mean, s.
+        asked: With a lot: where its units were; None: where the samples are.
     """
 
-    model: _core.EvidenceModel
+    model: MapModel
     bins: Bins
     t: Floats
     r: Floats
@@ -72,6 +107,7 @@ class Process:
     center: float
     spread: float
     seconds: float
+    asked: Asked | None = None
 
     def mean_dph(self, t: Floats, r: Floats) -> Floats:
         """Mean at normalised inputs, deg/h."""

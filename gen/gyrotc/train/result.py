@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..results.lot import LotUse
 from .data import Scaling
 from .process import Process
 
@@ -53,6 +54,7 @@ class Fit:
         fallback_dph: Weighted mean of the training bias, deg/h.
         ladder: What was tried and chosen from, where the method was left to the data; as in `training.json`.
         reason: Why this one was chosen, in words.
+        lot: What a lot did for it, where one was given.
     """
 
     method: str
@@ -64,6 +66,7 @@ class Fit:
     fallback_dph: float
     ladder: Sequence[Mapping[str, Any]] = ()
     reason: str = ""
+    lot: LotUse | None = None
 
     @property
     def networks(self) -> Sequence[Network]:

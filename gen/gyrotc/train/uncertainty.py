@@ -40,11 +40,14 @@ _SIGNIFICANT = float(chdtri(2, 0.05))  # a level and a run that differs most: tw
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
-    """`coverage` of `model.json`: cells of the envelope (T, dT/dt) that hold training samples."""
+    """`coverage` of `model.json`: cells of the envelope (T, dT/dt) that hold training samples, its own or a lot's."""
     t = _index(data.temperature_c, fit.scaling.temperature_c, cells[0])
     r = _index(data.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
     seen = np.zeros(cells[::-1], dtype=bool)
     seen[r, t] = True
+    if fit.outcome.process and (asked := fit.outcome.process.asked):
+        r = _index(asked.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
+        seen[r, _index(asked.temperature_c, fit.scaling.temperature_c, cells[0])] = True
     return {"cells": list(cells), "rows": ["".join("1" if x else "0" for x in row) for row in seen]}
 
 
@@ -74,9 +77,9 @@ def uncertainty(
     t, r = _points(fit)
     at_points = _variance(process, fit, t, r, scale)
     covered = _covered(data, fit, t, r)
-    index, place = _cell(fit, cells, samples.temperature_c, samples.slope_c_per_min), _cell(fit, cells, t, r)
+    place = _cell(fit, cells, t, r)
     everywhere = _means(place, at_points, np.ones(len(t)), cells, np.zeros(cells[::-1]))
-    seen = _means(index, at_samples, samples.weight, cells, everywhere)
+    seen = _means(*_asked(samples, process, fit, cells, scale), cells, everywhere)
     unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
     points = t[covered], r[covered]
     added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
@@ -87,6 +90,16 @@ def uncertainty(
         "uncovered": np.sqrt(unseen + between).tolist(),
         "rules": rules_of(known, block_s),
     }
+
+
+def _asked(
+    samples: TrainingData, process: Process, fit: Fit, cells: tuple[int, int], scale: float
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Where corrections are asked for, as the samples or a lot's units show: cells, variances, weights."""
+    t, r, weight = samples.temperature_c, samples.slope_c_per_min, samples.weight
+    if process.asked is not None:
+        t, r, weight = process.asked.temperature_c, process.asked.slope_c_per_min, process.asked.share
+    return _cell(fit, cells, t, r), _variance(process, fit, t, r, scale), weight
 
 
 def _variance(process: Process, fit: Fit, t: Floats, r: Floats, scale: float) -> Floats:
@@ -146,7 +159,9 @@ def _parts(samples: TrainingData) -> NDArray[np.int64]:
 
 
 def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float, float]:
-    """(κ², τ² in (deg/h)²) from parts left out in turn; (1, 0) where that cannot be done."""
+    """(κ², τ² in (deg/h)²) from parts left out in turn; (1, 0) where that cannot be done. A lot brings its own."""
+    if whole.asked is not None:
+        return 1.0, whole.asked.between_dph**2
     parts = _parts(samples)
     rows = []
     for k in range(int(parts.max()) + 1):

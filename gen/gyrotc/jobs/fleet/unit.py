@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from ...dataset import Dataset, load
@@ -37,7 +37,9 @@ class Task:
     def key(self) -> str:
         """Changes with the contents of the recordings, the options, the limits and the program."""
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
-        options = [self.unit.axis, asdict(self.fleet.options), self.fleet.numerics, limits, self.full]
+        lot = self.fleet.options.lot
+        plain = asdict(replace(self.fleet.options, lot=None)) | ({"lot": lot.checksum} if lot else {})
+        options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 

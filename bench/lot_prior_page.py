@@ -1,0 +1,100 @@
+"""The section of docs/results.md about lots, from every draw in docs/results/lot-prior-*.json."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+__all__ = ["section", "write_page"]
+
+_MARKS = re.compile(r"<!-- lot-prior -->\n.*?<!-- /lot-prior -->", re.DOTALL)
+_WAYS = {
+    "lot": "**with the lot**",
+    "auto": "without: the ladder (`build`)",
+    "mrbf": "without: a map (`--method mrbf`)",
+    "mean curve + offset": "mean curve + offset",
+    "PCA regression": "PCA regression",
+    "pooled GPR": "pooled GPR (scikit-learn)",
+}
+_HEAD = " ".join(
+    (
+        "## A new unit from one run and its lot (`make lot-prior`)\n\n60 fully calibrated units teach ([lot.md](lot.md)),",
+        "40 others are calibrated from one run of 2.5 h (5 C/min, 0 → 60 → −40 C) and judged on the full exam of six",
+        "environments. Lots are simulated from physics ([simulation.md](simulation.md), section 6); nothing was tuned on",
+        "these seeds, and every draw is kept. RMS is over the floor of the noise that was really added; the error is the",
+        "map's own, RMS of (map − truth), over the same. Median / worst of the units.\n",
+    )
+)
+
+
+def _pair(values: Sequence[float], digits: int) -> str:
+    return f"{np.median(values):.{digits}f} / {np.max(values):.{digits}f}"
+
+
+def _ways(units: Sequence[dict[str, Any]], name: str) -> str:
+    rows = [u[name] for u in units if name in u]
+    lines = ["| way | RMS ÷ floor | error |", "| --- | --- | --- |"]
+    for way, text in _WAYS.items():
+        if found := [row[way] for row in rows if way in row]:
+            ratio, error = zip(*found, strict=True)
+            lines.append(f"| {text} | {_pair(ratio, 3)} | {_pair(error, 2)} |")
+    return "\n".join(lines)
+
+
+def _longer(units: Sequence[dict[str, Any]]) -> str:
+    told = []
+    for name in ("8 h", "six runs"):
+        rows = [u[name] for u in units if name in u]
+        (with_lot, its), (alone, other) = (
+            np.median([row[w] for row in rows], axis=0) for w in ("lot", "mrbf")
+        )
+        told.append(f"{name}: {with_lot:.3f} ({its:.2f}) with the lot, {alone:.3f} ({other:.2f}) without")
+    return f"Longer programmes, {len(rows)} units, medians of RMS ÷ floor (error): {'; '.join(told)}."
+
+
+def _case(case: dict[str, Any]) -> str:
+    units = case["units"]
+    short = [u["2.5 h"] for u in units]
+    coverage = np.mean([row["coverage"] for row in short], axis=0)
+    better = np.mean([row["lot"][0] <= row["auto"][0] for row in short])
+    accused = np.mean([not row["accepted"] for row in short])
+    lines = [
+        f"#### {case['case'][0].upper()}{case['case'][1:]} (family {case['family']:g})",
+        "",
+        f"`gyrotc lot`: {case['told']}. {case['learnt_s']:.1f} s of processor time.",
+        "",
+        _ways(units, "2.5 h"),
+        "",
+        f"Better with the lot than with the ladder alone: {better:.0%} of units. The truth lies within 1 / 1.96 sigma "
+        f"of the table at {coverage[0]:.1%} / {coverage[1]:.1%} of the exam. Own units refused: {accused:.1%}.",
+        _longer(units),
+    ]
+    if refused := case["strangers_refused"]:
+        told = ", ".join(f"{share:.1%} from {name}" for name, share in refused.items())
+        lines.append(f"Strangers (another lot's units) refused: {told}.")
+    return "\n".join(lines)
+
+
+def section(draws: dict[str, list[dict[str, Any]]]) -> str:
+    """The section, a part for each draw."""
+    parts = [_HEAD]
+    for seed, cases in draws.items():
+        parts.append(f"### Seed {seed}\n\n" + "\n\n".join(_case(case) for case in cases) + "\n")
+    return "\n".join(parts)
+
+
+def write_page(docs: Path) -> str:
+    """Writes the section into docs/results.md; returns it."""
+    files = sorted((docs / "results").glob("lot-prior-*.json"))
+    text = section({file.stem.rpartition("-")[2]: json.loads(file.read_text("utf-8")) for file in files})
+    page = docs / "results.md"
+    old = page.read_text("utf-8")
+    block = f"<!-- lot-prior -->\n{text}<!-- /lot-prior -->"
+    new = _MARKS.sub(lambda _: block, old) if _MARKS.search(old) else f"{old.rstrip()}\n\n{block}\n"
+    page.write_text(new, "utf-8")
+    return text

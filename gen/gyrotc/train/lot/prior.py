@@ -1,0 +1,174 @@
+"""A lot as a prior: from `lot.json` to the posterior of a unit, and whether the unit fits its lot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...results.lot import Lot, LotProcess
+from ..process import Asked
+from .basis import PARAMETERS, LotBasis
+from .learn import UnitMeans, sums_of
+from .model import evidence
+from .surprise import p_value, scores
+
+__all__ = ["LotPosterior", "LotPrior", "prior_of"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LotPrior:
+    """What a lot says of a unit that was not seen.
+
+    Attributes:
+        lot: The file.
+        basis: Functions of T and dT/dt.
+        means, covariances: Of the coefficients, one for each cluster.
+        share: Of units in each cluster.
+        asked: Where units of the lot were.
+        freedom: Degrees of freedom of its spread.
+    """
+
+    lot: Lot
+    basis: LotBasis
+    means: Floats
+    covariances: Floats
+    share: Floats
+    asked: Asked
+    freedom: float
+
+    def with_runs(self, unit: UnitMeans) -> LotPosterior:
+        """What lot and recordings of a unit say together, and how far the unit is from the lot."""
+        sums = sums_of([unit], self.basis, self.lot.center_dph, self.lot.unit_dph)
+        precision, moment = sums.precision[0], sums.moment[0]
+        found, likely, p = [], [], []
+        for mean, covariance, share in zip(self.means, self.covariances, self.share, strict=True):
+            shrunk = np.linalg.inv(np.linalg.inv(covariance) + precision)
+            found.append((mean + shrunk @ (moment - precision @ mean), shrunk))
+            likely.append(float(evidence(sums, mean, covariance)[0]) + float(np.log(share)))
+            p.append(p_value(*scores(precision, moment, mean, covariance), self.freedom))
+        weight = np.exp(np.array(likely) - max(likely))
+        weight /= weight.sum()
+        mean, covariance = _mixed(found, weight)
+        return LotPosterior(self, mean, covariance, int(np.argmax(weight)), max(p))
+
+    def alone(self) -> LotPosterior:
+        """What the lot says before any run."""
+        mean, covariance = _mixed([*zip(self.means, self.covariances, strict=True)], self.share)
+        return LotPosterior(self, mean, covariance, 0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class LotPosterior:
+    """A normal distribution of a unit's coefficients.
+
+    Attributes:
+        prior: Where it comes from.
+        mean, covariance: Shapes (n,) and (n, n), in units of the lot.
+        cluster: Number of the cluster that fits best.
+        p_value: Probability that a unit of the lot lies as far from it as the recordings do.
+    """
+
+    prior: LotPrior
+    mean: Floats
+    covariance: Floats
+    cluster: int
+    p_value: float
+
+    def mean_dph(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+        """Mean map, deg/h."""
+        lot = self.prior.lot
+        values = self.prior.basis.values(temperature_c, slope_c_per_min)
+        return np.asarray(lot.center_dph + lot.unit_dph * (values @ self.mean))
+
+    def variance_dph2(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+        """Its variance, (deg/h)²."""
+        values = self.prior.basis.values(temperature_c, slope_c_per_min)
+        return np.asarray(self.prior.lot.unit_dph**2 * np.sum((values @ self.covariance) * values, axis=1))
+
+    def rms_sigma_dph(self) -> float:
+        """1 sigma, RMS over where units of the lot were, deg/h."""
+        asked = self.prior.asked
+        variance = self.variance_dph2(asked.temperature_c, asked.slope_c_per_min)
+        return float(np.sqrt(np.average(variance, weights=asked.share)))
+
+
+def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
+    """The prior that a file holds.
+
+    Raises:
+        InputError: The file contradicts itself: lengths that differ, a covariance that is none.
+    """
+    f = lot.functions
+    kept = np.array(f.kept, dtype=np.int64)
+    basis = LotBasis(f.center_c, f.half_range_c, f.half_range_c_per_min, kept)
+    directions = (
+        np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
+    )
+    rest = np.diag(basis.variance(_log(lot.rest))) + directions.T @ directions
+    freedom = max(sum(c.units for c in lot.clusters) - len(lot.clusters) - len(directions), 3)
+    scale = lot.cross_validation.spread_scale * freedom / (freedom - 2.0)  # variance of Student's t
+    means, covariances = [], []
+    for number, cluster in enumerate(lot.clusters):
+        at = f"{where}, clusters, {number}"
+        lower = _triangle(cluster.covariance, len(kept), at)
+        if len(cluster.mean) != len(kept):
+            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{len(kept)}, one a function")
+        covariance = scale * (rest + lower + np.tril(lower, -1).T)
+        _check_positive(covariance, at)
+        means.append(np.array(cluster.mean))
+        covariances.append(covariance)
+    sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
+    if not (sizes > 0.0).all():
+        raise InputError(f"{where}, clusters", "one without units", "units in each")
+    shares = sizes / sizes.sum()
+    return LotPrior(
+        lot, basis, np.array(means), np.array(covariances), shares, _asked(lot, where), float(freedom)
+    )
+
+
+def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, Floats]:
+    """Mean and covariance of a mixture."""
+    mean = np.einsum("c,ci->i", weight, np.array([m for m, _ in found]))
+    spread = [w * (v + np.outer(m - mean, m - mean)) for w, (m, v) in zip(weight, found, strict=True)]
+    return np.asarray(mean), np.asarray(np.sum(spread, axis=0))
+
+
+def _log(process: LotProcess) -> Floats:
+    return np.asarray(np.log([getattr(process, name) for name in PARAMETERS]))
+
+
+def _triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:
+    lower = np.zeros((n, n))
+    if [len(row) for row in rows] != list(range(1, n + 1)):
+        raise InputError(f"{where}, covariance", "rows of other lengths", f"a lower triangle of {n} rows")
+    for k, row in enumerate(rows):
+        lower[k, : k + 1] = row
+    return lower
+
+
+def _check_positive(covariance: Floats, where: str) -> None:
+    try:
+        np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        raise InputError(f"{where}, covariance", "is not positive definite", "a covariance") from None
+
+
+def _asked(lot: Lot, where: str) -> Asked:
+    """Centers of the cells in which units were."""
+    rows = {len(row) for row in lot.occupancy}
+    shares = np.array(lot.occupancy, dtype=np.float64) if len(rows) == 1 else np.zeros((0, 0))
+    if shares.size == 0 or shares.min() < 0.0 or not shares.sum() > 0.0:
+        raise InputError(f"{where}, occupancy", "rows that differ in length, or no shares", "shares of time")
+    n_r, n_t = shares.shape
+    t, r = np.meshgrid(_centers(lot.temperature_c, n_t), _centers(lot.slope_c_per_min, n_r))
+    there = shares > 0.0
+    return Asked(t[there], r[there], shares[there] / shares.sum(), lot.between_dph)
+
+
+def _centers(span: tuple[float, float], n: int) -> Floats:
+    return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))

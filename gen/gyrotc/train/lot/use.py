@@ -1,0 +1,224 @@
+"""A unit's fit with its lot: the posterior over the lot's envelope in the place of the evidence process.
+
+The network that a table holds follows the posterior as it follows the process of a unit alone: same compression, same
+proofs. What the posterior may be wrong by becomes the table's sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...results.lot import LotUse, UnitCurve
+from ..data import Bins, Scaling, TrainingData, average
+from ..guard import objection
+from ..mrbf import fit_mrbf
+from ..process import MEAN_S, Process, TrainingFailed, fit_process
+from ..result import Outcome
+from .learn import UnitMeans
+from .means import unit_means
+from .prior import LotPosterior, LotPrior
+from .surprise import FALSE_ALARM
+
+__all__ = ["WithLot", "fit_with_lot"]
+
+Floats = NDArray[np.float64]
+_CURVE = 41  # points of the picture
+_KEPT_DIGITS = 6  # of its numbers
+
+
+@dataclass(frozen=True, slots=True)
+class WithLot:
+    """What a lot made of a unit.
+
+    Attributes:
+        use: For `training.json`.
+        map: Networks and scaling over the lot's envelope; None: the lot was not used.
+        findings: What a user should know.
+    """
+
+    use: LotUse
+    map: tuple[Outcome, Scaling] | None
+    findings: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _PosteriorMap:
+    """A posterior in standardised units of a fit; what the compression and the table's sigma ask of a process."""
+
+    posterior: LotPosterior
+    scaling: Scaling
+    center: float
+    spread: float
+    sigma: float
+    freedom: float
+    value: float = 0.0
+    evaluations: int = 0
+
+    @property
+    def log_parameters(self) -> Floats:
+        """As of the evidence model: what a unit differs by has the scales of the lot's rest."""
+        p = self.posterior.prior.lot.rest
+        basis = self.posterior.prior.basis
+        of_t = basis.half_range_c / self.scaling.half_range_c
+        of_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
+        scales = p.short_scale * of_t, p.long_scale * of_t, p.coupled_scale_t * of_t, p.coupled_scale_r * of_r
+        return np.log([p.short, scales[0], p.long, scales[1], p.coupled, scales[2], scales[3], self.sigma])
+
+    def mean(self, t: Floats, r: Floats) -> Floats:
+        return (self.posterior.mean_dph(*self._physical(t, r)) - self.center) / self.spread
+
+    def variance(self, t: Floats, r: Floats) -> Floats:
+        return self.posterior.variance_dph2(*self._physical(t, r)) / self.spread**2
+
+    def _physical(self, t: Floats, r: Floats) -> tuple[Floats, Floats]:
+        s = self.scaling
+        return s.center_c + s.half_range_c * np.asarray(t), s.half_range_c_per_min * np.asarray(r)
+
+
+def fit_with_lot(
+    samples: TrainingData, own: Scaling, prior: LotPrior, serial: str, *, seed: int, average_s: float
+) -> WithLot:
+    """Tests whether a unit fits its lot, and fits it with the lot if it does.
+
+    Args:
+        samples: Cleaned samples of the unit.
+        own: Their scaling.
+        prior: The lot.
+        serial: The unit's serial: one of the lot is told.
+        seed: Of the Kohonen network.
+        average_s: Averaging of RMS figures, s.
+    """
+    try:
+        alone = fit_process(samples, own)
+    except TrainingFailed:
+        alone = None
+    unit, _ = unit_means(samples, own, alone)
+    posterior = prior.with_runs(unit)
+    if posterior.p_value < FALSE_ALARM:
+        use = _use(prior, posterior, serial, accepted=False, scaling=own)
+        return WithLot(use, None, [_stranger(use)])
+    scaling = _over_both(own, prior)
+    process = _process(samples, scaling, alone, unit, posterior)
+    try:
+        outcome = fit_mrbf(samples, scaling, seed=seed, centers=None, average_s=average_s, process=process)
+        against = objection(outcome, samples, scaling, average_s)
+    except TrainingFailed as failure:
+        against = str(failure)
+    if against:
+        use = _use(prior, posterior, serial, accepted=False, scaling=own)
+        text = f"The lot is not used: a map with it is refused: {against}."
+        return WithLot(use, None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}])
+    return WithLot(_use(prior, posterior, serial, accepted=True, scaling=scaling), (outcome, scaling), [])
+
+
+def _over_both(own: Scaling, prior: LotPrior) -> Scaling:
+    """Scaling over the envelope of the lot and of the unit's own samples."""
+    lot = prior.lot
+    t0, t1 = min(own.temperature_c[0], lot.temperature_c[0]), max(own.temperature_c[1], lot.temperature_c[1])
+    r0, r1 = (
+        min(own.slope_c_per_min[0], lot.slope_c_per_min[0]),
+        max(own.slope_c_per_min[1], lot.slope_c_per_min[1]),
+    )
+    half_c, half_r = max(0.5 * (t1 - t0), own.half_range_c), max(-r0, r1, own.half_range_c_per_min)
+    return Scaling(0.5 * (t0 + t1), half_c, half_r, (t0, t1), (r0, r1))
+
+
+def _process(
+    samples: TrainingData, scaling: Scaling, alone: Process | None, unit: UnitMeans, posterior: LotPosterior
+) -> Process:
+    """The posterior in the form of a process that has seen the unit's means, asked where the lot's units were."""
+    means = average(samples, MEAN_S)
+    weight = means.weight / np.median(means.weight)
+    center = float(np.average(means.bias_dph, weights=weight))
+    asked = posterior.prior.asked
+    variance = posterior.variance_dph2(asked.temperature_c, asked.slope_c_per_min)
+    whole = posterior.mean_dph(asked.temperature_c, asked.slope_c_per_min)
+    spread = float(np.sqrt(np.average((whole - center) ** 2, weights=asked.share))) or 1.0
+    sigma = unit.sigma_dph / spread
+    freedom = len(means) * float(np.average(variance, weights=asked.share)) / unit.sigma_dph**2
+    model = _PosteriorMap(posterior, scaling, center, spread, sigma, freedom)
+    t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
+    at = scaling.normalise(asked.temperature_c, asked.slope_c_per_min)
+    kept = (
+        alone.kept if alone is not None and len(alone.kept) == len(means) else np.ones(len(means), dtype=bool)
+    )
+    return Process(
+        model=model,
+        bins=Bins(*at, len(means) * asked.share, model.mean(*at), 0.0, float(len(means))),
+        t=t,
+        r=r,
+        y=(means.bias_dph - center) / spread,
+        weight=weight,
+        run=means.run,
+        kept=kept,
+        center=center,
+        spread=spread,
+        seconds=float(np.median(means.duration_s)),
+        asked=asked,
+    )
+
+
+def _use(
+    prior: LotPrior, posterior: LotPosterior, serial: str, *, accepted: bool, scaling: Scaling
+) -> LotUse:
+    lot, alone = prior.lot, prior.alone()
+    before, after = alone.rms_sigma_dph(), posterior.rms_sigma_dph()
+    share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+    use = LotUse(
+        checksum=lot.checksum,
+        units=sum(c.units for c in lot.clusters),
+        member=any(unit.serial == serial for unit in lot.units),
+        cluster=posterior.cluster,
+        p_value=posterior.p_value,
+        accepted=accepted,
+        false_alarm=FALSE_ALARM,
+        text="",
+        own_share=share if accepted else None,
+        prior_sigma_dph=before,
+        sigma_dph=after,
+        curve=_curve(alone, posterior, scaling) if accepted else None,
+    )
+    return use.model_copy(update={"text": _text(use, len(lot.clusters))})
+
+
+def _text(use: LotUse, clusters: int) -> str:
+    of = f"a lot of {use.units} units" + (
+        f" (cluster {use.cluster + 1} of {clusters})" if clusters > 1 else ""
+    )
+    if not use.accepted:
+        return f"not used: these runs lie farther from {of} than {1.0 - use.p_value:.1%} of its units do"
+    seen = "; this unit is one of them" if use.member else ""
+    return (
+        f"{of} leaves {use.prior_sigma_dph:.2g} deg/h (1 sigma over the envelope), with this unit's own runs "
+        f"{use.sigma_dph:.2g}: they removed {use.own_share or 0.0:.0%} of its variance{seen}"
+    )
+
+
+def _curve(alone: LotPosterior, posterior: LotPosterior, scaling: Scaling) -> UnitCurve:
+    t = np.linspace(*scaling.temperature_c, _CURVE)
+    still = np.zeros(_CURVE)
+
+    def rounded(values: Floats) -> tuple[float, ...]:
+        return tuple(float(f"{v:.{_KEPT_DIGITS}g}") for v in values)
+
+    return UnitCurve(
+        temperature_c=rounded(t),
+        prior_dph=rounded(alone.mean_dph(t, still)),
+        prior_sigma_dph=rounded(np.sqrt(alone.variance_dph2(t, still))),
+        posterior_dph=rounded(posterior.mean_dph(t, still)),
+        posterior_sigma_dph=rounded(np.sqrt(posterior.variance_dph2(t, still))),
+    )
+
+
+def _stranger(use: LotUse) -> dict[str, Any]:
+    return {
+        "id": "not_of_its_lot",
+        "text": f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
+        "units is refused), so it was calibrated without it, from its own runs alone. Look for what sets it apart: "
+        "another design, another batch of mirrors, the wrong lot, a fault.",
+        "evidence": {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum},
+    }

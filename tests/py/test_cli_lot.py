@@ -1,0 +1,153 @@
+"""`gyrotc lot` and `--lot` as a user types them: a fleet of simulated units teaches, a new one has one short run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from gyrotc.commands import app
+from gyrotc.errors import InputError
+from gyrotc.jobs.lot import load_lot, lot_of
+from gyrotc.model import load_model
+from gyrotc.outputs import json_text
+from gyrotc.plan.with_lot import plan_with_lot
+from gyrotc.results.lot_plan import LotPlan
+from gyrotc.train.lot import prior_of
+from typer.testing import CliRunner
+
+RUNS = """
+title = "Two short cycles"
+
+[profile.slow]
+start_c = 0.0
+record_min = 120
+steps = [{ramp_to_c = 40.0, c_per_min = 1.0}, {hold_min = 20}, {ramp_to_c = -20.0, c_per_min = 2.0}, {hold_min = 30}]
+
+[profile.fast]
+start_c = 0.0
+record_min = 90
+steps = [{repeat = [
+  {ramp_to_c = 40.0, c_per_min = 5.0}, {hold_min = 15}, {ramp_to_c = -20.0, c_per_min = 5.0}, {hold_min = 15},
+]}]
+
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = [PROFILES]
+"""
+
+
+def run(*arguments: str | Path) -> str:
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    if isinstance(done.exception, Exception):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five units with all runs, their fleet and lot; the sixth with a single short one."""
+    place = tmp_path_factory.mktemp("lot")
+    for name, profiles in (("whole", '"slow", "fast", "slow"'), ("short", '"fast"')):
+        (place / f"{name}.toml").write_text(RUNS.replace("PROFILES", profiles), "utf-8")
+    made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet")
+    run(*made, "--units", "5", "--base", place / "whole.toml", "--out", place / "whole")
+    run(*made, "--units", "6", "--base", place / "short.toml", "--out", place / "short")
+    run("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
+    told = run("lot", place / "fleet", "--out", place / "lot.json")
+    assert "5 units" in told and "before any run" in told
+    return place
+
+
+def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
+    lot = load_lot(world / "lot.json")
+    assert (world / "lot.json").stat().st_size < 200_000
+    assert [u.serial for u in lot.units] == [f"LOT-0005-00{k}" for k in range(1, 6)]
+    assert lot.units[0].model_hash == load_model(world / "fleet" / "LOT-0005-001").hash
+    assert lot_of(world / "fleet").content() == lot.content()
+    assert lot.at_rest.temperature_c[0] == pytest.approx(lot.temperature_c[0], rel=1e-5)
+
+
+def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
+    told = run("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
+    run("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
+    lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
+    use = json.loads((world / "with" / "training.json").read_text())["lot"]
+    assert use["checksum"] == lot.checksum and use["accepted"] and not use["member"]
+    assert "lot: a lot of 5 units leaves" in told and str(model.meta["lot"]).endswith(use["text"])
+    assert model.envelope.temperature_c[0] <= lot.temperature_c[0]
+    assert model.envelope.temperature_c[1] >= alone.envelope.temperature_c[1]
+    assert model.coverage is not None and alone.coverage is not None
+    assert "".join(model.coverage.rows).count("1") > 0
+
+
+def test_header_and_report_show_the_lot(world: Path) -> None:
+    out = world / "built"
+    unit = world / "short" / "LOT-0005-006"
+    run("build", unit, "--lot", world / "lot.json", "--numeric", "f32", "--out", out)
+    assert "a lot of 5 units leaves" in next((out / "c").glob("gtc_lot*.h")).read_text()
+    page = (out / "report.html").read_text()
+    assert "<h2>The lot</h2>" in page and "the lot alone, 5 units" in page
+    with pytest.raises(InputError, match="--extend"):
+        run("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
+
+
+def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> None:
+    data, out = world / "few", world / "few-out"
+    data.mkdir()
+    (data / "LOT-0005-006").symlink_to(world / "short" / "LOT-0005-006")
+    first = run("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
+    again = run("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
+    other = run("fleet", data, "--out", out, "--jobs", "1")
+    assert "done before" not in first and "done before" in again and "done before" not in other
+
+
+def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_path: Path) -> None:
+    lot = load_lot(world / "lot.json")
+    before = prior_of(lot).alone().rms_sigma_dph()
+    asked = ("--lot", world / "lot.json", "--require", f"accuracy={0.5 * before:.3g}")
+    told = run("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
+    assert "with the lot: " in told and "without: " in told
+    found = LotPlan.model_validate_json((tmp_path / "plan" / "plan.json").read_text())
+    assert found.with_lot.reached and found.with_lot.sigma_dph <= found.accuracy_dph < found.before_dph
+    assert 0.0 < found.with_lot.hours < found.without.hours
+    rows = (tmp_path / "plan" / "programme.csv").read_text().splitlines()
+    assert rows[0] == "time_min,set_point_c" and float(rows[-1].split(",")[0]) == pytest.approx(
+        60 * found.with_lot.hours
+    )
+    assert (
+        len((tmp_path / "plan" / "programme.txt").read_text().splitlines()) == len(found.with_lot.steps) + 1
+    )
+    steeper = plan_with_lot(lot, str(world / "whole.toml"), 0.4 * before)
+    assert steeper.with_lot.hours > found.with_lot.hours
+    with pytest.raises(InputError, match="--require"):
+        run("plan", "paper", "--lot", world / "lot.json", "--require", "hysteresis=1e-4")
+
+
+def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:
+    content = json.loads((world / "lot.json").read_text())
+    content["unit_dph"] *= 2.0
+    (tmp_path / "lot.json").write_text(json_text(content))
+    with pytest.raises(InputError, match=r"lot\.json, field checksum"):
+        load_lot(tmp_path / "lot.json")
+
+
+def test_what_is_no_lot_of_units_is_told(world: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="0 calibrated units"):
+        run("lot", tmp_path, "--out", tmp_path / "lot.json")
+    with pytest.raises(InputError, match="no folder"):
+        run("lot", tmp_path / "none", "--out", tmp_path / "lot.json")
+    with pytest.raises(InputError, match="0 calibrated units, 5 of another axis"):
+        run("lot", world / "fleet", "--axis", "x", "--out", tmp_path / "lot.json")
+    training = tmp_path / "fleet" / "A" / "training.json"
+    training.parent.mkdir(parents=True)
+    content = json.loads((world / "fleet" / "LOT-0005-001" / "training.json").read_text())
+    content.pop("means")
+    training.write_text(json_text(content))
+    (training.parent / "model.json").write_bytes(
+        (world / "fleet" / "LOT-0005-001" / "model.json").read_bytes()
+    )
+    with pytest.raises(InputError, match="has no means"):
+        run("lot", tmp_path / "fleet", "--out", tmp_path / "lot.json")
+    assert not (tmp_path / "lot.json").exists()
