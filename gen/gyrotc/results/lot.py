@@ -27,7 +27,7 @@ _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class LotFunctions(Part):
-    """The functions that maps are written in: docs/lot.md, section 5."""
+    """The functions that maps are written in: docs/lot.md, section 6."""
 
     center_c: Celsius = Field(description="z_T = (T - center)/half range")
     half_range_c: Positive = Field(description="of T, C")
