@@ -56,6 +56,7 @@ def test_every_target_agrees_in_every_bit(name: str, tmp_path: Path, results: Re
     assert all(e["vectors"] >= 20000 for e in result["targets"])
     assert len({e["name"] for e in result["targets"]}) >= 12
     assert all(e["ram_bytes"] == 0 for e in result["targets"])
+    assert all(e["read_only_bytes"] > 500 for e in result["targets"]), "tables are constants on every target"
     streamed = [e["replayed"] for e in result["targets"] if all_targets()[e["name"]].reads_input]
     assert all((r["rows"], r["mismatches"]) == (1714, 0) for r in streamed), streamed
     assert {e["name"] for e in result["targets"] if e["numeric"] == "q31"} == set(all_targets())

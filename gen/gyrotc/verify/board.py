@@ -144,11 +144,14 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
 
 
 def _sizes(target: Target, program: Path, objects: list[Path]) -> dict[str, int]:
-    """Code and constants of runtime and table that the program links, and their writable static data."""
-    own = {symbol.name for symbol in symbols(target, *objects)}
+    """Code and constants of runtime and table that the program links, and their writable static data.
+
+    What is constant is told by the objects: linker scripts put constants beside the code.
+    """
+    own = {symbol.name: symbol.kind for symbol in symbols(target, *objects)}
     linked = {symbol.name: symbol for symbol in symbols(target, program) if symbol.name in own}.values()
     return {
-        "code_bytes": sum(symbol.size for symbol in linked if symbol.kind in _CODE),
-        "read_only_bytes": sum(symbol.size for symbol in linked if symbol.kind in _CONSTANT),
+        "code_bytes": sum(symbol.size for symbol in linked if own[symbol.name] in _CODE),
+        "read_only_bytes": sum(symbol.size for symbol in linked if own[symbol.name] in _CONSTANT),
         "ram_bytes": writable_bytes(target, *objects),
     }
