@@ -364,8 +364,8 @@ TEST(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no
     {
         const num_t before = bias_of(&state);
 
-        state.constant = MUCH;
-        CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U)); /* its square is none: nothing is known of the share */
+        state.constant = MUCH; /* its square is none: nothing is known of the share */
+        CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
         CHECK(same(bias_of(&state), before));
     }
 #endif
