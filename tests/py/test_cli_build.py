@@ -44,7 +44,7 @@ def test_build_leaves_every_promised_file(demo: Path) -> None:
     names = {p.name for p in result.iterdir()}
     assert names == {
         "model.json", "training.json", "c", "verify.json", "evaluate.json", "trace", "report.html",
-        "manifest.json", ".gyrotc-result.json",
+        "manifest.json", "budget.json", ".gyrotc-result.json",
     }  # fmt: skip
     assert len(list((result / "trace").glob("run-*.csv"))) == 12
     assert not [p for p in demo.iterdir() if p.name.startswith(".")]

@@ -18,12 +18,14 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
     """Everything after the cut is scored once."""
     if not (REAL / name).is_dir():
         pytest.skip(f"{name} is absent: see GYROTC_REAL_DATA")
-    (folder / "data.csv").write_bytes((REAL / name / "data.csv").read_bytes())
+    data = folder / "data"
+    data.mkdir()
+    (data / "data.csv").write_bytes((REAL / name / "data.csv").read_bytes())
     run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
-    (folder / "dataset.toml").write_text(
+    (data / "dataset.toml").write_text(
         f'schema = 1\nserial = "R1"\n{run}to_s = {cut_s}\n{run}from_s = {cut_s}\nrole = "exam"\n'
     )
-    done = gyrotc("diagnose", folder, "--axis", axis, "--average-s", 10, "--out", folder / "out")
+    done = gyrotc("diagnose", data, "--axis", axis, "--average-s", 10, "--out", folder / "out")
     assert done.returncode == 0, done.stderr
     return dict(json.loads((folder / "out" / "diagnose.json").read_text()))
 

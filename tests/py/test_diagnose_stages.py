@@ -19,7 +19,7 @@ ORDER = [
     "signatures",
     "detect",
     "attribute",
-    "words",
+    "noise_words",
     "discrepancy",
     "verdict",
     "advice",

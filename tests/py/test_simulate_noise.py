@@ -112,6 +112,7 @@ def plain_record(seed: int, cells: int, levels: NoiseLevels) -> SimulatedRecord:
     return SimulatedRecord(
         reading_c=np.zeros(cells),
         channels={},
+        states={},
         air_c=zero,
         cavity_c=zero,
         bias_dph=zero,

@@ -93,9 +93,9 @@ def test_the_bias_is_the_map_with_what_differences_and_laser_add() -> None:
     s = whole.states
     x = s["mirror_c"] - s["block_c"]
     cavity = whole.cavity_c[:-1]
-    expected = 3e-4 * x / np.sqrt(1.0 + (x / 8.0) ** 2) * (1.0 + 0.004 * (cavity - 20.0))
-    expected += -6e-5 * (s["case_c"] - s["block_c"])
-    expected += 5e-5 * (s["loss_ppm"] - 300.0) + 5e-4 * np.sin(np.pi * s["stroke"])
+    expected = 5e-4 * x / np.sqrt(1.0 + (x / 8.0) ** 2) * (1.0 + 0.004 * (cavity - 20.0))
+    expected += -1e-4 * (s["case_c"] - s["block_c"])
+    expected += 1e-4 * (s["loss_ppm"] - 300.0) + 5e-4 * np.sin(np.pi * s["stroke"])
     assert added == pytest.approx(expected, abs=1e-12)
     assert bare.reading_c == pytest.approx(whole.reading_c)  # nothing else is drawn anew
 
