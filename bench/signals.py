@@ -67,8 +67,8 @@ With {useless} useless channels beside: RMS changes by {harm} in the worlds (aim
 ## A channel lost during the whole exam
 
 RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the channel's
-median stands for it. A table of one thermometer carried beside, and taken while GTC_CHANNEL_LOST is set, is 0
-% worse by construction.
+median stands for it. A table of one thermometer can be carried beside and taken while GTC_CHANNEL_LOST
+is set: its correction is then that of the table of one thermometer.
 
 | channel lost | worlds | worse by, largest |
 | --- | --- | --- |

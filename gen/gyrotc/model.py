@@ -27,7 +27,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from .errors import InputError
 from .inputs import read_json
-from .outputs import canonical_json, json_text, write_atomically
+from .outputs import digest_of, json_text, write_atomically
 from .terms import CATALOGUE, Cause
 from .terms.tabled import Tabled
 
@@ -340,6 +340,23 @@ class Model(_Frozen):
             return self._network_dph(self.networks[0], z)
         return self._bank_dph(z, temperature_c, slope_c_per_min)
 
+    def trained_inputs(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """T (C) and dT/dt (C/min) at the middles of the cells of the envelope where training was, shape (n,) each.
+
+        All cells where that is not known.
+        """
+        columns, rows = self.coverage.cells if self.coverage else (32, 12)
+        (t0, t1), (r0, r1) = self.envelope.temperature_c, self.envelope.slope_c_per_min
+        t = t0 + (t1 - t0) * (np.arange(columns) + 0.5) / columns
+        r = r0 + (r1 - r0) * (np.arange(rows) + 0.5) / rows
+        every_t, every_r = (grid.ravel() for grid in np.meshgrid(t, r))
+        seen = (
+            np.array([c == "1" for row in self.coverage.rows for c in row])
+            if self.coverage
+            else np.ones(0, bool)
+        )
+        return (every_t[seen], every_r[seen]) if seen.any() else (every_t, every_r)
+
     def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:
         bias = network.w0 + z @ np.array(network.linear)
         center, half = self.scale.temperature_c
@@ -406,7 +423,7 @@ class Model(_Frozen):
     @property
     def hash(self) -> str:
         """SHA-256 of the canonical form: sorted keys, no spaces, ASCII."""
-        return hashlib.sha256(canonical_json(self.to_dict())).hexdigest()
+        return digest_of(self.to_dict())
 
     def save(self, path: Path) -> None:
         """Writes `model.json` to a temporary name, then renames."""

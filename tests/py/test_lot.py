@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from gyrotc.jobs.lot import checksum_of, lot_from
 from gyrotc.results.lot import Lot, LotCluster
 from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty
 from gyrotc.train.lot import LotPrior, UnitMeans, learn, prior_of
+from gyrotc.train.lot import basis as lot_basis
 from gyrotc.train.lot.basis import PRIOR_LOG, LotBasis
 from gyrotc.train.lot.learn import Learned, sums_of
 from gyrotc.train.lot.model import evidence, fitted
@@ -189,11 +192,11 @@ def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     print("seed", seed)
     rng = np.random.default_rng(seed)
     side = np.arange(20) % 2
-    lot, found = lot_of([calibrated(rng, unit_map(rng, 1e-4, 1.2e-3 * (s - 0.5))) for s in side])
+    lot, found = lot_of([calibrated(rng, unit_map(rng, 1e-4, 3e-3 * (s - 0.5))) for s in side])
     assert len(lot.clusters) == 2 and "2 clusters" in lot.told
     assert abs(np.corrcoef(found.state.cluster, side[found.inside])[0, 1]) > 0.99
     prior = prior_of(lot)
-    own = unit_map(rng, 1e-4, 0.6e-3)
+    own = unit_map(rng, 1e-4, 1.5e-3)
     data = short_run(rng, own)
     use = fit(data, method="auto", lot=prior).lot
     assert use is not None and use.cluster == found.state.cluster[int(np.argmax(side == 1))]
@@ -238,3 +241,17 @@ def _negative(cluster: LotCluster) -> LotCluster:
     rows = [list(row) for row in cluster.covariance]
     rows[0][0] = -1e6
     return cluster.model_copy(update={"covariance": tuple(tuple(row) for row in rows)})
+
+
+def test_the_processes_of_a_lot_have_the_priors_of_the_evidence_method() -> None:
+    """The lot adds the amplitude of the constant before; the core has the noise behind."""
+    core = Path(__file__).parents[2].joinpath("gen/core/evidence.cpp").read_text("utf-8")
+
+    def numbers(name: str) -> list[float]:
+        found = re.search(rf"\b{name} =([^;]*);", core)
+        assert found is not None
+        return [float(n) for n in re.findall(r"\d+\.\d+", found[1])]
+
+    assert np.exp(lot_basis.PRIOR_LOG[1:]) == pytest.approx(numbers("kPriorMean")[:-1], rel=1e-12)
+    assert list(lot_basis._PRIOR_SD[1:]) == numbers("kPriorSd")[:-1]
+    assert numbers("kReach") == [lot_basis._REACH]

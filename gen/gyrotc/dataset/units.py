@@ -22,6 +22,7 @@ __all__ = [
     "Conversion",
     "Kind",
     "UnitError",
+    "channel_kind",
     "channel_unit",
     "conversion",
     "declared",
@@ -169,6 +170,12 @@ def channel_unit(name: str) -> str | None:
     """The unit that the name of a channel says: `case_temperature_c`, `supply_v`; None if it says none."""
     head, _, ending = name.rpartition("_")
     return _ENDINGS.get(ending.lower()) if head else None
+
+
+def channel_kind(name: str, declared: Mapping[str, str]) -> Kind | None:
+    """What an auxiliary channel measures, by its declared unit or by its name."""
+    unit = declared.get(name) or channel_unit(name)
+    return kind_of(unit) if unit else None
 
 
 def _spelt(text: str) -> str:

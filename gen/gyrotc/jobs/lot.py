@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +12,13 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import InputError
 from ..model import Model, load_model
-from ..outputs import canonical_json
+from ..outputs import digest_of
 from ..results.base import read_result
 from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotFunctions, LotProcess, LotUnit
 from ..results.training import Training
 from ..train.lot import LEAST_UNITS, Learned, UnitMeans, learn, prior_of
 from ..train.lot.basis import PARAMETERS
-from ..train.lot.learn import Envelope
+from ..train.lot.learn import Envelope, folds_of
 from ..train.lot.model import LotState
 from ..train.process import MEAN_S
 
@@ -62,7 +61,7 @@ def load_lot(path: Path) -> Lot:
 def checksum_of(lot: Lot) -> str:
     """SHA-256 of the canonical form without its checksum."""
     content = {key: value for key, value in lot.content().items() if key != "checksum"}
-    return hashlib.sha256(canonical_json(content)).hexdigest()
+    return digest_of(content)
 
 
 def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = None) -> Lot:
@@ -185,7 +184,7 @@ def lot_from(  # long: one line for each field of lot.json
         mean_s=mean_s,
         between_dph=between_dph,
         cross_validation=CrossValidation(
-            folds=min(5, len(inside)),
+            folds=folds_of(len(inside)),
             spread_scale=found.scale,
             left_rms_dph=found.left_out_dph[0],
             constant_rms_dph=found.left_out_dph[1],

@@ -286,7 +286,7 @@ def _weights(model: Model) -> Iterator[Finding]:
     """
     if model.method in _POLYNOMIALS:
         return
-    swing = float(np.ptp(_trained_map(model)))
+    swing = float(np.ptp(model.map_dph(*model.trained_inputs())))
     total = model.sum_abs_weights_dph
     if swing > 0.0 and total > _WEIGHTS_TO_RANGE * swing:
         yield _finding(
@@ -296,19 +296,6 @@ def _weights(model: Model) -> Iterator[Finding]:
             sum_abs_weights_dph=total,
             swing_dph=swing,
         )
-
-
-def _trained_map(model: Model) -> NDArray[np.float64]:
-    """The map at the middles of the cells of its envelope that held training data, deg/h."""
-    columns, rows = model.coverage.cells if model.coverage else (32, 12)
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    t = t0 + (t1 - t0) * (np.arange(columns) + 0.5) / columns
-    r = r0 + (r1 - r0) * (np.arange(rows) + 0.5) / rows
-    bias = model.map_dph(*np.meshgrid(t, r))
-    if model.coverage is None:
-        return bias
-    seen = np.array([list(row) for row in model.coverage.rows]) == "1"
-    return np.asarray(bias[seen]) if seen.any() else bias
 
 
 def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:

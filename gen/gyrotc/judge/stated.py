@@ -112,15 +112,10 @@ def _stated(instruments: Sequence[Instrument], quantity: str) -> tuple[float, fl
 
 def _gradient(model: Model) -> float:
     """RMS of the map's slope over temperature where training was, deg/h/C."""
-    cells = model.coverage.cells if model.coverage else (32, 12)
-    rows = model.coverage.rows if model.coverage else ("1" * cells[0],) * cells[1]
-    seen = np.array([[c == "1" for c in row] for row in rows])
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    j, i = np.nonzero(seen)
-    t = t0 + (i + 0.5) / cells[0] * (t1 - t0)
-    r = r0 + (j + 0.5) / cells[1] * (r1 - r0)
+    t, r = model.trained_inputs()
+    t0, t1 = model.envelope.temperature_c
     step = _STEP * (t1 - t0)
-    if step <= 0.0 or not t.size:
+    if step <= 0.0:
         return 0.0
     apart = model.map_dph(np.minimum(t + step, t1), r) - model.map_dph(np.maximum(t - step, t0), r)
     across = np.minimum(t + step, t1) - np.maximum(t - step, t0)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Dataset, Rows, Run
-from ..dataset.units import channel_unit, kind_of
+from ..dataset.units import channel_kind
 
 __all__ = ["thermometer_findings"]
 
@@ -43,7 +43,7 @@ class _Followed:
 
 def thermometer_findings(dataset: Dataset) -> Iterator[dict[str, Any]]:
     """A finding for each thermometer and run that stand apart; none of fewer than three runs."""
-    names = [n for n in dataset.channels if _is_thermometer(dataset, n)]
+    names = [n for n in dataset.channels if channel_kind(n, dataset.units) == "temperature"]
     if not names or len(dataset.runs) < _LEAST_RUNS:
         return
     followed: dict[str, list[_Followed]] = {name: [] for name in names}
@@ -56,11 +56,6 @@ def thermometer_findings(dataset: Dataset) -> Iterator[dict[str, Any]]:
     for name, runs in followed.items():
         if len(runs) >= _LEAST_RUNS:
             yield from _odd_ones(name, runs)
-
-
-def _is_thermometer(dataset: Dataset, name: str) -> bool:
-    unit = dataset.units.get(name) or channel_unit(name)
-    return unit is not None and kind_of(unit) == "temperature"
 
 
 def _followed(run: Run, rows: Rows, name: str) -> _Followed | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from .files import check_replaceable, write_atomically
 from .folder import Stage, clean, leftovers, result_folder, write_result
 from .interrupts import Interrupted, deferred, die_of, raise_on_signals
-from .jsontext import canonical_json, json_text
+from .jsontext import canonical_json, digest_of, json_text
 from .lock import Lock
 from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
 from .scratch import scratch_folder
@@ -27,6 +27,7 @@ __all__ = [
     "clean",
     "deferred",
     "die_of",
+    "digest_of",
     "faults",
     "json_text",
     "leftovers",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from typing import Any
 
-__all__ = ["canonical_json", "json_text"]
+__all__ = ["canonical_json", "digest_of", "json_text"]
 
 
 def json_text(content: Any) -> str:
@@ -24,3 +25,8 @@ def canonical_json(content: Any) -> bytes:
         ValueError: A number is not finite.
     """
     return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False).encode("ascii")
+
+
+def digest_of(content: Any) -> str:
+    """SHA-256 of the canonical form, hexadecimal. Raises as that."""
+    return hashlib.sha256(canonical_json(content)).hexdigest()

@@ -67,7 +67,8 @@ def best_cubic(model: Model, autopilot: Autopilot) -> Cubic:
     Raises:
         CheckFailed: ArduPilot corrects nothing where the middle of the range is not above 0 C.
     """
-    t, y = _seen(model)
+    t, r = model.trained_inputs()
+    y = model.map_dph(t, r)
     low, high = (np.float32(edge) for edge in model.envelope.temperature_c)
     middle = (high + low) * np.float32(0.5)
     if autopilot == "ardupilot" and middle <= 0:
@@ -90,13 +91,3 @@ def best_cubic(model: Model, autopilot: Autopilot) -> Cubic:
         autopilot, middle, low, high, coefficients, float(np.sqrt(np.mean(lost**2))), float(np.abs(lost).max()),
         float(np.sqrt(np.mean(y**2))),
     )  # fmt: skip
-
-
-def _seen(model: Model) -> tuple[Floats, Floats]:
-    """Temperatures, C, and the map, deg/h, at the centers of the cells where training was."""
-    cells = model.coverage.cells if model.coverage else (32, 12)
-    rows = model.coverage.rows if model.coverage else ("1" * cells[0],) * cells[1]
-    j, i = np.nonzero(np.array([[c == "1" for c in row] for row in rows]))
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    t = t0 + (i + 0.5) / cells[0] * (t1 - t0)
-    return t, model.map_dph(t, r0 + (j + 0.5) / cells[1] * (r1 - r0))

@@ -17,7 +17,7 @@ from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from ..dataset import Dataset, Rows, Run
-from ..dataset.units import channel_unit, kind_of
+from ..dataset.units import channel_kind
 from ..frontend import F32, Blocks, Guarded, channel_at, with_missing
 from ..model import Model
 from ..results.training import ChannelTried
@@ -90,14 +90,9 @@ def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, Fl
 
 def _names(dataset: Dataset) -> list[str]:
     """Candidates by name: "a" or "a - b"."""
-    warm = [name for name in dataset.channels if _kind(dataset, name) == "temperature"]
+    warm = [name for name in dataset.channels if channel_kind(name, dataset.units) == "temperature"]
     pairs = [(a, "temperature_c") for a in warm] + list(combinations(warm, 2))
     return [n for n in dataset.channels if n not in warm] + [f"{a} - {b}" for a, b in pairs]
-
-
-def _kind(dataset: Dataset, name: str) -> str | None:
-    unit = dataset.units.get(name) or channel_unit(name)
-    return kind_of(unit) if unit else None
 
 
 def chosen_channels(
@@ -140,7 +135,7 @@ def chosen_channels(
 
 def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingData, scaling: Scaling) -> str:
     """Why a channel must not be an input; empty if it may."""
-    if _kind(dataset, name) == "rate":
+    if channel_kind(name, dataset.units) == "rate":
         return "it is a rate: it would compensate the gyro with what it measures"
     known = np.isfinite(values)
     if np.mean(~known) > _MOST_MISSING:

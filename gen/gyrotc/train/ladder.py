@@ -30,10 +30,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from ..metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average
+from .paired import more_than_its_error, of_pieces, surely_above_0, t_statistic
 from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .residual_noise import difference_sigma
 from .simple import SIMPLE, design, solve
@@ -49,7 +49,6 @@ RUNGS = ("nothing", *SIMPLE, *MAPS)
 """From the simplest to the richest."""
 YARDSTICKS = ("constant", "cubic", "cubic_slope")
 """What anyone would fit: least squares on few columns, the commonest corrections of such gyros."""
-_SIGNIFICANCE = 0.05  # of the t test against the constant: docs/training.md, section 2
 _EQUAL = 0.01  # of a score, so 1 % of RMS: half of what "no worse than trivial" allows (docs/real.md)
 _LEAST_PIECES = 3  # runs or power-ons: with fewer their scatter says nothing
 _LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by rounding only
@@ -107,29 +106,21 @@ class Ladder:
             return False
         used = self.pieces >= 0
         excess = self.rms_dph[used, RUNGS.index(name)] ** 2 - self.noise_dph**2
-        tests = [self.gain(name)]
+        tests = [of_pieces(self._gains(name), self.pieces)]
         if len(excess) and excess.max() < self.noise_dph**2:
-            tests.append(_t_statistic(self._gains(name)))
-        return any(n > 0 and t > stdtrit(n, 1.0 - _SIGNIFICANCE) for t, n in tests)
+            tests.append(self._gains(name))
+        return any(surely_above_0(gains) for gains in tests)
 
     def gain(self, name: str) -> tuple[float, int]:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
-        used = self.pieces >= 0
-        if not used.any():
-            return 0.0, 0
-        _, index = np.unique(self.pieces[used], return_inverse=True)
-        return _t_statistic(np.bincount(index, self._gains(name)[used]) / np.bincount(index))
+        return t_statistic(of_pieces(self._gains(name), self.pieces))
 
     def _gains(self, name: str) -> Floats:
         return np.asarray(self.score[:, RUNGS.index("constant")] - self.score[:, RUNGS.index(name)])
 
     def _clearly_worse(self, k: int, best: int) -> bool:
         """By more than a standard error of the paired difference, in score and in mean square."""
-        for values in (self.score, self.rms_dph**2):
-            difference = values[:, k] - values[:, best]
-            if difference.mean() <= difference.std(ddof=1) / np.sqrt(len(difference)):
-                return False
-        return True
+        return more_than_its_error(*(v[:, k] - v[:, best] for v in (self.score, self.rms_dph**2)))
 
     def beaten_by(self, name: str, other: Ladder, rung: str) -> bool:
         """Whether a rung of another ladder, over the same stretches, is what this one would choose above `name`.
@@ -177,14 +168,6 @@ class Ladder:
             if kind in kinds
         ]
         return words + [text for kind, text in _RANGES.items() if kind in kinds]
-
-
-def _t_statistic(gains: Floats) -> tuple[float, int]:
-    """Student's t of a mean against 0, and its degrees of freedom; 0 degrees where nothing can be said."""
-    if len(gains) < 2 or not np.all(np.isfinite(gains)):
-        return 0.0, 0
-    error = float(gains.std(ddof=1)) / float(np.sqrt(len(gains)))
-    return float(gains.mean()) / max(error, 1e-12), len(gains) - 1
 
 
 _COUNTED = {

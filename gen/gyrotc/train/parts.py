@@ -17,10 +17,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from .data import Scaling, TrainingData, average
 from .ladder import pieces_of
+from .paired import more_than_its_error, of_pieces, surely_above_0
 from .process import MEAN_S, Process, conditioned, fit_process
 from .residual_noise import difference_sigma
 from .spans import Fold, history_folds
@@ -29,7 +29,6 @@ __all__ = ["Parts", "PartsTrial", "chosen_parts"]
 
 Floats = NDArray[np.float64]
 
-_LEVEL = 0.05  # of the test over pieces, as of the ladder: docs/training.md, section 2
 _ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
 
 
@@ -246,20 +245,16 @@ class _Course:
 
     def _clearly_worse(self, square: Floats, best: Floats) -> bool:
         """By more than a standard error of the paired difference over stretches, in score and in mean square."""
-        for lost in (self._score(square) - self._score(best), square - best):
-            if lost.mean() <= lost.std(ddof=1) / np.sqrt(len(lost)):
-                return False
-        return True
+        return more_than_its_error(self._score(square) - self._score(best), square - best)
 
     def _surely_better(self, beside: Floats, without: Floats) -> bool:
         """Over pieces of history, or over all stretches where pieces differ by noise alone."""
         used = self.pieces >= 0
-        gain = (self._score(without) - self._score(beside))[used]
-        _, index = np.unique(self.pieces[used], return_inverse=True)
-        tests = [np.bincount(index, gain) / np.bincount(index)]
-        if len(gain) and (beside[used] < 2.0 * self.noise_dph**2).all():
-            tests.append(gain)
-        return any(_surely_above_0(one) for one in tests)
+        gain = self._score(without) - self._score(beside)
+        tests = [of_pieces(gain, self.pieces)]
+        if used.any() and (beside[used] < 2.0 * self.noise_dph**2).all():
+            tests.append(gain[used])
+        return any(surely_above_0(one) for one in tests)
 
     def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, Floats]:
         """Weights of the chosen parts from all means."""
@@ -269,11 +264,3 @@ class _Course:
         normal = (self.table * weight[:, None]).T @ inside
         mix = self._mix(0.5 * (normal + normal.T), chosen)
         return {name: -mix[self.where[name]] for name in chosen}
-
-
-def _surely_above_0(values: Floats) -> bool:
-    """Student's t at 5 %, one-sided."""
-    if len(values) < 2:
-        return False
-    error = float(values.std(ddof=1)) / float(np.sqrt(len(values)))
-    return bool(values.mean() > stdtrit(len(values) - 1, 1.0 - _LEVEL) * max(error, 1e-12))

@@ -116,8 +116,10 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
 
 def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> int:
     """Enters one result: payloads first, so that no row names what is not there; 0 where its folder has gone."""
-    folder = next((path for path in (out / entry.name,) if (path / ENTRY).is_file()), None)
-    if folder is None:  # a name with bytes that are no character: it is told, but lies elsewhere
+    folder = out / entry.name
+    if not (
+        folder / ENTRY
+    ).is_file():  # a name with bytes that are no character: it is told, but lies elsewhere
         return 0
     model = load_model(folder / "model.json")
     budget = read_optional(folder / "budget.json", Budget)

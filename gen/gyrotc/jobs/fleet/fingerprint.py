@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import os
 import stat
 from collections.abc import Iterator
@@ -12,17 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ... import __version__, _core
-from ...outputs import canonical_json, sha256
+from ...outputs import digest_of, sha256
 from ...reference.runtime import runtime_folders
 
-__all__ = ["digest_of", "inputs_of", "program_of"]
+__all__ = ["inputs_of", "program_of"]
 
 _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures come out of
-
-
-def digest_of(value: Any) -> str:
-    """SHA-256 of a JSON value, hexadecimal."""
-    return hashlib.sha256(canonical_json(value)).hexdigest()
 
 
 @functools.cache

@@ -11,14 +11,14 @@ from ...errors import CheckFailed, GyrotcError, InputError
 from ...judge.conformity import coverage_factor
 from ...metrics import Averages
 from ...model import Model
-from ...outputs import KINDS, result_folder
+from ...outputs import KINDS, digest_of, result_folder
 from ...results.evaluation import Evaluation
 from ...results.fleet import FleetEntry
 from ..build import Built, build_into
 from .aside import set_aside
 from .entry import kept_entry, write_entry
 from .facts import facts_of
-from .fingerprint import digest_of, inputs_of, program_of
+from .fingerprint import inputs_of, program_of
 from .manifest import Fleet, Unit, printable
 
 __all__ = ["Task", "do_unit", "done_before", "failed"]

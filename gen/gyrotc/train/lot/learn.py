@@ -12,7 +12,7 @@ from .basis import LotBasis
 from .model import LotState, UnitSums, evidence, fitted, predictive
 from .surprise import FALSE_ALARM, inflation, p_value, scores
 
-__all__ = ["LEAST_UNITS", "Learned", "UnitMeans", "learn", "sums_of"]
+__all__ = ["LEAST_UNITS", "Envelope", "Learned", "UnitMeans", "folds_of", "learn", "sums_of"]
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -73,9 +73,7 @@ class Learned:
     left_out_dph: tuple[float, float]
 
 
-def learn(
-    units: Sequence[UnitMeans], envelope: tuple[tuple[float, float], tuple[float, float]], say: Progress
-) -> Learned:
+def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Learned:
     """Learns what units share.
 
     Args:
@@ -132,20 +130,32 @@ def _chosen(sums: UnitSums, basis: LotBasis, say: Progress) -> LotState:
     together = np.zeros(len(sums), dtype=np.int64)
     plain = fitted(sums, basis, 0, together, _ROUNDS[1])
     price = 0.5 * np.log(len(sums)) * _freedom(sums, plain)
-    best, value = plain, plain.evidence
-    for rank in range(1, min(_MOST_DIRECTIONS, len(sums) // _UNITS_A_DIRECTION) + 1):
-        say(f"{rank} directions")
-        tried = fitted(sums, basis, rank, together, _ROUNDS[2], start=best)
-        if tried.evidence - rank * price <= value:
-            break
-        best, value = tried, tried.evidence - rank * price
+    best, value = _with_directions(sums, plain, plain.evidence, price, say)
     for number in range(2, _MOST_CLUSTERS + 1):
         say(f"{number} clusters")
-        split, its = _clustered(sums, plain, number, price)
+        parted = _clustered(sums, plain, number)
+        if parted is None:
+            break
+        split, its = _with_directions(sums, parted, parted.evidence - _told(parted.cluster), price, say)
         if its <= value:
             break
         best, value = split, its
     return best
+
+
+def _with_directions(
+    sums: UnitSums, state: LotState, value: float, price: float, say: Progress
+) -> tuple[LotState, float]:
+    """As many shared directions as pay for themselves; clusters are held against one cloud with the same freedom."""
+    paid = value - state.evidence
+    for rank in range(1, min(_MOST_DIRECTIONS, len(sums) // _UNITS_A_DIRECTION) + 1):
+        say(f"{rank} directions")
+        tried = fitted(sums, state.basis, rank, state.cluster, _ROUNDS[2], start=state)
+        its = tried.evidence + paid - rank * price
+        if its <= value:
+            break
+        state, value = tried, its
+    return state, value
 
 
 def _freedom(sums: UnitSums, state: LotState) -> float:
@@ -155,9 +165,9 @@ def _freedom(sums: UnitSums, state: LotState) -> float:
     return float(np.mean(told))
 
 
-def _clustered(sums: UnitSums, plain: LotState, number: int, price: float) -> tuple[LotState, float]:
-    """The best model with so many clusters, and its evidence less what it costs to say who is in which."""
-    found: list[tuple[float, LotState]] = []
+def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
+    """The best model with so many clusters and no direction; None where no partition has enough units in each."""
+    found: list[LotState] = []
     for cluster in _partitions(sums, plain, number):
         state = fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain)
         for _ in range(3):
@@ -166,13 +176,8 @@ def _clustered(sums: UnitSums, plain: LotState, number: int, price: float) -> tu
             if np.array_equal(nearest, state.cluster) or _smallest(nearest, number) < _LEAST_IN_CLUSTER:
                 break
             state = fitted(sums, plain.basis, 0, nearest, _AGAIN, start=state)
-        found.append((state.evidence - _told(state.cluster), state))
-    if not found:
-        return plain, -np.inf
-    value, best = max(found, key=lambda pair: pair[0])
-    one = fitted(sums, plain.basis, 1, best.cluster, _ROUNDS[2], start=best)
-    its = one.evidence - _told(one.cluster) - price
-    return (one, its) if its > value else (best, value)
+        found.append(state)
+    return max(found, key=lambda s: s.evidence - _told(s.cluster), default=None)
 
 
 def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np.int64]]:
@@ -195,6 +200,11 @@ def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np
     return list(found.values())
 
 
+def folds_of(units: int) -> int:
+    """Number of folds of the cross-validation."""
+    return min(_FOLDS, units)
+
+
 def _smallest(cluster: NDArray[np.int64], number: int) -> int:
     return int(np.bincount(cluster, minlength=number).min())
 
@@ -208,7 +218,7 @@ def _told(cluster: NDArray[np.int64]) -> float:
 def _left_out(sums: UnitSums, state: LotState) -> tuple[Floats, float, NDArray[np.bool_]]:
     """p-value of each unit under the lot without its fold, the inflation that they ask for, and who stands apart."""
     n = len(sums)
-    folds = np.arange(n) % min(_FOLDS, n)
+    folds = np.arange(n) % folds_of(n)
     found: list[tuple[Floats, Floats]] = [(np.zeros(0), np.zeros(0))] * n
     for fold in range(int(folds.max()) + 1):
         rest = folds != fold
