@@ -87,8 +87,17 @@ def _sigma(docs: Path) -> None:
     write(docs, "sigma", {"cost": cost(), **coverage(_say)}, section)
 
 
+def _bounds(docs: Path) -> None:
+    """Static bounds on instructions, beside what an emulator counts."""
+    from .bounds import bounds
+    from .bounds_page import section
+    from .runtime_page import write
+
+    write(docs, "bounds", {"rows": bounds()}, section)
+
+
 _PARTS = {"training": _training, "runtime": _runtime}
-_ALONE = {"raw": _raw, "sigma": _sigma}
+_ALONE = {"raw": _raw, "sigma": _sigma, "bounds": _bounds}
 
 
 def main() -> None:

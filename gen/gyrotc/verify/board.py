@@ -17,6 +17,7 @@ from ..outputs import scratch_folder
 from ..reference.table import Table
 from ..results.verification import CallCost, FunctionCost, VerifiedTarget
 from .boardlog import BoardOutput, compared_words, read_output
+from .bounds import instruction_bounds
 from .functions import function_costs
 from .source import board_files, checked_sources
 from .toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
@@ -59,7 +60,7 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
         sources = [c / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
         shared = compile_objects(target, sources, work, include=c)
-        functions = function_costs(target, c, work)
+        functions = _functions(job, target, c, work)
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
@@ -78,6 +79,18 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             yield entry(**_ran(job, target, numeric, shared, work, c), **told)
         except CheckFailed as error:
             yield entry(status="fail", error=str(error))
+
+
+def _functions(job: Job, target: Target, c: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
+    """Code, stack and the most instructions of each public function, by arithmetic."""
+    costs = function_costs(target, c, work)
+    if costs:
+        runtime = work / "functions" / "gtc.o"
+        for n, most in instruction_bounds(target, c, job.tables, job.model.symbol, runtime).items():
+            costs[n] = {
+                f: cost.model_copy(update={"instructions": most.get(f)}) for f, cost in costs[n].items()
+            }
+    return costs
 
 
 def _ran(job: Job, target: Target, numeric: str, shared: list[Path], work: Path, c: Path) -> dict[str, Any]:

@@ -97,6 +97,8 @@ def parse_graph(text: str) -> Graph:
 def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
     """Costs by arithmetic and public function; empty without a gcc that tells.
 
+    It leaves the runtime's object, with lines of its text, as `functions/gtc.o` in `work`.
+
     Raises:
         CheckFailed: The compiler refused, or a stack has no bound.
     """
@@ -104,7 +106,7 @@ def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict
         return {}
     own = work / "functions"
     own.mkdir()
-    told = target.model_copy(update={"flags": (*target.flags, "-fstack-usage", "-fcallgraph-info=su")})
+    told = target.model_copy(update={"flags": (*target.flags, "-g", "-fstack-usage", "-fcallgraph-info=su")})
     objects = compile_objects(told, [c_folder / "gtc.c"], own, include=c_folder)
     graph = parse_graph((own / "gtc.ci").read_text(encoding="utf-8", errors="replace"))
     sizes = {s.name: s.size for s in symbols(target, *objects)}

@@ -32,6 +32,7 @@ __all__ = [
     "compile_c",
     "compile_objects",
     "compiler_version",
+    "disassembly",
     "link",
     "load_target",
     "run_program",
@@ -47,7 +48,7 @@ _HERE = Path(__file__).resolve().parent
 _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
 _SHOWN_LINES = 12  # of what a compiler says: the first error stands there
-_SYMBOL = re.compile(r"[0-9A-Fa-f]+ (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
+_SYMBOL = re.compile(r"(?P<address>[0-9A-Fa-f]+) (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
 
 class Target(BaseModel):
@@ -90,6 +91,7 @@ class Symbol:
     name: str
     kind: str
     size: int
+    address: int
 
 
 def load_target(path: Path) -> Target:
@@ -172,22 +174,29 @@ def run_program(target: Target, program: Path, data: bytes = b"") -> ProgramRun:
 
 def symbols(target: Target, *files: Path) -> list[Symbol]:
     """Symbols with a size, of objects or programs."""
-    rows = [_SYMBOL.fullmatch(line) for line in _inspected(target, "nm", "-S", files)]
-    return [Symbol(row["name"], row["kind"], int(row["size"], 16)) for row in rows if row]
+    rows = [_SYMBOL.fullmatch(line) for line in _inspected(target, "nm", ("-S",), files)]
+    return [
+        Symbol(row["name"], row["kind"], int(row["size"], 16), int(row["address"], 16)) for row in rows if row
+    ]
+
+
+def disassembly(target: Target, program: Path) -> list[str]:
+    """Lines of the code of a program, with those of its text in between."""
+    return _inspected(target, "objdump", ("-d", "-l", "--no-show-raw-insn"), [program])
 
 
 def writable_bytes(target: Target, *files: Path) -> int:
     """Bytes of writable static data in objects (what is constant once it is relocated does not count)."""
-    rows = [line.split() for line in _inspected(target, "size", "-A", files)]
+    rows = [line.split() for line in _inspected(target, "size", ("-A",), files)]
     sizes = [(row[0], int(row[1])) for row in rows if len(row) == 3 and row[1].isdigit()]
     writable = (".data", ".bss", ".sdata", ".sbss", "COMMON")
     return sum(n for name, n in sizes if name.startswith(writable) and ".rel.ro" not in name)
 
 
-def _inspected(target: Target, tool: str, option: str, files: Sequence[Path]) -> list[str]:
-    """Lines that a tool of the toolchain (nm, size) prints."""
+def _inspected(target: Target, tool: str, options: Sequence[str], files: Sequence[Path]) -> list[str]:
+    """Lines that a tool of the toolchain (nm, size, objdump) prints."""
     name = _tool(target.compiler, tool)
-    done = run_to_end([name, option, *(str(f.absolute()) for f in files)], files[0].parent, name)
+    done = run_to_end([name, *options, *(str(f.absolute()) for f in files)], files[0].parent, name)
     if done.returncode != 0:
         raise CheckFailed(f"{target.name}: {name} failed: {done.stderr[:200]}")
     return done.stdout.decode("utf-8", "replace").splitlines()
@@ -195,7 +204,7 @@ def _inspected(target: Target, tool: str, option: str, files: Sequence[Path]) ->
 
 @functools.cache
 def _tool(compiler: str, tool: str) -> str:
-    """Path of the nm or size that belongs to a compiler."""
+    """Path of the tool that belongs to a compiler."""
     asked = [compiler, f"-print-prog-name={tool}"]
     return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or tool
 

@@ -1,0 +1,250 @@
+"""Blocks, branches, calls and loops of linked Thumb-2 code, read from what objdump prints of it.
+
+Every instruction carries the line of the C text that it was made for (`-g`), by which a loop of the object code is
+known as a loop of the text. What cannot be followed (a jump through a table, a loop with two entries) is refused,
+never passed over.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from ..errors import CheckFailed
+
+__all__ = ["Block", "Flow", "Instruction", "Loop", "parse_flows"]
+
+_FUNCTION = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
+_INSTRUCTION = re.compile(r"^ *([0-9a-f]+):\t(\S+)(?:\t(.*))?$")
+_LINE = re.compile(r"^\S*?([^/\s]+):(\d+)(?: \(discriminator \d+\))?$")
+_TARGET = re.compile(r"(?:^|, )([0-9a-f]+) <")
+_CONDITION = "(?:eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)"
+_BRANCH = re.compile(rf"b({_CONDITION})?(?:\.[nw])?$")
+_CALL = re.compile(r"bl(?:\.w)?$")
+_INDIRECT = re.compile(r"blx$")
+_BY_REGISTER = re.compile(rf"bx({_CONDITION})?$")
+_DATA = (".word", ".short", ".byte")
+_UNKNOWN = re.compile(rf"(?:tb[bh]|(?:mov|add)s?(?:{_CONDITION})?(?:\.w)?$|bl{_CONDITION}$|blx{_CONDITION}$)")
+_RETURN = re.compile(rf"(?:pop|ldmia|ldmdb|ldr)({_CONDITION})?(?:\.w)?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """One instruction; `line` is that of the C text, 0 where there is none."""
+
+    address: int
+    name: str
+    operands: str
+    line: int
+
+    @property
+    def target(self) -> int | None:
+        """The address that a branch or call names."""
+        found = _TARGET.search(self.operands)
+        return int(found[1], 16) if found else None
+
+
+@dataclass(slots=True)
+class Block:
+    """Instructions that run one after the other; what comes behind them.
+
+    `call` is the address of a function called at the end, `hook` says that a pointer is called there; `leaves` that
+    the function ends there (after a call in last place, too).
+    """
+
+    instructions: list[Instruction]
+    successors: list[int] = field(default_factory=list)
+    call: int | None = None
+    hook: bool = False
+    leaves: bool = False
+
+    @property
+    def start(self) -> int:
+        return self.instructions[0].address
+
+    @property
+    def last(self) -> Instruction:
+        return self.instructions[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A natural loop: addresses of blocks; `inner` are those of loops within it."""
+
+    header: int
+    latches: frozenset[int]
+    body: frozenset[int]
+    inner: frozenset[int]
+
+
+@dataclass(slots=True)
+class Flow:
+    """A function: its blocks by address, entered at `entry`."""
+
+    name: str
+    entry: int
+    blocks: dict[int, Block]
+
+    def loops(self) -> list[Loop]:
+        """Natural loops, by back edges to a block that dominates them.
+
+        Raises:
+            CheckFailed: A loop has more than one entry.
+        """
+        dominators = self._dominators()
+        latches: dict[int, set[int]] = {}
+        for start, block in self.blocks.items():
+            for after in block.successors:
+                if start in dominators and after in dominators[start]:
+                    latches.setdefault(after, set()).add(start)
+        bodies = {header: self._body(header, found) for header, found in latches.items()}
+        self._refuse_other_cycles({(b, h) for h, found in latches.items() for b in found})
+        return [
+            Loop(h, frozenset(latches[h]), frozenset(body), frozenset(_inside(h, body, bodies)))
+            for h, body in bodies.items()
+        ]
+
+    def _dominators(self) -> dict[int, set[int]]:
+        reached = self._reached()
+        before: dict[int, set[int]] = {b: set() for b in reached}
+        for b in reached:
+            for after in self.blocks[b].successors:
+                before[after].add(b)
+        found = {b: set(reached) for b in reached}
+        found[self.entry] = {self.entry}
+        changed = True
+        while changed:
+            changed = False
+            for b in reached[1:]:
+                new = {b} | set.intersection(*(found[p] for p in before[b]))
+                changed |= new != found[b]
+                found[b] = new
+        return found
+
+    def _reached(self) -> list[int]:
+        order, seen = [self.entry], {self.entry}
+        for b in order:
+            for after in self.blocks[b].successors:
+                if after not in seen:
+                    seen.add(after)
+                    order.append(after)
+        return order
+
+    def _body(self, header: int, latches: set[int]) -> set[int]:
+        before: dict[int, set[int]] = {b: set() for b in self.blocks}
+        for b in self._reached():
+            for after in self.blocks[b].successors:
+                before[after].add(b)
+        body, work = {header}, list(latches)
+        while work:
+            b = work.pop()
+            if b not in body:
+                body.add(b)
+                work.extend(before[b])
+        return body
+
+    def _refuse_other_cycles(self, back: set[tuple[int, int]]) -> None:
+        """Without its back edges a function of natural loops has no cycle."""
+        left = {b: [a for a in self.blocks[b].successors if (b, a) not in back] for b in self._reached()}
+        while ends := [b for b, after in left.items() if not any(a in left for a in after)]:
+            for b in ends:
+                del left[b]
+        if left:
+            raise CheckFailed(f"{self.name} has a loop with two entries: no bound on its instructions")
+
+
+def _inside(header: int, body: set[int], bodies: dict[int, set[int]]) -> Iterator[int]:
+    for other, blocks in bodies.items():
+        if other != header and other in body:
+            yield from blocks
+
+
+def parse_flows(text: str, source: str) -> dict[int, Flow]:
+    """Functions by address, from `objdump -d -l --no-show-raw-insn`; lines are those of the file `source`.
+
+    Raises:
+        CheckFailed: An instruction moves the program counter in a way that is not followed.
+    """
+    flows: dict[int, Flow] = {}
+    for name, instructions in _functions(text, source):
+        if instructions:
+            entry = instructions[0].address
+            flows[entry] = Flow(name, entry, _blocks(name, instructions))
+    return flows
+
+
+def _functions(text: str, source: str) -> Iterator[tuple[str, list[Instruction]]]:
+    name, found, line = "", list[Instruction](), 0
+    for row in text.splitlines():
+        if head := _FUNCTION.match(row):
+            yield name, found
+            name, found, line = head[2], [], 0
+        elif (code := _INSTRUCTION.match(row)) and code[2] not in _DATA:
+            operands = (code[3] or "").split("@")[0].strip()
+            found.append(Instruction(int(code[1], 16), code[2], operands, line))
+        elif where := _LINE.match(row):
+            line = int(where[2]) if where[1] == source else 0
+    yield name, found
+
+
+def _blocks(name: str, instructions: list[Instruction]) -> dict[int, Block]:
+    own = {i.address for i in instructions}
+    ends = {i.address: _end(name, i, own) for i in instructions}
+    starts = {instructions[0].address}
+    for k, i in enumerate(instructions):
+        if (end := ends[i.address]) is not None:
+            starts.update(following.address for following in instructions[k + 1 : k + 2])
+            starts.update(end.successors)
+    blocks: dict[int, Block] = {}
+    for k, i in enumerate(instructions):
+        if i.address in starts:
+            current = blocks[i.address] = Block([])
+        current.instructions.append(i)
+        after = instructions[k + 1].address if k + 1 < len(instructions) else None
+        if (end := ends[i.address]) is not None:
+            current.call, current.hook, current.leaves = end.call, end.hook, end.leaves
+            current.successors = list(end.successors)
+            falls = _falls(i, end)
+        else:
+            falls = after in starts
+        if falls and after is not None:
+            current.successors.append(after)
+    return blocks
+
+
+def _falls(i: Instruction, end: Block) -> bool:
+    """Whether the instruction behind the end of a block may come next."""
+    if end.call is not None or end.hook:
+        return not end.leaves or _is_conditional(i)
+    return _is_conditional(i)
+
+
+def _is_conditional(i: Instruction) -> bool:
+    if i.name.startswith("cb"):
+        return True
+    for form in (_BRANCH, _BY_REGISTER, _RETURN):
+        if found := form.match(i.name):
+            return found[1] is not None
+    return False
+
+
+def _end(name: str, i: Instruction, own: set[int]) -> Block | None:
+    """What an instruction at the end of a block does (successors but the next one); None for any other."""
+    if i.name in ("cbz", "cbnz") or _BRANCH.match(i.name):
+        if i.target in own:
+            return Block([i], [i.target])
+        return Block([i], call=i.target, leaves=True)
+    if _CALL.match(i.name):
+        return Block([i], call=i.target)
+    if _INDIRECT.match(i.name):
+        return Block([i], hook=True)
+    if _BY_REGISTER.match(i.name):
+        return Block([i], hook=i.operands != "lr", leaves=True)
+    if _RETURN.match(i.name) and re.search(r"\bpc\}|^pc,", i.operands):
+        return Block([i], leaves=True)
+    if i.name == "udf":
+        return Block([i], leaves=True)
+    if _UNKNOWN.match(i.name) and (i.name[0] in "tb" or i.operands.startswith("pc")):
+        raise CheckFailed(f"{name}: {i.name} {i.operands} is not followed: no bound on its instructions")
+    return None

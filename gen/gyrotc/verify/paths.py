@@ -1,0 +1,257 @@
+"""The most instructions on any way through a function with all that it calls: a linear program over its blocks.
+
+Li and Malik, "Performance analysis of embedded software using implicit path enumeration", DAC 1995.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import CheckFailed
+from .flow import Block, Flow, Loop
+from .loops import LoopText
+
+__all__ = ["Paths", "Program"]
+
+_HOOKS = ("nothing", "memory", "play", "warm_up", "harmonic", "auxiliary")  # by the kind of a term, from 1 on
+_ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
+
+
+@dataclass(slots=True)
+class Program:
+    """Linked code, and the text it was made of."""
+
+    flows: dict[int, Flow]
+    addresses: dict[str, int]
+    text: LoopText
+    loops: dict[int, list[tuple[Loop, int]]] = field(default_factory=dict)
+
+    def loops_of(self, flow: Flow) -> list[tuple[Loop, int]]:
+        """Loops of a function, each with the line of its text (0 in the compiler's library)."""
+        if flow.entry not in self.loops:
+            self.loops[flow.entry] = [(loop, self._line(flow, loop)) for loop in flow.loops()]
+        return self.loops[flow.entry]
+
+    def _line(self, flow: Flow, loop: Loop) -> int:
+        """The line of its `for`, whose test the compiler put where the loop goes round or is left."""
+        leaving = [b for b in loop.body - loop.inner if not loop.body.issuperset(flow.blocks[b].successors)]
+        tests = [[flow.blocks[b].last.line for b in some] for some in (loop.latches, leaving)]
+        inside = [
+            [i.line for b in some for i in flow.blocks[b].instructions]
+            for some in (loop.latches, loop.body - loop.inner)
+        ]
+        for lines in (*tests, *inside):
+            found = {line for line in lines if self.text.is_loop(line)}
+            if len({self.text.at(line) for line in found}) == 1:
+                return min(found)
+        raise CheckFailed(f"{flow.name}: the loop at {loop.header:x} is of no one loop of the text")
+
+    def hooks(self, numeric: str, slot: str) -> list[tuple[int, int]]:
+        """Functions behind a pointer of a term's code: address, and how many terms of the table have it."""
+        found: dict[int, int] = {}
+        for kind in self.text.counts.kinds:
+            names = [
+                f"gtc_{n}_{what}"
+                for what in (f"{_HOOKS[kind]}_{slot}", "nothing")
+                for n in (numeric, _twin(numeric))
+            ]
+            address = next(self.addresses[n] for n in names if n in self.addresses)
+            found[address] = found.get(address, 0) + 1
+        return list(found.items())
+
+
+def _twin(numeric: str) -> str:
+    """Functions that are the same in both arithmetics are linked once, by one of the two names."""
+    return "q31" if numeric == "f32" else "f32"
+
+
+@dataclass(slots=True)
+class _Copy:
+    """A function in one place where it is called: nodes of its blocks, edges by the blocks that they join."""
+
+    flow: Flow
+    around: str  # text of the loop that it is called in
+    node: dict[int, int]
+    ways: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    hooks: list[tuple[int, int, int]] = field(default_factory=list)  # block, edge to it, terms that have it
+
+
+@dataclass(slots=True)
+class Paths:
+    """The linear program: flows along edges, each from a node to another; node 0 is the end."""
+
+    program: Program
+    numeric: str
+    cost: list[int] = field(default_factory=lambda: [0])
+    edges: list[tuple[int, int]] = field(default_factory=list)
+    limits: list[tuple[dict[int, float], float]] = field(
+        default_factory=list
+    )  # sum of factors x edges <= limit
+    entered: list[tuple[str, str, int]] = field(default_factory=list)  # caller, function, edge into it
+    turns: dict[str, list[dict[int, float]]] = field(default_factory=dict)  # of loops, by text
+    begun: dict[str, list[int]] = field(default_factory=dict)  # edges into loops from outside, by text
+
+    def whole(self, address: int) -> None:
+        """Makes the graph of a function from its first instruction (edge 0) to its end (node 0)."""
+        self.edges.append((-1, 0))
+        first, exits = self.function(address)
+        self.edges[0] = (-1, first)
+        self.edges += [(node, 0) for node in exits]
+
+    def function(self, address: int, above: tuple[int, ...] = (), around: str = "") -> tuple[int, list[int]]:
+        """A copy of a function for one place where it is called: its first node, and those at which it ends.
+
+        Raises:
+            CheckFailed: It calls itself, or code that is not there.
+        """
+        if address in above or address not in self.program.flows:
+            raise CheckFailed(f"a call to {address:x} cannot be followed: no bound on the instructions")
+        flow = self.program.flows[address]
+        copy = _Copy(flow, around, {start: self._node(block) for start, block in flow.blocks.items()})
+        exits: list[int] = []
+        for start, block in flow.blocks.items():
+            done = self._called(copy, start, (*above, address))
+            calls = block.hook or block.call is not None
+            if block.leaves:
+                exits += done if calls else [copy.node[start]]
+            from_here = done if calls and not block.leaves else [copy.node[start]]
+            for after in block.successors:
+                ways = [self._edge(a, copy.node[after]) for a in from_here]
+                copy.ways.setdefault((start, after), []).extend(ways)
+        self._divided(copy)
+        for loop, line in self.program.loops_of(flow):
+            self._bounded(copy, loop, line)
+        return copy.node[address], exits
+
+    def _node(self, block: Block) -> int:
+        self.cost.append(len(block.instructions))
+        return len(self.cost) - 1
+
+    def _edge(self, a: int, b: int) -> int:
+        self.edges.append((a, b))
+        return len(self.edges) - 1
+
+    def _called(self, copy: _Copy, start: int, above: tuple[int, ...]) -> list[int]:
+        """The nodes at which what a block calls ends; none where it calls nothing."""
+        block = copy.flow.blocks[start]
+        if block.hook:
+            slot = re.search(r"->(begin|step|apply)\(", self.program.text.at(block.last.line))
+            if slot is None:
+                raise CheckFailed(
+                    f"{copy.flow.name}: a call through a pointer at {start:x} cannot be followed"
+                )
+            callees = self.program.hooks(self.numeric, slot[1])
+        elif block.call is not None:
+            callees = [(block.call, 0)]
+        else:
+            return []
+        ends: list[int] = []
+        for callee, terms in callees:
+            first, exits = self.function(callee, above, self._around(copy, start))
+            way = self._edge(copy.node[start], first)
+            self.entered.append((copy.flow.name, self.program.flows[callee].name, way))
+            if terms:
+                copy.hooks.append((start, way, terms))
+            ends += exits
+        return ends
+
+    def _divided(self, copy: _Copy) -> None:
+        """Divisors of the runtime have 32 bits: libgcc's way for longer ones, behind its first test, is not taken."""
+        first = copy.flow.blocks[copy.flow.entry]
+        tests = [(i.name, i.operands) for i in first.instructions[-2:]]
+        if (
+            copy.flow.name == "__udivmoddi4"
+            and tests[0] == ("cmp", "r3, #0")
+            and tests[1][0].startswith("bne")
+        ):
+            ways = copy.ways[copy.flow.entry, first.successors[0]]
+            self.limits.append((dict.fromkeys(ways, 1.0), 0.0))
+
+    def _around(self, copy: _Copy, start: int) -> str:
+        """The text of the innermost loop around a block; where there is none, of the loop that calls the function."""
+        loops = [
+            (len(loop.body), line) for loop, line in self.program.loops_of(copy.flow) if start in loop.body
+        ]
+        return self.program.text.at(min(loops)[1]) if loops else copy.around
+
+    def _bounded(self, copy: _Copy, loop: Loop, line: int) -> None:
+        """Limits how often a loop goes round, and which terms it meets."""
+        text = self.program.text
+        outer = [(len(o.body), n) for o, n in self.program.loops_of(copy.flow) if o.body > loop.body]
+        most = text.most(line, text.at(min(outer)[1]) if outer else copy.around)
+        back = [e for b in loop.latches for e in copy.ways[b, loop.header]]
+        entries = [
+            e for (a, b), es in copy.ways.items() for e in es if b == loop.header and a not in loop.body
+        ]
+        tested_last = self._is_tested_last(copy.flow, loop, text.at(line))
+        turns = dict.fromkeys(back, 1.0) | (dict.fromkeys(entries, 1.0) if tested_last else {})
+        self.limits.append((_less(turns, entries, float(most)), float(most) if not entries else 0.0))
+        self.turns.setdefault(text.at(line), []).append(turns)
+        self.begun.setdefault(text.at(line), []).extend(entries)
+        for start, way, terms in copy.hooks:
+            if start in loop.body - loop.inner:
+                self.limits.append((_less({way: 1.0}, entries, float(terms)), 0.0))
+
+    def _is_tested_last(self, flow: Flow, loop: Loop, text: str) -> bool:
+        """Whether a turn ends, and does not begin, with the test of the loop: turns are ways back and one more."""
+
+        def tests(start: int) -> bool:
+            block = flow.blocks[start]
+            line = block.last.line
+            leaves = any(after not in loop.body for after in block.successors)
+            return leaves and self.program.text.is_loop(line) and self.program.text.at(line) == text
+
+        one_block = loop.latches == {loop.header} and len(loop.body) == 1
+        return all(tests(b) for b in loop.latches) and (one_block or not tests(loop.header))
+
+    def calls(self, caller: str, callee: str) -> list[dict[int, float]]:
+        """Edges of calls, by patterns of the names' beginnings."""
+        return [{e: 1.0} for a, b, e in self.entered if re.match(caller, a) and re.match(callee, b)]
+
+    def limit(self, flows: list[dict[int, float]], most: float) -> None:
+        """The sum of flows is at most so much."""
+        total: dict[int, float] = {}
+        for some in flows:
+            for edge, factor in some.items():
+                total[edge] = total.get(edge, 0.0) + factor
+        self.limits.append((total, float(most)))
+
+    def most(self) -> int:
+        """The most instructions on any way from the first node, that of edge 0, to the end."""
+        from scipy import sparse  # a second for each start of gyrotc that asks for no bound
+        from scipy.optimize import linprog
+
+        n = len(self.edges)
+        ends = np.array(self.edges)
+        into, out_of = ends[:, 1], ends[1:, 0]
+        balance = sparse.csr_matrix(
+            (
+                np.concatenate([np.ones(n), -np.ones(n - 1)]),
+                (np.concatenate([into, out_of]), np.concatenate([np.arange(n), np.arange(1, n)])),
+            ),
+            shape=(len(self.cost), n),
+        )
+        cells = [(row, e, f) for row, (factors, _) in enumerate(self.limits) for e, f in factors.items()]
+        rows, columns, factors = np.array(cells, dtype=float).reshape(-1, 3).T
+        unequal = sparse.csr_matrix((factors, (rows.astype(int), columns.astype(int))), (len(self.limits), n))
+        cost = np.array(self.cost, dtype=float)[into]
+        right = np.zeros(len(self.cost))
+        right[0] = 1.0  # what goes in at edge 0 comes out at the end
+        found = linprog(
+            -cost, A_ub=unequal, b_ub=[limit for _, limit in self.limits], A_eq=balance, b_eq=right,
+            bounds=(0.0, None), method="highs",
+        )  # fmt: skip
+        if found.status != 0:
+            raise CheckFailed(f"no bound on the instructions: {found.message}")
+        return int(np.floor(-found.fun + _ROUNDING))
+
+
+def _less(turns: dict[int, float], entries: list[int], most: float) -> dict[int, float]:
+    """Factors of `turns - most x entries`."""
+    factors = dict(turns)
+    for e in entries:
+        factors[e] = factors.get(e, 0.0) - most
+    return factors
