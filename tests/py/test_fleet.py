@@ -259,18 +259,6 @@ def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) ->
         pytest.skip("Dask is installed")
 
 
-def test_on_dask(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-    for k in range(3):
-        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
-    shutil.rmtree(tmp_path / "out", ignore_errors=True)
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        entries = run_fleet(
-            load_manifest(tmp_path / "d"), tmp_path / "out", scheduler=cluster.scheduler_address
-        )
-    assert [entry.status for entry in entries] == ["done"] * 3
-
-
 def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:
     """Before: such a fleet passed without a word."""
     for k in (1, 2):

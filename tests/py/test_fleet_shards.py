@@ -70,6 +70,14 @@ def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     assert contents(out) == contents(lot / "whole")
 
 
+def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        entries = run_fleet(load_manifest(lot / "d"), lot / "dask", scheduler=cluster.scheduler_address)
+    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+    assert contents(lot / "dask") == contents(lot / "whole")
+
+
 def test_every_unit_is_in_one_share_of_any_number() -> None:
     units = tuple(Unit(Path(f"/lot/RLG-{k:05d}"), None) for k in range(1000))
     fleet = Fleet(units, FitOptions(), None, None)
