@@ -28,6 +28,7 @@ from gyrotc.results.limits import HeldLimits
 from gyrotc.results.lot import Lot
 from gyrotc.results.lot_plan import LotPlan
 from gyrotc.results.manifest import Manifest
+from gyrotc.results.map import MapOnGrid
 from gyrotc.results.marker import Marker
 from gyrotc.results.planned import Plan
 from gyrotc.results.training import Training
@@ -56,6 +57,7 @@ RESULTS: dict[str, type[Part]] = {
     "lot": Lot,
     "lot-plan": LotPlan,
     "manifest": Manifest,
+    "map": MapOnGrid,
     "plan": Plan,
     "result": Marker,
     "training": Training,

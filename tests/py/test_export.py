@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.errors import CheckFailed, InputError
-from gyrotc.jobs.export import export, map_text
+from gyrotc.jobs.export import Exporting, export
+from gyrotc.jobs.export.grid import csv_text, grid_of
 from gyrotc.model import Model, load_model
 from gyrotc.quantise.cubic import Autopilot, Cubic, best_cubic
 
@@ -99,8 +100,10 @@ def test_the_file_gives_the_firmwares_bits(
     autopilot: Autopilot, model: Model, firmware: Path, tmp_path: Path
 ) -> None:
     model.save(tmp_path / "model.json")
-    export(tmp_path, autopilot, tmp_path / "gyro.params", axis_as="z")
-    told = export(tmp_path, autopilot, tmp_path / "gyro.params", axis_as="y")  # an earlier export is replaced
+    export(tmp_path, autopilot, tmp_path / "gyro.params", Exporting(axis_as="z"))
+    told = export(
+        tmp_path, autopilot, tmp_path / "gyro.params", Exporting(axis_as="y")
+    )  # an earlier export is replaced
     values = read(tmp_path / "gyro.params")
     words = np.array([values[name] for name in NAMES[autopilot]], dtype=np.float32)
     stream = words.tobytes() + TEMPERATURES.tobytes()
@@ -138,7 +141,7 @@ def test_what_ardupilot_would_not_correct_is_refused(model: Model) -> None:
 
 
 def test_the_table_is_the_map(model: Model, tmp_path: Path) -> None:
-    rows = list(csv.DictReader(map_text([model]).splitlines()))
+    rows = list(csv.DictReader(csv_text([grid_of(model)]).splitlines()))
     assert len(rows) == 61 * 25
     for row in rows[:: 61 * 5]:
         bias = model.map_dph(float(row["temperature_c"]), float(row["slope_c_per_min"]))
@@ -150,4 +153,4 @@ def test_the_table_is_the_map(model: Model, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not written by gyrotc"):
         export(tmp_path, "csv", tmp_path / "notes.csv")
     with pytest.raises(InputError, match="--axis-as"):
-        export(tmp_path, "px4", tmp_path / "a", axis_as="w")
+        export(tmp_path, "px4", tmp_path / "a", Exporting(axis_as="w"))

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import CheckFailed, InputError
+from ..errors import InputError
 from .base import DirArg, app, tell
 
 
@@ -23,19 +23,14 @@ def sign(
     Example: gyrotc sign result --key lab.pem
     """
     from ..emit.record import SIGNATURE
-    from ..jobs.axes import axes_in, verify_axes
+    from ..jobs.axes import axes_in, check_emitted
     from ..outputs import result_folder
-    from ..verify import verify
     from ..verify.signature import load_private_key, sign_record
 
     private = load_private_key(key, lambda: _passphrase(key))
     axes = axes_in(folder)
     parts = [folder / axis for axis in axes] or [folder]
-    results = {part.name: verify(part, compiled=False) for part in parts}
-    judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
-    wrong = [name for result in judged for name in result.wrong_files]
-    if wrong or any(result.failed for result in judged):
-        raise CheckFailed(f"not signed: {wrong[0] if wrong else 'a check'} fails; see gyrotc verify {folder}")
+    check_emitted(folder, "not signed")
     for part in [*parts, *([folder] if axes else [])]:
         with result_folder(part, "sign", entries=("c",)) as stage:
             shutil.copytree(part / "c", stage.folder / "c")

@@ -16,11 +16,11 @@ from ..pages.report import axes_page
 from ..reference.runtime import runtime_folders
 from ..results.verification import JointVerification, Verification
 from ..texts import c_environment
-from ..verify import file_entries
+from ..verify import file_entries, verify
 from ..verify.signature import check_signature, load_public_key
 from ..verify.toolchain import all_targets, compile_c, run_program
 
-__all__ = ["axes_in", "join_axes", "joint_texts", "verify_axes"]
+__all__ = ["axes_in", "check_emitted", "join_axes", "joint_texts", "verify_axes"]
 
 AXES = ("x", "y", "z")
 
@@ -131,6 +131,25 @@ def verify_axes(
         signature=signed,
         axes=dict(results),
     )
+
+
+def check_emitted(folder: Path, refused: str) -> None:
+    """Is what `folder/c` holds (with several axes: of every axis, too) what gyrotc makes of the models?
+
+    Args:
+        refused: What is not done with it otherwise, in words.
+
+    Raises:
+        InputError: There is no emitted code, or a model cannot be read.
+        CheckFailed: It is not.
+    """
+    axes = axes_in(folder)
+    parts = [folder / axis for axis in axes] or [folder]
+    results = {part.name: verify(part, compiled=False) for part in parts}
+    judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
+    wrong = [name for result in judged for name in result.wrong_files]
+    if wrong or any(result.failed for result in judged):
+        raise CheckFailed(f"{refused}: {wrong[0] if wrong else 'a check'} fails; see gyrotc verify {folder}")
 
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:

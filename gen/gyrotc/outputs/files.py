@@ -15,7 +15,16 @@ __all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
-_EXPORTED = (b"# gyrotc: ", b"serial,axis,temperature_c,slope_c_per_min,bias_dph")  # how exports begin
+_EXPORTED = (
+    b"# gyrotc: ",
+    b"serial,axis,temperature_c,slope_c_per_min,bias_dph",
+    b"/* gyrotc: ",
+    b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- gyrotc: ',
+)  # fmt: skip; how exports begin
+_UNIT, _MADE_BY = (
+    b"PK\x03\x04",
+    b'generationTool="gyrotc"',
+)  # an FMU: a ZIP file, its description first and as it is
 
 unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""
@@ -80,7 +89,7 @@ def check_replaceable(path: Path) -> None:
             raise InputError(str(path), "is a folder", "the name of a file")
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
-            if _PAGE in head or head.startswith(_EXPORTED):
+            if _PAGE in head or head.startswith(_EXPORTED) or (head.startswith(_UNIT) and _MADE_BY in head):
                 return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:
