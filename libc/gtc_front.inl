@@ -81,11 +81,10 @@ static NUM FN(seen)(const TABLE *table, NUM temp)
     return (most > low) ? most : low;
 }
 
-/* Lets every term take note that a block ends; it sees this temperature. */
-static void FN(step_terms)(STATE *state, NUM temp)
+/* Lets every term take note that a block ends; it sees this temperature, which lies within the envelope. */
+static void FN(step_terms)(STATE *state, NUM seen)
 {
     const TABLE *const table = state->table;
-    const NUM seen = FN(seen)(table, temp);
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
@@ -94,11 +93,10 @@ static void FN(step_terms)(STATE *state, NUM temp)
     FN(doubt_step)(state, seen);
 }
 
-/* Makes the correction for an input and puts it in force. */
-static void FN(correct)(STATE *state, NUM temp, NUM slope, int_least32_t remarks)
+/* Makes the correction for an input, whose temperature the terms see as `seen`, and puts it in force. */
+static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32_t remarks)
 {
     const TABLE *const table = state->table;
-    const NUM seen = FN(seen)(table, temp);
     EFFECT effect;
     NUM bias = NUM_ZERO;
     WIDE total;
@@ -141,6 +139,7 @@ static void FN(forget_terms)(STATE *state)
 static void FN(restart)(STATE *state, NUM x, int is_first)
 {
     const TABLE *const table = state->table;
+    const NUM seen = FN(seen)(table, x);
     uint_least32_t i;
 
     state->filled = 0U;
@@ -149,11 +148,11 @@ static void FN(restart)(STATE *state, NUM x, int is_first)
     if (is_first == 0) {
         FN(forget_terms)(state);
     }
-    FN(doubt_begin)(state, FN(seen)(table, x));
+    FN(doubt_begin)(state, seen);
     for (i = 0U; i < table->n_terms; i++) {
-        table->term_code[i]->begin(state, i, FN(seen)(table, x));
+        table->term_code[i]->begin(state, i, seen);
     }
-    FN(correct)(state, x, NUM_ZERO, GTC_WARMING);
+    FN(correct)(state, x, seen, NUM_ZERO, GTC_WARMING);
 }
 
 /* ---- the window ---------------------------------------------------------------------------------- */
@@ -175,33 +174,40 @@ static void FN(push)(STATE *state, uint_least32_t is_valid)
 }
 
 /* Least-squares slope over the valid blocks of the window, the newest of which is valid.
- * Returns GTC_OK, or GTC_WARMING (and slope 0) if the window is not full. */
+ * Returns GTC_OK, or GTC_WARMING (and slope 0) if the window is not full. Sums over the places k of the blocks begin
+ * as those without holes; the newest block adds nothing to the sums over d, its differences from itself. */
 static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
 {
     const uint_least32_t blocks = state->table->slope_blocks;
+    const uint_least32_t last = blocks - 1U;
     const uint_least32_t half = (blocks + 1U) / 2U;
+    const NUM newest = state->window[0];
+    uint_least32_t n = blocks;
+    uint_least32_t sum_k = (blocks * last) / 2U;
+    uint_least32_t sum_kk = (sum_k * (blocks + last)) / 3U;
     WIDE sum_d = NUM_ZERO;
     WIDE sum_kd = NUM_ZERO;
-    uint_least32_t n = 0U;
-    uint_least32_t sum_k = 0U;
-    uint_least32_t sum_kk = 0U;
-    uint_least32_t k;
+    uint_least32_t k = 0U;
+    uint_least32_t bit;
 
-    for (k = 0U; k < blocks; k++) {
-        const uint_least32_t age = (blocks - 1U) - k;
-
-        if (((state->window_valid >> age) & 1U) != 0U) {
-            const WIDE d = FN(diff)(state->window[age], state->window[0]);
+    *slope = NUM_ZERO;
+    if (state->filled < blocks) {
+        return GTC_WARMING;
+    }
+    for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {
+        if ((state->window_valid & bit) != 0U) {
+            const WIDE d = FN(diff)(state->window[last - k], newest);
 
             sum_d = FN(add)(sum_d, d);
             sum_kd = FN(add)(sum_kd, FN(scaled)(k, d));
-            n++;
-            sum_k += k;
-            sum_kk += k * k;
+        } else {
+            n--;
+            sum_k -= k;
+            sum_kk -= k * k;
         }
+        k++;
     }
-    *slope = NUM_ZERO;
-    if ((state->filled < blocks) || (n < 2U) || (n < half)) {
+    if ((n < 2U) || (n < half)) {
         return GTC_WARMING;
     }
     sum_d = FN(scaled)(sum_k, sum_d);
@@ -431,7 +437,7 @@ static void FN(bridge)(STATE *state)
         FN(put)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
     } else if (state->input[0].gap_us != 0U) {
         FN(push)(state, 0U);
-        FN(step_terms)(state, state->input[0].mean);
+        FN(step_terms)(state, FN(seen)(state->table, state->input[0].mean));
         state->status |= GTC_HELD;
     } else {
         /* nothing was ever believed: no correction yet */
@@ -452,14 +458,16 @@ static void FN(close)(STATE *state)
     FN(close_channels)(state);
     if (FN(end_block)(state, &state->input[0], state->table->guards) != 0) {
         NUM temp;
+        NUM seen;
         NUM slope;
         int_least32_t remarks;
 
         FN(push)(state, 1U);
         remarks = FN(window_slope)(state, &slope);
         temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
-        FN(step_terms)(state, temp);
-        FN(correct)(state, temp, slope, remarks);
+        seen = FN(seen)(state->table, temp);
+        FN(step_terms)(state, seen);
+        FN(correct)(state, temp, seen, slope, remarks);
     } else {
         FN(bridge)(state);
     }

@@ -133,18 +133,20 @@ GTC_IN_LOOP uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
 #endif
 }
 
-/* A sum of products, in 2^-29 of the result's unit, and the sum with w * e added;
- * |w| < 2^30, 0 <= e < 2^30. */
+/* A sum of products, in 2^-29 of the result's unit: as it begins for w0, with w * e added, and in units as it ends;
+ * |w0| <= 2^30, |w| < 2^30, 0 <= e < 2^30. A wide sum has w0 in it from the start, so that no register waits with
+ * the network's address for the end of the loop; in halves it costs less to add w0 last. */
 #if GTC_HALF_MULTIPLY
 typedef struct {
     uint_least32_t low;
     uint_least32_t high;
 } FN(sum_t);
 
-static inline FN(sum_t) FN(no_sum)(void)
+static inline FN(sum_t) FN(begun)(int_least32_t w0)
 {
     FN(sum_t) sum;
 
+    (void)w0;
     sum.low = 0U;
     sum.high = 0U;
     return sum;
@@ -171,12 +173,17 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 {
     return (sum.high << 3) | (sum.low >> 29);
 }
+
+GTC_IN_LOOP uint_least32_t FN(ended)(FN(sum_t) sum, const gtc_word_t *network)
+{
+    return network[1].bits + FN(units)(sum);
+}
 #else
 typedef int_least64_t FN(sum_t);
 
-static inline FN(sum_t) FN(no_sum)(void)
+static inline FN(sum_t) FN(begun)(int_least32_t w0)
 {
-    return 0;
+    return (int_least64_t)w0 * 0x20000000;
 }
 
 GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
@@ -189,6 +196,12 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 {
     GTC_ASSERT_RANGE((sum >= -0x1000000000000000LL) && (sum < 0x1000000000000000LL));
     return (uint_least32_t)(((uint_least64_t)sum >> 29) & 0xFFFFFFFFU);
+}
+
+GTC_IN_LOOP uint_least32_t FN(ended)(FN(sum_t) sum, const gtc_word_t *network)
+{
+    (void)network;
+    return FN(units)(sum);
 }
 #endif
 
@@ -296,7 +309,7 @@ static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *ne
     const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
     /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
     const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
-    FN(sum_t) sum = FN(no_sum)();
+    FN(sum_t) sum = FN(begun)(network[1].integer);
     gtc_word_t bias;
 
     sum = FN(accumulate)(sum, network[2].integer, (int_least32_t)(in->x_temp << 13));
@@ -320,7 +333,7 @@ static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *ne
 #endif
         }
     }
-    bias.bits = network[1].bits + FN(units)(sum);
+    bias.bits = FN(ended)(sum, network);
     return bias.integer;
 }
 

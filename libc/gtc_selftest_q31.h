@@ -14,7 +14,7 @@ static int FN(primitives_work)(void)
     const uint_least32_t b = operand[1];
     const int_least32_t c = (int_least32_t)a;
     const int_least32_t d = (int_least32_t)b;
-    const FN(sum_t) zero = FN(no_sum)();
+    const FN(sum_t) zero = FN(begun)(0);
 
     int works = 1;
 

@@ -56,6 +56,9 @@ POWER = ("while (rest != 0U) {", "for (rest = blocks; rest != 0U; rest >>= 1) {"
 #: Loops that are no plain count, by their text; docs/numerics.md says why each ends.
 _OTHER: dict[str, Callable[[Counts, int], int]] = {
     "for (i = state->table->slope_blocks - 1U; i > 0U; i--) {": lambda c, _: c.by_name["slope_blocks"] - 1,
+    "for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {": lambda c, _: (
+        c.by_name["slope_blocks"] - 1
+    ),
     # A running block, those until every channel counts as missing, and the rest of the last one.
     "while (rest > 0U) {": lambda c, _: c.missing_blocks + 3,
     "while (center != end) {": lambda c, unrolled: 0 if c.is_narrow else c.centers // unrolled,
@@ -69,7 +72,6 @@ _OTHER: dict[str, Callable[[Counts, int], int]] = {
     # Words of several arrays, of which all together are as many as `totals` says.
     _WORDS: lambda c, _: max(c.words, _SAVED),
 }
-_LOCAL = {"blocks": "slope_blocks"}  # names of counts in a loop's text
 
 
 @dataclass(slots=True)
@@ -106,7 +108,6 @@ class LoopText:
 
     def _number(self, text: str) -> int | None:
         word = re.sub(r"^\(uint_least32_t\)", "", text).rsplit("->", 1)[-1]
-        word = _LOCAL.get(word, word)
         if word == "network[0].bits":
             return self.counts.centers
         if number := re.fullmatch(r"(\d+)U?L?", word):
