@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.emit.files import emit, emit_texts, quantise_all
 from gyrotc.errors import InputError
-from gyrotc.model import Model, load_model
+from gyrotc.model import Guard, Model, Term, load_model
+from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.
 RUNTIME = {"gtc.h", "gtc.c", "emission.json"}  # the record has the hashes of the other two
@@ -79,6 +81,48 @@ def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: P
     printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
     temperature, bias = float(printed.split()[2]), float(printed.split()[4])
     assert bias == pytest.approx(float(model.map_dph(temperature, 0.0)), abs=2e-6)
+
+
+#: Readings of a supply of 27 ... 29 V, believed in that range, 28.4 V where it is lost; what its term then adds, deg/h.
+READINGS = {
+    "28.40000F": 0.004,
+    "0.0F": -0.01,
+    "(float)4095": 0.01,
+    "1e20F": 0.01,
+    "(0.0F / (float)argc - 1e38F * 1e38F)": 0.004,
+}
+
+
+@pytest.mark.parametrize("reading", READINGS)
+def test_main_prints_no_wild_correction_whatever_a_channel_reads(reading: str, tmp_path: Path) -> None:
+    """It fed 0 V to a supply that trained at 28 V, and printed -0.28 deg/h for a true 0.0073.
+
+    As emitted it feeds what is used where the channel is lost.
+    """
+    term = Term(
+        id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v"
+    )
+    guard = Guard(
+        low=27.0, high=29.0, max_step=2.0, max_rate_per_min=0.0, agree_s=1.0, stuck_s=0.0,
+        missing_s=300.0, fallback=28.4,
+    )  # fmt: skip
+    model = random_model(4, terms=(term,), guards={"supply_v": guard})
+    emit(model, tmp_path)
+    c = tmp_path / "c"
+    emitted = (c / "main.c").read_text("ascii")
+    assert emitted.count("28.40000F") == 1
+    fed = emitted.replace("28.40000F", reading).replace("main(void)", "main(int argc, char **argv)")
+    longer, turns = re.subn(r"k < \d+;", "k < 2100;", fed)  # two blocks of 10 s
+    assert turns == 1
+    (c / "main.c").write_text(longer, "ascii")
+    sources = [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"]
+    subprocess.run(
+        ["gcc", "-std=c99", "-ffp-contract=off", "-w", "-o", tmp_path / "main", *sources], check=True
+    )
+    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
+    temperature, bias = float(printed.split()[2]), float(printed.split()[4])
+    expected = float(model.map_dph(temperature, 0.0)) + READINGS[reading]
+    assert bias == pytest.approx(expected, abs=2e-6)
 
 
 def test_intel_hex_holds_the_image(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "proof.md").read_text("utf-8")
 REQUIREMENTS = re.findall(r"^\| (R-[A-Z]+-\d+) \| (.+?) \| (.+) \|$", PAGE, re.MULTILINE)
+FAULTS = re.findall(r"^\| ([^|]+) \| (`tests/[^|]+::[^|]+) \|$", PAGE.partition("\n## 6.")[2], re.MULTILINE)
 ANSWER = re.compile(r"`(tests/[\w/]+\.(?:py|c))::(\w+)`")
 
 
@@ -28,9 +29,19 @@ def test_there_are_requirements_and_no_id_twice() -> None:
     assert len(ids) == len(re.findall(r"^\| R-", PAGE, re.MULTILINE))
 
 
+def test_every_fault_that_was_met_has_a_test() -> None:
+    assert len(FAULTS) >= 20
+    assert len(FAULTS) == len(re.findall(r"^\| (?!fault|---)", PAGE.partition("\n## 6.")[2], re.MULTILINE))
+    for _, answers in FAULTS:
+        _exist(answers)
+
+
 @pytest.mark.parametrize("requirement", REQUIREMENTS, ids=[r[0] for r in REQUIREMENTS])
 def test_what_answers_for_a_requirement_exists(requirement: tuple[str, str, str]) -> None:
-    _, _, answers = requirement
+    _exist(requirement[2])
+
+
+def _exist(answers: str) -> None:
     found = ANSWER.findall(answers)
     assert found
     assert ANSWER.sub("", answers).strip() == ""

@@ -10,7 +10,7 @@ import pytest
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import Model
 from gyrotc.quantise import NUMERICS
-from gyrotc.reference.table import Table, Words
+from gyrotc.reference.table import SERIAL_WORDS, Table, Words
 from gyrotc.status import E_ID, E_IMAGE, E_LAYOUT
 from libc_build import Runtime, runtime
 from libc_device import Device, history, variant
@@ -50,6 +50,17 @@ def test_an_emitted_image_opens_to_the_bits_of_the_compiled_table(build: Runtime
         device.init(image, 7)
         for a, b in zip(expected, device.steps(image, channels, missed), strict=True):
             np.testing.assert_array_equal(a, b, err_msg=numeric)
+
+
+@pytest.mark.parametrize("serial", ["RLG-0042", "S" * 64])
+def test_an_opened_image_has_the_serial_and_the_date_of_its_model(build: Runtime, serial: str) -> None:
+    """It had none: a firmware could not say whose correction it had."""
+    model = random_model(3, serial=serial, meta={"calibrated_on": "2026-11-21"})
+    for table, words in _images(model).values():
+        status, opened = Device(build, table).open(words)
+        text = ctypes.string_at(opened.serial, 4 * SERIAL_WORDS)
+        assert status == 0 and text.rstrip(b"\0").decode("ascii") == serial
+        assert opened.calibrated == 20261121
 
 
 @pytest.mark.parametrize("seed", [1, 2])
