@@ -219,6 +219,8 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"
     assert [c["moved_rms_dph"] is None for c in changes["history"]] == [True, False]
     assert changes["map"]["significant"] is True and "as found: RMS 1.0" in done.stdout
+    page = (tmp_path / "two" / "report.html").read_text()
+    assert "All calibrations that are known" in page and 'aria-label="all calibrations over time' in page
     names = json.loads((tmp_path / "two" / "manifest.json").read_text())["files"]
     assert "limits.json" in names
 

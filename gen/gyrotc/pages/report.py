@@ -21,6 +21,7 @@ from ..results.training import LeftOutRows, Training
 from ..terms import CATALOGUE
 from ..texts import file_stem, html_environment
 from ..train.left_out import exclude_text
+from .history_plots import calibrations_over_time
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 from .prior_plots import prior_and_posterior
 from .unit import UnitResults, unit_in
@@ -69,7 +70,8 @@ def axes_page(folder: Path, axes: Sequence[str]) -> str:
         pictures = {u.model.axis: _bias_picture(folder / str(u.model.axis), u) for u in units}
         worst = told[0].verdict
         template = page_environment().get_template("axes.html.j2")
-        return template.render(units=told, pictures=pictures, verdict=worst)
+        trends = {unit.model.axis: _trend(unit) for unit in units}
+        return template.render(units=told, pictures=pictures, trends=trends, verdict=worst)
 
 
 def write_page(folder: Path, text: str) -> Path:
@@ -138,7 +140,12 @@ def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:
         "curve": curve_by_size(unit.training) if unit.training else None,
         "lot": prior_and_posterior(unit.training) if unit.training else None,
         "allan": allan_deviation(unit.training.noise) if unit.training else None,
+        "trend": _trend(unit),
     }
+
+
+def _trend(unit: UnitResults) -> str | None:
+    return calibrations_over_time(unit.changes.history) if unit.changes else None
 
 
 def _bias_picture(folder: Path, unit: UnitResults) -> str | None:
