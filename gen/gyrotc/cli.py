@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
+import warnings
 
 from .errors import GyrotcError, InputError
-from .outputs import Interrupted, die_of, raise_on_signals
 from .texts import terminal_line, terminal_text
 
 _CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
@@ -19,14 +20,29 @@ def main() -> None:
     Arrow's read-ahead threads may still hold a Python file when the interpreter goes; it would end them inside C++
     code, which aborts the process after its work is done.
     """
+    _quiet_start()
     _single_threaded()
+    _without_warnings()
+    from .outputs import Interrupted, die_of, raise_on_signals
+
     raise_on_signals()
     try:
         status = _status()
         status = _flushed(status)
     except Interrupted as end:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
         die_of(end.number)
     os._exit(status)
+
+
+def _quiet_start() -> None:
+    """Until `raise_on_signals` Ctrl-C ends the process as it ends any other: nothing is begun that could be cleaned up.
+
+    Python's own answer would be a traceback out of the middle of an import. A signal that is ignored stays so.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _flushed(status: int) -> int:
@@ -56,6 +72,16 @@ def _single_threaded() -> None:
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+
+
+def _without_warnings() -> None:
+    """What libraries warn of is no news for who typed a command, here and in processes of a fleet.
+
+    Whoever asks for warnings (`PYTHONWARNINGS`, `python -W`) gets them; in tests each one is an error (`pytest.ini`).
+    """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+        os.environ.setdefault("PYTHONWARNINGS", "ignore")
 
 
 _COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`

@@ -195,5 +195,5 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(
         time.sleep(0.005)
     job.send_signal(number)
     _, told = job.communicate()
-    assert (job.returncode, told) == (-number, "")
+    assert (job.returncode, told) == (-number, f"gyrotc: interrupted ({number.name})\n")
     assert list(tmp_path.iterdir()) == []

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import random
+import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from conftest import Command
+from emitted import emitted
 from gyrotc.cli import _hoisted
-from gyrotc.commands.base import time_left
+from gyrotc.commands.stages import BUILD, DIAGNOSE, FIT, Course, time_left
 from gyrotc.diagnose.signatures import cache
 from recordings import described
 
@@ -34,6 +39,8 @@ def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path
     assert told.returncode == 0 and told.stdout
     lines = told.stderr.splitlines()
     assert lines and all(line.split()[1] == "s" and float(line.split()[0]) >= 0.0 for line in lines)
+    course = Course(FIT)
+    assert all(course.share_of(line.partition(" s  ")[2]) > 0.0 for line in lines[1:]), "a stage has no place"
 
 
 def test_the_time_left() -> None:
@@ -41,6 +48,122 @@ def test_the_time_left() -> None:
     assert time_left(5, 20, 30.0) == ", 25 %, about 90 s left"
     assert time_left(10, 1000, 60.0) == ", 1 %, about 99 min left"
     assert time_left(1, 1000, 60.0) == ", 0 %, about 16.6 h left"
+
+
+def test_what_a_text_tells_of_the_work_that_is_done() -> None:
+    course = Course((("reading", 0.2), ("verifying", 0.6), ("drawing", 0.2)))
+    told = {
+        "reading": 0.0,
+        "reading a.csv, 2 of 4": 0.05,
+        "verifying host-gcc-O2, target 3 of 4": 0.5,
+        "drawing": 0.8,
+        "y (2 of 3): drawing": 0.6,
+        "something else": 0.0,
+        "verifying 7 of 3": 0.2,
+    }
+    for text, share in told.items():
+        assert course.share_of(text) == pytest.approx(share), text
+    assert Course().share_of("simulating 35%") == Course().share_of("import, 35 %") == pytest.approx(0.35)
+    for stages in (BUILD, DIAGNOSE, FIT):
+        assert sum(share for _, share in stages) == pytest.approx(1.0)
+
+
+def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on() -> None:
+    course = Course((("reading", 0.25), ("drawing", 0.75)))
+    begun = course._begun
+    course.say("reading")
+    assert course.line(begun + 1.0) == "reading" and course.line(begun + 4.0) == "reading, 4 s"
+    course._begun -= 10.0
+    course.say("drawing")
+    assert course.line(course._told) == "drawing, 25 %, about 30 s left"
+    assert course.line(course._told + 5.0) == "drawing, 25 %, about 25 s left", "the clock goes on"
+    assert course.line(course._told + 90.0).endswith("about 0 s left")
+    course.say("reading")
+    assert course.line(course._told).startswith("reading, 25 %"), "never less than before"
+
+
+def _catches(process: int) -> int:
+    """Signals that a process has handlers for, as bits (proc(5))."""
+    status = Path(f"/proc/{process}/status").read_text()
+    return int(next(line for line in status.splitlines() if line.startswith("SigCgt:")).split()[1], 16)
+
+
+COMMANDS = {
+    "fit": ("fit", "RLG-1", "--out", "out"),
+    "build": ("build", "RLG-1", "--out", "out"),
+    "simulate": ("simulate", "paper", "--out", "out"),
+    "compare": ("compare", "RLG-1", "--out", "out"),
+    "diagnose": ("diagnose", "RLG-1", "--out", "out"),
+    "fleet": ("fleet", "lot", "--out", "out"),
+    "plan": ("plan", "paper", "--out", "out"),
+    "export": ("export", "made", "--format", "fmu", "--out", "out"),
+}
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("desk")
+    described(folder / "RLG-1")
+    described(folder / "lot" / "RLG-1")
+    emitted(folder / "made")
+    return folder
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="there is no /proc")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
+    """At a moment drawn within the first second and a half: imports, work, or its end."""
+    seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {seed}")
+    before = sorted(desk.iterdir())
+    # A job in the background of a shell inherits that SIGINT is ignored; env undoes it, and becomes the program.
+    command = ["env", "--default-signal", PROGRAM, *COMMANDS[name]]
+    job = subprocess.Popen(command, cwd=desk, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while job.poll() is None and not _catches(job.pid) >> (signal.SIGTERM - 1) & 1:
+        time.sleep(0.005)
+    time.sleep(random.Random(seed).uniform(0.0, 1.5))
+    job.send_signal(signal.SIGINT)
+    _, told = job.communicate()
+    if job.returncode == -signal.SIGINT:  # a shell reports 130
+        assert told == "gyrotc: interrupted (SIGINT)\n"
+        whole = name == "fleet" or sorted(p for p in desk.iterdir() if p.suffix != ".lock") == before
+        assert whole, "something half-written stayed"
+    else:
+        assert job.returncode == 0, f"it had ended: {told}"
+    shutil.rmtree(desk / "out", ignore_errors=True)
+    (desk / "out").unlink(missing_ok=True)
+
+
+def test_ctrl_c_before_anything_is_begun_is_silent() -> None:
+    """Before: a traceback out of the middle of an import."""
+    early = "import os, signal, gyrotc.cli as c; c._quiet_start(); os.kill(os.getpid(), signal.SIGINT)"
+    command = ["env", "--default-signal", sys.executable, "-c", early]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    light = (
+        "import sys, gyrotc.cli; sys.exit(bool({'numpy', 'pydantic', 'rich', 'typer'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", light], check=False).returncode == 0
+
+
+def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
+    code = "import warnings, gyrotc.cli as c; c._status = lambda: (warnings.warn('of a library'), 0)[1]; c.main()"
+    plain = os.environ | {"PYTHONWARNINGS": ""}
+    for options, shown in (((), False), (("-W", "default"), True)):
+        command = [sys.executable, *options, "-c", code]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=plain)
+        assert (done.returncode, "of a library" in done.stderr) == (0, shown)
+
+
+def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
+    wide = []
+    for words in ([], *([name] for name in ("build", "export", "fleet", "diagnose", "import"))):
+        command = [PROGRAM, *words, "--help"]
+        told = subprocess.run(
+            command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"}
+        )
+        wide += [line for line in told.stdout.splitlines() if len(line) > 80]
+    assert wide == []
 
 
 def test_bash_completes_commands_and_options(tmp_path: Path, gyrotc: Command) -> None:

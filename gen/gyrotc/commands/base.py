@@ -18,6 +18,7 @@ from .. import __version__
 from ..inputs import CEILINGS, set_ceilings
 from ..outputs import check_replaceable, json_text, write_result
 from ..texts import terminal_line, terminal_text
+from .stages import Course, Stages
 
 app = typer.Typer(
     name="gyrotc",
@@ -27,9 +28,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-
-_SILENT_S = 2.0  # before a time left is told
 
 
 class _Loudness:
@@ -125,20 +123,36 @@ DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
+def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
     """A line on stderr that says what is being done; nothing when stderr is no terminal, or with --quiet.
 
-    With --verbose every stage is a line of its own with the seconds since the start, also where stderr is a file.
+    From 2 s on with percent and time left, as far as `stages` or counts ("3 of 12") in the texts tell them. With
+    --verbose every stage is a line of its own with the seconds since the start, also where stderr is a file.
     """
     if _Loudness.verbose:
-        start = time.monotonic()
-        yield lambda text: print(f"{time.monotonic() - start:8.1f} s  {terminal_text(text)}", file=sys.stderr)
+        start, said = time.monotonic(), [""]
+
+        def line(text: str) -> None:
+            if text != said[0]:
+                print(f"{time.monotonic() - start:8.1f} s  {terminal_text(text)}", file=sys.stderr)
+            said[0] = text
+
+        yield line
         return
     if _Loudness.quiet or not ERR.is_terminal:
         yield lambda _: None
         return
-    with ERR.status("") as status:
-        yield lambda text: status.update(Text(terminal_text(text)))
+    course = Course(stages)
+    status = ERR.status(course)
+
+    def shown(text: str) -> None:
+        course.say(text)
+        status.start()  # with the first stage: a question that comes before it has the terminal for itself
+
+    try:
+        yield shown
+    finally:
+        status.stop()
 
 
 def tell(text: str, *, wrong: bool = False) -> None:
@@ -152,21 +166,6 @@ def show(table: Table) -> None:
     """A table of the result on stdout; none with --quiet."""
     if not _Loudness.quiet:
         OUT.print(table)
-
-
-def time_left(done: int, total: int, elapsed_s: float) -> str:
-    """Percent, and the time that the rest will take if it goes on like this; empty for the first two seconds."""
-    if elapsed_s < _SILENT_S or not done:
-        return ""
-    left = elapsed_s / done * (total - done)
-    unit = (
-        f"{left:.0f} s"
-        if left < 120.0
-        else f"{left / 60.0:.0f} min"
-        if left < 7200.0
-        else f"{left / 3600.0:.1f} h"
-    )
-    return f", {100 * done // total} %, about {unit} left"
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import CheckFailed, InputError
-from .base import JsonOption, LotOption, OutOption, app, progress, tell, time_left, write_json
+from .base import JsonOption, LotOption, OutOption, app, progress, tell, write_json
+from .stages import time_left
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary

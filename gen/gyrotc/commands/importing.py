@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from .base import ERR, JsonOption, OutOption, TrustUnitsOption, app, tell, write_json
+from .base import JsonOption, OutOption, TrustUnitsOption, app, progress, tell, write_json
 
 _ROLES = ("time", "temperature", "rate", "rate_x", "rate_y", "rate_z", "pulses")
 
@@ -90,10 +87,11 @@ def import_(
     content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
     chosen = _stated(content, units, stated, _columns(column or []), table)
     options = ImportOptions(serial, format, trust_units, dry_run)  # type: ignore[arg-type]
-    with _share() as progress:
+    with progress() as say:
         result = import_files(
-            files, out, Map.model_validate(chosen), options, ask=_ask, say=tell, progress=progress
-        )
+            files, out, Map.model_validate(chosen), options, ask=_ask, say=tell,
+            progress=lambda name, done: say(f"{name} {done:.0%}"),
+        )  # fmt: skip
     if result is not None:
         write_json(json_file, result.result().content())
 
@@ -146,23 +144,3 @@ def _ask(question: str) -> str | None:
         return None
     answer: str = typer.prompt(question, default="", show_default=False, err=True)
     return answer.strip() or None
-
-
-@contextmanager
-def _share() -> Iterator[Callable[[str, float], None] | None]:
-    """A line on stderr with percent and time left; nothing when stderr is no terminal."""
-    if not ERR.is_terminal:
-        yield None
-        return
-    begun: dict[str, float] = {}
-
-    def show(name: str, done: float) -> None:
-        elapsed = time.monotonic() - begun.setdefault(name, time.monotonic())
-        left = f", {elapsed / done * (1.0 - done):.0f} s left" if done > 0.0 and elapsed > 1.0 else ""
-        sys.stderr.write(f"\r\x1b[2K{name}: {done:.0%}{left}")
-        sys.stderr.flush()
-
-    try:
-        yield show
-    finally:
-        sys.stderr.write("\r\x1b[2K")

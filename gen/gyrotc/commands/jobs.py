@@ -45,6 +45,7 @@ from .results import (
     summary,
     verify_table,
 )
+from .stages import BUILD, COMPARE, DIAGNOSE
 
 if TYPE_CHECKING:
     from ..jobs.build import Built
@@ -91,7 +92,7 @@ def build(
 
     shared = load_lot(lot) if lot else None
     options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
-    with progress() as say:
+    with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
         results = run(
             dataset,
             out,
@@ -174,7 +175,7 @@ def compare(
     options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
     with (
         result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
-        progress() as say,
+        progress(COMPARE) as say,
     ):
         subtracted = applied_of(applied) if applied else None
         recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
@@ -236,7 +237,7 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
 
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
-        with progress() as say:
+        with progress(DIAGNOSE) as say:
             if into is None:
                 found = run(
                     recordings, model=known, options=options, progress=say, accept_events=accept_events

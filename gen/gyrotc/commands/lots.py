@@ -9,6 +9,7 @@ import typer
 
 from ..outputs import json_text, write_result
 from .base import app, progress, tell, written_place
+from .stages import LOT
 
 
 @app.command()
@@ -28,7 +29,7 @@ def lot(
     """
     from ..jobs.lot import lot_of
 
-    with progress() as say:
+    with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
     checked = found.cross_validation

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..outputs import json_text, result_folder, write_atomically
 from .base import JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .plan_lines import limits_of, pair_of, plan_parts
+from .stages import PLAN
 
 
 @app.command()
@@ -53,7 +54,7 @@ def plan(
     from ..pages.plan_page import write_plan
     from ..plan import plan as run
 
-    with result_folder(out, "plan") if out else nullcontext() as stage, progress() as say:
+    with result_folder(out, "plan") if out else nullcontext() as stage, progress(PLAN) as say:
         result = run(
             profile,
             noise=noise,  # type: ignore[arg-type]

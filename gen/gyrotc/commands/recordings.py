@@ -145,18 +145,21 @@ def check(
     from ..judge.check import envelope_of
     from ..quantise.applied import applied_of
 
-    result = run(
-        dataset,
-        axis=axis,
-        envelope=envelope_of(envelope) if envelope is not None else None,
-        applied=applied_of(applied) if applied else None,
-        trust_units=trust_units,
-        earlier=earlier_models(previous) if previous else None,
-    )
-    if plots is not None:
-        from ..pages.check_page import write_check_page
+    with progress() as say:
+        result = run(
+            dataset,
+            axis=axis,
+            envelope=envelope_of(envelope) if envelope is not None else None,
+            applied=applied_of(applied) if applied else None,
+            trust_units=trust_units,
+            earlier=earlier_models(previous) if previous else None,
+            progress=say,
+        )
+        if plots is not None:
+            from ..pages.check_page import write_check_page
 
-        write_check_page(plots, dataset, result)
+            say("drawing")
+            write_check_page(plots, dataset, result)
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

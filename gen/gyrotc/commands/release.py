@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .base import DirArg, app, tell
+from .base import DirArg, app, progress, tell
 
 
 @app.command()
@@ -30,7 +30,8 @@ def sign(
     private = load_private_key(key, lambda: _passphrase(key))
     axes = axes_in(folder)
     parts = [folder / axis for axis in axes] or [folder]
-    check_emitted(folder, "not signed")
+    with progress() as say:
+        check_emitted(folder, "not signed", say)
     for part in [*parts, *([folder] if axes else [])]:
         with result_folder(part, "sign", entries=("c",)) as stage:
             shutil.copytree(part / "c", stage.folder / "c")

@@ -47,6 +47,7 @@ from .results import (
     verify_notes,
     verify_table,
 )
+from .stages import FIT, VERIFY
 from .traces import evaluation_folders
 
 
@@ -80,7 +81,7 @@ def fit(
         method, seed, centers, rho, block_s, average_s, channels, load_lot(lot) if lot else None
     )
     known = applied_of(applied) if applied else None
-    with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
+    with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
         fitted = fit_dataset(recordings, options, progress=say)
@@ -188,7 +189,7 @@ def verify(  # long: the parts of a command in the order in which they are print
     if axes and log is not None:
         raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
     results = {}
-    with progress() as say:
+    with progress(VERIFY) as say:
         for part in [folder / axis for axis in axes] or [folder]:
             axis = load_model(part / "model.json").axis
             recordings = load(dataset, axis=axis, trust_units=trust_units) if dataset else None

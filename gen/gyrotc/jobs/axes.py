@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
@@ -133,7 +133,7 @@ def verify_axes(
     )
 
 
-def check_emitted(folder: Path, refused: str) -> None:
+def check_emitted(folder: Path, refused: str, progress: Callable[[str], None] = lambda _: None) -> None:
     """Is what `folder/c` holds (with several axes: of every axis, too) what gyrotc makes of the models?
 
     Args:
@@ -145,7 +145,10 @@ def check_emitted(folder: Path, refused: str) -> None:
     """
     axes = axes_in(folder)
     parts = [folder / axis for axis in axes] or [folder]
-    results = {part.name: verify(part, compiled=False) for part in parts}
+    results = {}
+    for k, part in enumerate(parts, 1):
+        progress(f"comparing files, {k} of {len(parts)}")
+        results[part.name] = verify(part, compiled=False)
     judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
     wrong = [name for result in judged for name in result.wrong_files]
     if wrong or any(result.failed for result in judged):

@@ -119,12 +119,16 @@ def build(
             stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
             return [_build_axis(dataset, stage.folder, options, order, say)]
         built = []
-        for name in axes:
+        for k, name in enumerate(axes, 1):
             dataset = load(source, axis=name, applied=known, trust_units=trust_units)
             stage.of(dataset.serial, any_serial=any_serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
-                built.append(_build_axis(dataset, part.folder, options, order, _of_axis(name, say)))
+                built.append(
+                    _build_axis(
+                        dataset, part.folder, options, order, _of_axis(f"{name} ({k} of {len(axes)})", say)
+                    )
+                )
         join_axes(stage.folder, axes)
         return built
 

@@ -74,8 +74,8 @@ def compare(
     data, held, judged_on = _samples(dataset, options)
     methods = []
     _fit(options.methods[0], data, options)  # what a first call loads is not training time
-    for method in options.methods:
-        say(method)
+    for k, method in enumerate(options.methods, 1):
+        say(f"{method}, {k} of {len(options.methods)}")
         methods.append(_judged(method, data, held, options))
     reference = next((m for m in methods if m.id == "mrbf"), methods[0])
     return Comparison(

@@ -6,7 +6,7 @@ can be checked: its unfinished last line is left out, and that is a doubt.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -102,6 +102,7 @@ def check(
     applied: Applied | None = None,
     trust_units: bool = False,
     earlier: Mapping[str, Model] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> CheckResult:
     """Checks a data set as `fit` would read it, and looks for what is doubtful.
 
@@ -124,13 +125,17 @@ def check(
     axes = _axes(folder, axis)
     for one in axes:
         told = Problems(collect=True)
+        progress("reading")
         dataset = survey(folder, told, axis=one, applied=applied, trust_units=trust_units)
         problems |= {str(problem): problem for problem in told.found}
         marks |= told.marks
         if dataset is not None:
             refuse_another(earlier or {}, dataset.serial)
             datasets.append((one, dataset))
-            looked = [looked_at(run) for run in dataset.runs]
+            looked = []
+            for k, run in enumerate(dataset.runs, 1):
+                progress(f"{run.file}, {k} of {len(dataset.runs)}")
+                looked.append(looked_at(run))
             of_axis = [f for f, _ in looked]
             together = doubts_of_data_set(dataset, of_axis, envelope, earlier)
             for doubt in (*together, *(doubt for _, of_run in looked for doubt in of_run)):

@@ -116,9 +116,9 @@ def evaluate(
     parts = []
     compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
     with compiling as program:
-        for run in dataset.runs:
+        for k, run in enumerate(dataset.runs, 1):
             if progress:
-                progress(run.file)
+                progress(f"{run.file}, {k} of {len(dataset.runs)}")
             parts.append(
                 _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
             )

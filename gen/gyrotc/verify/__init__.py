@@ -7,6 +7,7 @@ word with what the reference computes.
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -32,6 +33,7 @@ from ..results.verification import (
     WorstError,
 )
 from .board import Job, board_entries
+from .confined import end_all
 from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
 from .logs import log_entries
@@ -164,12 +166,19 @@ def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[V
 def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[VerifiedTarget]:
     """Entries in the order of the targets; compilers and emulators run side by side."""
 
+    begun = itertools.count(1)
+
     def one(target: Target) -> list[VerifiedTarget]:
-        progress(target.name)
+        progress(f"{target.name}, target {next(begun)} of {len(targets)}")
         return board_entries(job, target)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
-        return [entry for entries in pool.map(one, targets) for entry in entries]
+        try:
+            return [entry for entries in pool.map(one, targets) for entry in entries]
+        except BaseException:  # one failed, or the user stops: the others end now, not with their queue
+            pool.shutdown(wait=False, cancel_futures=True)
+            end_all()
+            raise
 
 
 def _earlier(folder: Path, identity: tuple[str, str], *, boards_only: bool) -> list[VerifiedTarget]:

@@ -18,7 +18,7 @@ from typing import IO
 
 from ..errors import CheckFailed
 
-__all__ = ["LIMIT_S", "ProgramRun", "confined", "run_to_end"]
+__all__ = ["LIMIT_S", "ProgramRun", "confined", "end_all", "run_to_end"]
 
 LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).
@@ -28,6 +28,8 @@ _LIMITS = {"c": 0, "d": 2 * 2**20, "v": 16 * 2**20, "f": 8 * 2**20}
 _SAID_BYTES = 64 * 2**20  # kept of what a program says on stderr
 
 Stream = IO[bytes] | int
+
+_groups: set[int] = set()  # of processes that run now
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +59,28 @@ def confined(
         stderr=stderr,
         start_new_session=True,
     )
+    _groups.add(process.pid)
     try:
         yield process
     finally:
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
+        _groups.discard(process.pid)
+        _end(process.pid)
         process.wait()
         for pipe in (process.stdin, process.stdout, process.stderr):
             if pipe is not None:
                 with suppress(BrokenPipeError):  # what was still to be written to it
                     pipe.close()
+
+
+def end_all() -> None:
+    """Ends what other threads run: the job is interrupted, and nobody waits for it any more."""
+    for group in tuple(_groups):
+        _end(group)
+
+
+def _end(group: int) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, signal.SIGKILL)
 
 
 def run_to_end(

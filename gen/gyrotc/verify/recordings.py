@@ -71,8 +71,8 @@ def replay_dataset(
                 )
             except CheckFailed as error:
                 lane.error = str(error)
-        for run in dataset.runs:
-            progress(f"replaying {run.file}")
+        for k, run in enumerate(dataset.runs, 1):
+            progress(f"replaying {run.file}, {k} of {len(dataset.runs)}")
             rows = run.rows()
             for table in job.tables.values():
                 history = history_of(rows, run, job.model, table)
