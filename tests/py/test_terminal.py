@@ -96,6 +96,7 @@ COMMANDS = {
     "diagnose": ("diagnose", "RLG-1", "--out", "out"),
     "fleet": ("fleet", "lot", "--out", "out"),
     "plan": ("plan", "paper", "--out", "out"),
+    "verify": ("verify", "made"),
     "export": ("export", "made", "--format", "fmu", "--out", "out"),
 }
 
