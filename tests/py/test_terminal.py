@@ -15,7 +15,7 @@ import pytest
 from conftest import Command
 from emitted import emitted
 from gyrotc.cli import _hoisted
-from gyrotc.commands.stages import BUILD, DIAGNOSE, FIT, Course, time_left
+from gyrotc.commands.stages import BUILD, DIAGNOSE, FIT, StageLine, time_left
 from gyrotc.diagnose.signatures import cache
 from recordings import described
 
@@ -39,7 +39,7 @@ def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path
     assert told.returncode == 0 and told.stdout
     lines = told.stderr.splitlines()
     assert lines and all(line.split()[1] == "s" and float(line.split()[0]) >= 0.0 for line in lines)
-    course = Course(FIT)
+    course = StageLine(FIT)
     assert all(course.share_of(line.partition(" s  ")[2]) > 0.0 for line in lines[1:]), "a stage has no place"
 
 
@@ -51,7 +51,7 @@ def test_the_time_left() -> None:
 
 
 def test_what_a_text_tells_of_the_work_that_is_done() -> None:
-    course = Course((("reading", 0.2), ("verifying", 0.6), ("drawing", 0.2)))
+    course = StageLine((("reading", 0.2), ("verifying", 0.6), ("drawing", 0.2)))
     told = {
         "reading": 0.0,
         "reading a.csv, 2 of 4": 0.05,
@@ -63,13 +63,15 @@ def test_what_a_text_tells_of_the_work_that_is_done() -> None:
     }
     for text, share in told.items():
         assert course.share_of(text) == pytest.approx(share), text
-    assert Course().share_of("simulating 35%") == Course().share_of("import, 35 %") == pytest.approx(0.35)
+    assert (
+        StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
+    )
     for stages in (BUILD, DIAGNOSE, FIT):
         assert sum(share for _, share in stages) == pytest.approx(1.0)
 
 
 def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on() -> None:
-    course = Course((("reading", 0.25), ("drawing", 0.75)))
+    course = StageLine((("reading", 0.25), ("drawing", 0.75)))
     begun = course._begun
     course.say("reading")
     assert course.line(begun + 1.0) == "reading" and course.line(begun + 4.0) == "reading, 4 s"

@@ -18,7 +18,7 @@ from .. import __version__
 from ..inputs import CEILINGS, set_ceilings
 from ..outputs import check_replaceable, json_text, write_result
 from ..texts import terminal_line, terminal_text
-from .stages import Course, Stages
+from .stages import StageLine, Stages
 
 app = typer.Typer(
     name="gyrotc",
@@ -142,7 +142,7 @@ def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
     if _Loudness.quiet or not ERR.is_terminal:
         yield lambda _: None
         return
-    course = Course(stages)
+    course = StageLine(stages)
     status = ERR.status(course)
 
     def shown(text: str) -> None:

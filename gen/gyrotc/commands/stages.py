@@ -10,7 +10,7 @@ from rich.text import Text
 
 from ..texts import terminal_text
 
-__all__ = ["BUILD", "COMPARE", "DIAGNOSE", "FIT", "LOT", "PLAN", "VERIFY", "Course", "Stages", "time_left"]
+__all__ = ["BUILD", "COMPARE", "DIAGNOSE", "FIT", "LOT", "PLAN", "VERIFY", "StageLine", "Stages", "time_left"]
 
 _SILENT_S = 2.0  # before a time left is told
 
@@ -54,7 +54,7 @@ def _words(left_s: float) -> str:
     return f"{left_s / 60.0:.0f} min" if left_s < 7200.0 else f"{left_s / 3600.0:.1f} h"
 
 
-class Course:
+class StageLine:
     """The stage of a job that a terminal shows; its text is made anew whenever it is drawn."""
 
     def __init__(self, stages: Stages = ()) -> None:

@@ -150,10 +150,9 @@ def _unexpected(before: Words, rate: Words) -> NDArray[np.float32]:
     mask = np.uint64(_TABLE - 1)
     slot = (before & mask).view(np.int64)
     pair = (_mixed(before * _FIRST + rate) & mask).view(np.int64)
-    alone = np.bincount(slot, minlength=_TABLE).astype(np.float32)
-    both = np.bincount(pair, minlength=_TABLE).astype(np.float32)
-    told = np.log2(np.maximum(alone, 1.0))[slot] - np.log2(np.maximum(both, 1.0) - np.float32(0.5))[pair]
-    return np.asarray(told, dtype=np.float32)
+    alone = np.bincount(slot)[slot].astype(np.float32)  # at least 1: each row counts itself
+    both = np.bincount(pair)[pair].astype(np.float32)
+    return np.asarray(np.log2(alone) - np.log2(both - np.float32(0.5)), dtype=np.float32)
 
 
 def windows_in_common(mine: Fingerprints, its: Fingerprints) -> NDArray[np.int64]:

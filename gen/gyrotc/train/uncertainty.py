@@ -79,7 +79,7 @@ def uncertainty(
     covered = _covered(data, fit, t, r)
     place = _cell(fit, cells, t, r)
     everywhere = _means(place, at_points, np.ones(len(t)), cells, np.zeros(cells[::-1]))
-    seen = _means(*_asked(samples, process, fit, cells, scale), cells, everywhere)
+    seen = _means(*_asked(samples, process, fit, cells, scale, at_samples), cells, everywhere)
     unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
     points = t[covered], r[covered]
     added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
@@ -93,13 +93,19 @@ def uncertainty(
 
 
 def _asked(
-    samples: TrainingData, process: Process, fit: Fit, cells: tuple[int, int], scale: float
+    samples: TrainingData,
+    process: Process,
+    fit: Fit,
+    cells: tuple[int, int],
+    scale: float,
+    at_samples: Floats,
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Where corrections are asked for, as the samples or a lot's units show: cells, variances, weights."""
-    t, r, weight = samples.temperature_c, samples.slope_c_per_min, samples.weight
-    if process.asked is not None:
-        t, r, weight = process.asked.temperature_c, process.asked.slope_c_per_min, process.asked.share
-    return _cell(fit, cells, t, r), _variance(process, fit, t, r, scale), weight
+    asked = process.asked
+    if asked is None:
+        return _cell(fit, cells, samples.temperature_c, samples.slope_c_per_min), at_samples, samples.weight
+    t, r = asked.temperature_c, asked.slope_c_per_min
+    return _cell(fit, cells, t, r), _variance(process, fit, t, r, scale), asked.share
 
 
 def _variance(process: Process, fit: Fit, t: Floats, r: Floats, scale: float) -> Floats:
