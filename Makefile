@@ -162,6 +162,10 @@ mutants: setup
 blind: setup
 	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## hidden effects in a world of other physics, a quarter of an hour: docs/results.md (SEED=n goes on with a run or repeats it)
+blind-other: setup
+	@$(PYTHON) -m tests.blind.other.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
+
 ## training on 2,000 odd but valid data sets (SETS=2000, minutes)
 odd: setup
 	@GYROTC_ODD="$$SET_SETS" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
@@ -188,4 +192,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind odd cycles packages dist site clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist site clean

@@ -102,6 +102,8 @@ class Tool:
         assert self.process.stdin is not None
         self.process.stdin.close()
         self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
 
     def diagnose(self, folder: Path) -> dict[str, Any]:
         """The result for one folder of recordings."""
@@ -197,7 +199,7 @@ def code_version() -> str:
     return digest.hexdigest()[:12]
 
 
-def _commit() -> str:
+def commit() -> str:
     found = subprocess.run(
         ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
     )
@@ -221,7 +223,7 @@ def _begin(arguments: argparse.Namespace) -> tuple[Plan, dict[str, Any]]:
         "seed": seed,
         "records": arguments.records,
         "code": version,
-        "commit": _commit(),
+        "commit": commit(),
         "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
     }
     (folder / f"{seed}-{arguments.records}.head.json").write_text(json.dumps(head), encoding="utf-8")

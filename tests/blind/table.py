@@ -157,12 +157,12 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Every requirement with its count, share, limits, and whether it is met."""
     out: list[dict[str, Any]] = []
     for name, goal, select, hit, bound, kind in CHECKS:
-        out += _share(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
-    out += _parameters_met(rows) + _sets(rows) + _reliability(rows)
+        out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
+    out += _parameters_met(rows) + _sets(rows) + reliability(rows)
     return out + _gains(rows) + _honesty(rows) + _time(rows)
 
 
-def _share(name: str, goal: str, hits: Sequence[bool], bound: float, kind: str) -> list[dict[str, Any]]:
+def proportion(name: str, goal: str, hits: Sequence[bool], bound: float, kind: str) -> list[dict[str, Any]]:
     """A share with its limits; nothing where nothing was counted."""
     if not hits:
         return []
@@ -192,9 +192,9 @@ def _parameters_met(rows: Sequence[Row]) -> list[dict[str, Any]]:
     ):
         found = [p for p in strong if any(w in p["name"] for w in wanted)]
         close = [p["got"] * p["true"] > 0 and abs(np.log(p["got"] / p["true"])) <= bound for p in found]
-        out += _share(f"{label} within {bound:.0%}, k ≥ 2.5", "≥ 90 %", close, 0.9, "min")
+        out += proportion(f"{label} within {bound:.0%}, k ≥ 2.5", "≥ 90 %", close, 0.9, "min")
     inside = [p["inside"] for p in strong]
-    for entry in _share("95 % intervals cover, k ≥ 2.5", "90-98 %", inside, 0.9, "min"):
+    for entry in proportion("95 % intervals cover, k ≥ 2.5", "90-98 %", inside, 0.9, "min"):
         out.append({**entry, "met": entry["high"] >= 0.9 and entry["low"] <= 0.98})
     return out
 
@@ -207,7 +207,7 @@ def _sets(rows: Sequence[Row]) -> list[dict[str, Any]]:
     told = [r["truth"][0] == r["named"][0] for r in named if r["design"] == "separating" and _told(r)]
     return [
         *(_value("mean size of the set, k ≥ 1.7", "≤ 2", mean, mean <= 2, len(sizes)) if sizes else []),
-        *_share("member right where printed d_sep ≤ d (separating)", "≥ 90 %", told, 0.9, "min"),
+        *proportion("member right where printed d_sep ≤ d (separating)", "≥ 90 %", told, 0.9, "min"),
     ]
 
 
@@ -222,7 +222,7 @@ def _time(rows: Sequence[Row]) -> list[dict[str, Any]]:
 _BINS = ((0.1, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.0 + 1e-9))  # of stated probabilities
 
 
-def _reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """How often what was said with a probability is true, over all recordings, clean and foreign ones among them."""
     said = [one for row in rows for one in row.get("said", [])]
     out: list[dict[str, Any]] = []
@@ -232,7 +232,7 @@ def _reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
             continue
         mean = float(np.mean([one["p"] for one in inside]))
         name = f"true of what was said with {low:.0%}-{min(high, 1.0):.0%}, on average {mean:.0%}"
-        for entry in _share(name, f"{mean:.0%}", [one["true"] for one in inside], mean, "min"):
+        for entry in proportion(name, f"{mean:.0%}", [one["true"] for one in inside], mean, "min"):
             out.append({**entry, "met": entry["low"] <= mean <= entry["high"]})
     return out
 
@@ -261,7 +261,7 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
         out += _value(name, "≥ 85 %", got / best, got / best >= 0.85, len(chosen))
     shipped = [r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]]
     worse = [g["after2"] > g["before2"] for g in shipped]
-    return out + _share("shipped although worse on the exam", "0", worse, 0.0, "max")
+    return out + proportion("shipped although worse on the exam", "0", worse, 0.0, "max")
 
 
 def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:

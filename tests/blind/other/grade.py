@@ -1,0 +1,120 @@
+"""What is right about an answer, and the table of a run with limits by recording (Clopper and Pearson)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ..effects import FAMILY
+from ..grade import Row, alarmed, family_right, in_set, wrong_family
+from ..table import proportion, reliability
+from .record import Recording, told
+
+__all__ = ["answers", "graded", "table"]
+
+
+def graded(recording: Recording, result: dict[str, Any]) -> Row:
+    """Truth and answer side by side."""
+    physical = [c for c in result["causes"] if c["family"] != "noise"]
+    truth = recording.truth
+    names = [truth.name] if truth.name else ["foreign"] if truth.stratum == "foreign" else []
+    row: Row = {
+        **told(truth),
+        "truth": names,
+        "verdict": result["verdict"],
+        "named": [c["id"] for c in physical],
+        "noise": [c["id"] for c in result["causes"] if c["family"] == "noise"],
+        "equivalent": [c["equivalent"] for c in physical],
+        "said": [
+            {"id": id, "p": p, "true": id in names}
+            for c in physical
+            for id, p in (c.get("probabilities") or {}).items()
+        ],
+        "events": [e["id"] for e in result.get("events", [])],
+        "shipped_worse": _shipped_worse(result, physical),
+        "seconds": result.get("seconds"),
+    }
+    if result["verdict"] == "error":
+        row["error"] = result["text"]
+    return row
+
+
+def _shipped_worse(result: dict[str, Any], physical: list[dict[str, Any]]) -> bool | None:
+    """Whether what was shipped is worse on the exam run; None: nothing was shipped or measured."""
+    if result.get("extended") is None or not physical or not all(c["gain"] for c in physical):
+        return None
+    return bool(physical[-1]["gain"]["exam_rms_after_dph"] > physical[0]["gain"]["exam_rms_before_dph"])
+
+
+Chosen = Callable[[Row], bool]
+
+
+def _of(stratum: str, low: float = 0.0, **fields: Any) -> Chosen:
+    return lambda r: (
+        r["stratum"] == stratum and r["k"] >= low and all(r[name] == value for name, value in fields.items())
+    )
+
+
+def _named(row: Row) -> bool:
+    return bool(row["named"])
+
+
+def _sure(row: Row) -> bool:
+    return bool(row["named"]) and row["verdict"] == "explained"
+
+
+def _level_told(row: Row) -> bool:
+    return bool(row["noise"])
+
+
+_CHECKS: list[tuple[str, str, Chosen, Callable[[Row], bool], float, str]] = [
+    ("a cause named, clean", "≤ 2 %", _of("clean"), _named, 0.02, "max"),
+    ("... noise declared wrong", "≤ 2 %", _of("clean", declared="wrong"), _named, 0.02, "max"),
+    ("... noise declared right", "≤ 2 %", _of("clean", declared="right"), _named, 0.02, "max"),
+    ("... not declared", "≤ 2 %", _of("clean", declared="none"), _named, 0.02, "max"),
+    ("a cause or structure claimed, clean", "≤ 2 %", _of("clean"), alarmed, 0.02, "max"),
+    ("wrong declaration told, clean", "-", _of("clean", declared="wrong"), _level_told, 0.0, "min"),
+    ("right declaration doubted, clean", "-", _of("clean", declared="right"), _level_told, 1.0, "max"),
+    ("foreign given a name", "≤ 10 %", _of("foreign"), _named, 0.10, "max"),
+    ("... without saying that another does as well", "≤ 10 %", _of("foreign"), _sure, 0.10, "max"),
+    ("foreign given a name, k ≥ 2.5", "≤ 10 %", _of("foreign", 2.5), _named, 0.10, "max"),
+    ("foreign noticed, k ≥ 2.5", "-", _of("foreign", 2.5), alarmed, 0.0, "min"),
+    ("detected, k ≥ 2.5", "≥ 95 %", _of("one", 2.5), alarmed, 0.95, "min"),
+    ("family right, k ≥ 2.5", "≥ 95 %", _of("one", 2.5), family_right, 0.95, "min"),
+    ("family right, all k", "-", _of("one"), family_right, 0.0, "min"),
+    ("... parameter within the search", "-", _of("one", beyond=False), family_right, 0.0, "min"),
+    ("... parameter beyond the search", "-", _of("one", beyond=True), family_right, 0.0, "min"),
+    ("truth named or equivalent, k ≥ 2.5", "≥ 95 %", _of("one", 2.5), in_set, 0.95, "min"),
+    ("a wrong family named", "≤ 5 %", _of("one"), wrong_family, 0.05, "max"),
+    (
+        "shipped although worse on the exam",
+        "0",
+        lambda r: r["shipped_worse"] is not None,
+        lambda r: bool(r["shipped_worse"]),
+        0.0,
+        "max",
+    ),
+    ("broke down", "0", lambda r: True, lambda r: r["verdict"] == "error", 0.0, "max"),
+]
+
+
+def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Every figure with its count, share and limits."""
+    out: list[dict[str, Any]] = []
+    for name, goal, select, hit, bound, kind in _CHECKS:
+        out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
+    return out + reliability(rows)
+
+
+def answers(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
+    """For every hidden effect, how often which answer was given."""
+    found: dict[str, dict[str, int]] = {}
+    for row in rows:
+        hidden = row["truth"][0] if row["truth"] else "nothing"
+        answer = " + ".join(row["named"]) or row["verdict"]
+        of = found.setdefault(hidden, {})
+        of[answer] = of.get(answer, 0) + 1
+    order = ["nothing", "foreign", *FAMILY]
+    return {
+        name: dict(sorted(found[name].items(), key=lambda item: -item[1])) for name in order if name in found
+    }

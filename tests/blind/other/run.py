@@ -1,0 +1,187 @@
+"""Blind runs in the other world: each recording has its own temperatures; who diagnoses is not told.
+
+    python -m tests.blind.other.run [--records 200] [--seed N] [--docs docs]
+
+The seed comes from the operating system and is printed; the same seed makes the same recordings, and a run that was
+stopped goes on with `--seed`. `--only 17` writes one recording with its truth. Whoever changes the detector runs with
+a new seed: what was drawn before may have been looked at.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import secrets
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..grade import Row
+from ..run import ROOT, Tool, code_version, commit, rows_of
+from ..table import markdown
+from .grade import answers, graded, table
+from .mechanisms import CATALOGUE
+from .record import draw_recording, told, write
+
+__all__ = ["orders", "run", "write_page"]
+
+_SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
+_MARKS = re.compile(r"(<!-- blind-other -->\n).*?(<!-- /blind-other -->)", re.DOTALL)
+_HEAD = """## Hidden effects in a world that is no sibling (`make blind-other`)
+
+Gyros of another make (tests/blind/other, which imports nothing of gyrotc): heat by finite volumes through case, glass
+and mirror with properties that depend on temperature, a chamber that switches, relays of Preisach, an etalon's waves,
+noise of 1/f^alpha with alpha from 0.5 to 1.5, converters with steps, rows of 1, 10 or 60 s, the noise declared wrong
+in half, parameters that may lie beyond what is searched, and a campaign of temperatures for each recording. Foreign
+effects are drawn from a grammar of operators (integrate, saturate, threshold, delay, relax, multiply); of none of them
+can one cause of the catalogue imitate more than half of the energy beside the map. k = d / 6 as above. Limits: 95 %,
+by recording (Clopper and Pearson). The detector was not tuned on this world.
+"""
+
+
+def orders(records: int) -> list[tuple[str, str]]:
+    """Stratum and name of every recording: strata take turns, so that a run that is stopped is a smaller run."""
+    made = {stratum: 0 for stratum, _ in _SHARES}
+    names = list(CATALOGUE)
+    out = []
+    for k in range(records):
+        stratum = max(_SHARES, key=lambda s: s[1] * (k + 1) - made[s[0]])[0]
+        out.append((stratum, names[made[stratum] % len(names)] if stratum == "one" else ""))
+        made[stratum] += 1
+    return out
+
+
+def run(seed: int, records: int, folder: Path, *, hours: float = 5.0) -> list[Row]:
+    """Recordings of a run, one after the other; rows that `folder` holds already are not made again."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{seed}-{records}.jsonl"
+    done = {row["number"]: row for row in rows_of(path)}
+    with (
+        tempfile.TemporaryDirectory(prefix="blind-other-") as name,
+        Tool(Path(name)) as tool,
+        path.open("a", encoding="utf-8") as stream,
+    ):
+        for number, (stratum, wanted) in enumerate(orders(records)):
+            if number in done:
+                continue
+            recording = draw_recording(seed, number, stratum, wanted, hours=hours)
+            target = Path(name) / f"u{number:04d}"
+            write(recording, target, f"V-{number:04d}")
+            row = {**graded(recording, tool.diagnose(target)), "number": number}
+            done[number] = row
+            stream.write(json.dumps(row) + "\n")
+            stream.flush()
+            print(_line(row), flush=True)
+            for left in Path(
+                name
+            ).iterdir():  # recordings, and the cached bank of temperatures that do not come again
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
+    return [done[k] for k in sorted(done)]
+
+
+def _line(row: Row) -> str:
+    hidden = f"{row['name'] or row['kind'] or 'nothing'} {row['k']:.2f}"
+    found = ", ".join([*row["named"], *row["noise"]]) or "-"
+    return (
+        f"{row['number']:4d} {row['row_s']:2d} s {row['declared']:5s} {hidden} -> {row['verdict']}: {found}"
+    )
+
+
+def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
+    """docs/results/other-blind-SEED.json and the section of docs/results.md made of all of them."""
+    folder = docs / "results"
+    result = {
+        **head,
+        "done": len(rows),
+        "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+        "table": table(rows),
+        "answers": answers(rows),
+        "foreign": [
+            {
+                "kind": r["kind"],
+                "k": r["k"],
+                "imitated": r["imitated"],
+                "verdict": r["verdict"],
+                "named": r["named"],
+            }
+            for r in rows
+            if r["stratum"] == "foreign"
+        ],
+    }
+    own = folder / f"other-blind-{head['seed']}.json"
+    own.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    runs = [json.loads(p.read_text(encoding="utf-8")) for p in folder.glob("other-blind-*.json")]
+    runs.sort(key=lambda r: str(r["started"]), reverse=True)
+    page = docs / "results.md"
+    text = page.read_text(encoding="utf-8")
+    if not _MARKS.search(text):
+        text += "\n<!-- blind-other -->\n<!-- /blind-other -->\n"
+    section = "\n".join([_HEAD, *map(_section, runs)])
+    page.write_text(_MARKS.sub(lambda m: m[1] + section + m[2], text), encoding="utf-8")
+
+
+def _section(run: dict[str, Any]) -> str:
+    ended = "complete" if run["done"] >= run["records"] else f"stopped of {run['records']}"
+    lines = [
+        f"### Other world, seed {run['seed']}: {run['done']} recordings, {ended}",
+        "",
+        f"Started {run['started']}, written {run['written']}, commit {run['commit']}, code {run['code']}.",
+        "",
+        markdown(run["table"]),
+        "",
+        "| hidden | recordings | answers |",
+        "| --- | --- | --- |",
+    ]
+    lines += [
+        f"| {name} | {sum(found.values())} | {', '.join(f'{k} {v}' for k, v in found.items())} |"
+        for name, found in run["answers"].items()
+    ]
+    named = [one for one in run["foreign"] if one["named"]]
+    if named:
+        lines += [
+            "",
+            "Foreign kinds that were given a name:",
+            "",
+            "| kind | k | named |",
+            "| --- | --- | --- |",
+        ]
+        lines += [f"| `{one['kind']}` | {one['k']:.1f} | {' + '.join(one['named'])} |" for one in named]
+    return "\n".join([*lines, "", ""])
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--records", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--only", type=int, default=None, help="write this recording of --seed and stop")
+    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "blind-other")
+    parser.add_argument("--docs", type=Path, default=None)
+    arguments = parser.parse_args()
+    seed = secrets.randbits(32) if arguments.seed is None else arguments.seed
+    if arguments.only is not None:
+        stratum, name = orders(arguments.records)[arguments.only]
+        recording = draw_recording(seed, arguments.only, stratum, name)
+        write(recording, arguments.folder / f"{seed}-{arguments.only:04d}", f"V-{arguments.only:04d}")
+        print(arguments.folder / f"{seed}-{arguments.only:04d}", told(recording.truth))
+        return
+    print(f"blind run in the other world, seed {seed} (go on or repeat with --seed {seed})", flush=True)
+    head = {
+        "seed": seed,
+        "records": arguments.records,
+        "code": code_version(),
+        "commit": commit(),
+        "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+    }
+    rows = run(seed, arguments.records, arguments.folder)
+    if arguments.docs is not None:
+        write_page(arguments.docs, head, rows)
+    print(markdown(table(rows)))
+
+
+if __name__ == "__main__":
+    main()
