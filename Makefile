@@ -166,9 +166,9 @@ blind: setup
 blind-other: setup
 	@$(PYTHON) -m tests.blind.other.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
-## training on 2,000 odd but valid data sets (SETS=2000, minutes)
+## training on 2,000 odd but valid data sets, minutes (SETS=2000; SEED=n begins with the n-th: shares)
 odd: setup
-	@GYROTC_ODD="$$SET_SETS" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
+	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
 
 ## memory named from 100 clean single cycles at four levels of noise (CYCLES=100): at most 2 %
 cycles: setup

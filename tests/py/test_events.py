@@ -10,6 +10,8 @@ import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose.screen.events import Event, accepted, events_of
 from gyrotc.diagnose.screen.turned import turned_runs
+from gyrotc.diagnose.screen.turned_within import gain_changes
+from gyrotc.frontend.beginning_drifts import drifts_of
 from gyrotc.frontend.lasting_steps import steps_of
 from recordings import toml, write_csv
 
@@ -29,14 +31,18 @@ def recording(rng: np.random.Generator, kind: int) -> Columns:
     return {"time_s": time, "temperature_c": temperature, "rate_dph": 0.01 + rate + walk + noise}
 
 
-def written(folder: Path, change: Columns | None = None) -> Path:
-    """Three runs; the second has the rates of `change` added."""
+def written(
+    folder: Path, change: Columns | None = None, run: int = 1, kept: np.ndarray | None = None
+) -> Path:
+    """Three runs; one, the second, has the rates of `change` added, and of its rows those that are `kept`."""
     rng = np.random.default_rng(SEED)
     print("seed", SEED)
     for k in range(3):
         columns = recording(rng, k)
-        if k == 1 and change is not None:
+        if k == run and change is not None:
             columns["rate_dph"] = columns["rate_dph"] + change["rate_dph"]
+        if k == run and kept is not None:
+            columns = {name: values[kept] for name, values in columns.items()}
         write_csv(folder / f"{k}.csv", columns)
     (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(3))), "utf-8")
     return folder
@@ -56,6 +62,52 @@ def test_recordings_without_steps_have_none() -> None:
         alarms += bool(steps_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
     print(f"{alarms} of 40 sets with a step")
     assert alarms <= 3, alarms
+
+
+def test_recordings_without_drifts_have_none_though_temperatures_are_followed_late() -> None:
+    """Forty sets of six runs with random walks, warm-up and a slow memory: kinks, but no beginning."""
+    rng = np.random.default_rng(SEED + 1)
+    alarms = 0
+    for _ in range(40):
+        runs = [recording(rng, k) for k in range(6)]
+        for r in runs:
+            tau = rng.uniform(300.0, 3000.0)
+            weights = np.exp(-np.arange(0.0, 5.0 * tau, ROW_S) / tau)
+            past = np.r_[np.full(weights.size, r["temperature_c"][0]), r["temperature_c"]]
+            late = np.convolve(past, weights / weights.sum())[weights.size : past.size]
+            r["rate_dph"] = (
+                r["rate_dph"] + 5e-4 * (late - r["temperature_c"]) + 0.01 * np.exp(-r["time_s"] / tau)
+            )
+        alarms += bool(drifts_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
+    print(f"{alarms} of 40 sets with a drift")
+    assert alarms <= 2, alarms
+
+
+def test_a_drift_that_begins_has_its_run_time_and_slope(tmp_path: Path) -> None:
+    """At a constant temperature, after five of eight hours; it is left out to the end."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    slope, at = 0.02, 5.0 * 3600.0
+    folder = written(tmp_path, {"rate_dph": slope * np.maximum(time - at, 0.0) / 3600.0}, run=0)
+    event = only(folder)
+    assert (event.id, event.file, event.unit) == ("ramp", "0.csv", "deg/h/h")
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 1800.0
+    assert event.size[1] <= slope <= event.size[2] and event.size[0] == pytest.approx(slope, rel=0.1)
+    assert event.leave_out is not None and event.leave_out[1] > time[-1]
+    assert events_of(accepted(load(folder), [event])) == []
+
+
+def test_a_run_that_goes_on_at_another_level_after_a_gap_was_restarted(tmp_path: Path) -> None:
+    """Seven minutes without rows. The same gap without another level is a dropout."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    kept = (time < 10_000.0) | (time > 10_400.0)
+    for size, id in ((0.012, "restart"), (0.0, "dropout")):
+        folder = written(tmp_path / id, {"rate_dph": size * (time > 10_200.0)}, run=0, kept=kept)
+        event = only(folder)
+        assert (event.id, event.file) == (id, "0.csv")
+        if id == "restart":
+            assert event.time_s[1:] == (9990.0, 10_410.0) and event.size[1] <= size <= event.size[2]
+            assert event.leave_out is not None and event.leave_out[1] <= 10_410.0, "the shorter side"
+            assert "power_on_s" in event.text
 
 
 def test_a_step_that_stays_has_its_run_time_and_size(tmp_path: Path) -> None:
@@ -104,6 +156,7 @@ def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
 
 def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path:
     """Four runs with ramps, an hour later in the programme each; the third is changed."""
+    folder.mkdir(exist_ok=True)
     rng = np.random.default_rng(SEED)
     print("seed", SEED)
     for k in range(4):
@@ -122,10 +175,29 @@ def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None
 
     dataset = load(ramps(tmp_path, louder))
     (event,) = turned_runs(dataset)
-    assert (event.id, event.file, event.unit) == ("gain_change", "2.csv", "times")
+    assert (event.id, event.file, event.unit) == ("gain_changed", "2.csv", "times")
     assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
     assert event.result().exclude is None, "the whole run goes, by its entry"
     assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
+
+
+def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path) -> None:
+    """In the midst of four hours of ramps; without a change, or with a level that changes, no gain does."""
+    at = 3.2 * 3600.0
+
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] * np.where(columns["time_s"] >= at, 1.4, 1.0)
+
+    def higher(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] + 0.02 * (columns["time_s"] >= at)
+
+    (event,) = gain_changes(load(ramps(tmp_path / "gain", louder)))
+    assert (event.id, event.file, event.whole_run) == ("gain_changed", "2.csv", False)
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 1800.0
+    assert event.size[1] <= 1.4 <= event.size[2] and event.size[0] == pytest.approx(1.4, abs=0.1)
+    assert (event.result().exclude or "").startswith("exclude = [{from_s = ")
+    assert gain_changes(load(ramps(tmp_path / "none"))) == []
+    assert gain_changes(load(ramps(tmp_path / "level", higher))) == []
 
 
 def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_values_reach_programs_as_they_are(value: str, house: Path) -> None:
         status, calls = make(house, "demo", *words, **given)
         assert status == 0
         assert calls[:2] == ["setup.sh", "gyrotc"] and calls[-3:] == [f"--axis={value}", "--", value]
-        for target in ("blind", "kills"):
+        for target in ("blind", "blind-other", "kills"):
             status, calls = make(house, target, *words, **given)
             assert status == 0 and calls[-1] == f"--seed={value}"
         status, calls = make(house, "real", *words, **given)

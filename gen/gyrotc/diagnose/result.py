@@ -27,6 +27,7 @@ from .pipeline import Analysis, analyse
 from .screen.events import Event, accepted, events_of
 from .screen.gather import records_of
 from .screen.turned import turned_runs
+from .screen.turned_within import gain_changes
 from .summary import not_testable, result_of
 from .verdict import holds
 
@@ -79,13 +80,27 @@ def diagnose(
     say = progress or (lambda _: None)
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    events = [*turned_runs(dataset), *events_of(whole)]
+    events = _events(dataset, whole)
     found = _diagnosed(
         accepted(whole, events) if accept_events else whole, options or _options_of(model), say
     )
     told = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=told | {"next": steps}))
+
+
+def _events(dataset: Dataset, whole: Dataset) -> list[Event]:
+    """Of whole runs first; a step where a gain changes is that change."""
+    turned = turned_runs(dataset)
+    gains = [e for e in gain_changes(whole) if e.file not in {t.file for t in turned}]
+
+    def of_gain(event: Event) -> bool:
+        times = [gain.time_s for gain in gains if gain.file == event.file]
+        return event.id in ("step", "ramp") and any(
+            a <= event.time_s[2] and event.time_s[1] <= b for _, a, b in times
+        )
+
+    return [*turned, *gains, *(e for e in events_of(whole) if not of_gain(e))]
 
 
 def _about(events: Sequence[Event], accept: bool) -> list[str]:

@@ -43,12 +43,14 @@ class Step:
         time_s: First row behind it, and the times between which it lies, s (95 %).
         size_dph: Size and its 95 % limits, deg/h.
         sigmas: Size over what the fit makes of noise.
+        over_gap: Whether there are no rows where it happened.
     """
 
     run: int
     time_s: tuple[float, float, float]
     size_dph: tuple[float, float, float]
     sigmas: float
+    over_gap: bool = False
 
 
 def steps_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Step]:
@@ -135,16 +137,34 @@ class _Windows:
         if scale == 0.0:
             return
         far = np.abs(self.z) / scale
-        open_ = far > limit
-        gaps = np.diff(self.t, append=self.t[-1] + self.cell_s) > 3.0 * self.cell_s
+        gaps, over_gap = self._gaps()
+        open_ = (far > limit) & ~gaps
         while open_.any():
             k = int(np.argmax(np.where(open_, far, 0.0)))
             open_[max(k - self.width, 0) : k + self.width + 1] = False
             at = k + self.width  # the first cell behind the step
-            if not gaps[at - self.width : at + self.width].any():
-                yield self._placed(
-                    at, float(self.size[k]), _NORMAL_95 * scale * float(self.spread[k]), float(far[k])
-                )
+            size, error = float(self.size[k]), _NORMAL_95 * scale * float(self.spread[k])
+            placed = self._behind_gap if over_gap[k] else self._placed
+            yield placed(at, size, error, float(far[k]))
+
+    def _gaps(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Windows that say nothing for a gap of the rows, and those with one gap in their middle, shape (n,).
+
+        Over a gap that is longer than half a window a gyro may drift by more than such windows show.
+        """
+        steps = np.diff(self.t)
+        gap = steps > 3.0 * self.cell_s
+        count = sliding_window_view(gap, 2 * self.width - 1).sum(axis=1)
+        middle = slice(self.width - 1, self.width - 1 + len(count))
+        over = gap[middle] & (count == 1) & (steps[middle] < self.half_s)
+        return (count > 0) & ~over, over
+
+    def _behind_gap(self, at: int, size: float, error: float, sigmas: float) -> Step:
+        """The step between the last row before a gap and the first behind it."""
+        time, edge = self.rows[0], 0.5 * float(self.t[at - 1] + self.t[at])
+        behind = int(np.searchsorted(time, edge))
+        between = float(time[behind]), float(time[behind - 1]), float(time[behind])
+        return Step(self.run, between, (size, size - error, size + error), sigmas, True)
 
     def _placed(self, at: int, size: float, error: float, sigmas: float) -> Step:
         """The step among the rows: where two levels leave least, and the times between which it lies."""

@@ -212,7 +212,8 @@ class FoundEvent(Part):
     """Something that happened to a recording at a time."""
 
     id: str = Field(
-        description="`step`, `step_and_recover`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
+        description="`step`, `step_and_recover`, `ramp` (a drift that begins), `restart`, `gain_changed`, "
+        "`sign_reversed`, `axes_exchanged`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
     )
     file: str = Field(description="of its run")
     time_s: Estimate = Field(description="on the file's clock, s")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...dataset import Dataset, Exclusion, Rows, Run, facts_of
 from ...frontend import departing_rows, samples_per_block
+from ...frontend.beginning_drifts import Drift, drifts_of
 from ...frontend.lasting_steps import Step, steps_of
 from ...results.diagnosed import Estimate, EventSize, FoundEvent
 
@@ -26,7 +27,7 @@ _BURST_ROWS = 10  # fewer are outliers
 _JOINED = 1.5  # row periods between rows of one burst
 _LOST_S = 60.0  # a thermometer that stands still, or no rows, for longer
 _STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
-_OF_RUNS = ("sign_reversed", "axes_exchanged", "gain_change")
+_ONE_PLACE_S = 3600.0  # half of the longest window in which a drift is looked for
 _BLOCK_S = 10.0  # over which the level around a burst is taken
 
 
@@ -35,14 +36,15 @@ class Event:
     """One event.
 
     Attributes:
-        id: step, step_and_recover, burst, dropout, thermometer_jump, thermometer_lost, or of a run as a whole
-            sign_reversed, axes_exchanged, gain_change.
+        id: step, step_and_recover, ramp, restart, gain_changed, burst, dropout, thermometer_jump,
+            thermometer_lost, or of a run as a whole sign_reversed, axes_exchanged, gain_changed.
         run: Number of its run among the training runs.
         file: Of that run.
         time_s: Value, and the limits between which it lies, s on the file's clock.
         size: Value and limits; `unit` is theirs.
         text: What it is.
         leave_out: What to leave out, from and to, s; None: nothing has to be, the front end sees to it.
+        whole_run: Whether it is about a run as a whole, which then is left out as such.
     """
 
     id: str
@@ -53,11 +55,7 @@ class Event:
     unit: str
     text: str
     leave_out: tuple[float, float] | None
-
-    @property
-    def whole_run(self) -> bool:
-        """Whether it is about a run as a whole, which then is left out as such."""
-        return self.id in _OF_RUNS
+    whole_run: bool = False
 
     def result(self) -> FoundEvent:
         """For the result."""
@@ -90,11 +88,15 @@ def events_of(dataset: Dataset) -> list[Event]:
         found += _dropouts(number, run, rows)
         good[wild] = False
         series.append((rows.time_s[good], rows.temperature_c[good], rows.rate_dph[good]))
-    steps = steps_of([part if len(part[0]) > 1 else (np.zeros(2),) * 3 for part in series])
+    judged = [part if len(part[0]) > 1 else (np.zeros(2),) * 3 for part in series]
+    steps, drifts = _told_once(steps_of(judged), drifts_of(judged))
     for number, run in enumerate(runs):
+        found += [_drift(run, drift, float(series[number][0][-1])) for drift in drifts if drift.run == number]
         of_run = [step for step in steps if step.run == number]
         if of_run:
             found += _steps(run, of_run, float(series[number][0][0]), float(series[number][0][-1]))
+    again = {(e.run, e.time_s[1]) for e in found if e.id == "restart"}
+    found = [e for e in found if e.id != "dropout" or (e.run, e.time_s[0]) not in again]
     return sorted(found, key=lambda event: (event.run, event.time_s[0]))
 
 
@@ -112,11 +114,40 @@ def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:
     return replace(dataset, runs=tuple(map(without, kept)))
 
 
+def _told_once(steps: Sequence[Step], drifts: Sequence[Drift]) -> tuple[list[Step], list[Drift]]:
+    """Of a step and a drift that are found at about one place, the clearer one."""
+
+    def near(one: Step | Drift, other: Step | Drift) -> bool:
+        return one.run == other.run and abs(one.time_s[0] - other.time_s[0]) < _ONE_PLACE_S
+
+    return (
+        [s for s in steps if all(s.sigmas >= d.sigmas for d in drifts if near(s, d))],
+        [d for d in drifts if all(d.sigmas > s.sigmas for s in steps if near(d, s))],
+    )
+
+
+def _drift(run: Run, drift: Drift, last_s: float) -> Event:
+    out = (drift.time_s[1], last_s + run.row_period_s)
+    text = (
+        f"The rate of {run.file} begins to drift by {drift.slope_dph_per_h[0]:+.3g} deg/h each hour at "
+        f"{drift.time_s[0]:g} s ({drift.sigmas:.1f} times what noise makes there) while the temperature stands still: "
+        f"leave out {_hours(*out)}, and find out what began then."
+    )
+    return Event("ramp", drift.run, run.file, drift.time_s, drift.slope_dph_per_h, "deg/h/h", text, out)
+
+
 def _steps(run: Run, steps: Sequence[Step], first_s: float, last_s: float) -> Iterator[Event]:
     """Steps that come back, as pairs, and those that last: of these the shorter side is to be left out."""
     k = 0
     while k < len(steps):
         one = steps[k]
+        if one.over_gap and not any(
+            gap.from_s <= one.time_s[1] + run.row_period_s and gap.to_s >= one.time_s[2]
+            for gap in run.exclude
+        ):
+            yield _restart(run, one, first_s, last_s)
+            k += 1
+            continue
         back = steps[k + 1] if k + 1 < len(steps) else None
         if back is not None and _undoes(one, back):
             out = (one.time_s[1], back.time_s[2] + run.row_period_s)
@@ -137,6 +168,22 @@ def _steps(run: Run, steps: Sequence[Step], first_s: float, last_s: float) -> It
         )
         yield Event("step", one.run, run.file, one.time_s, one.size_dph, "deg/h", text, out)
         k += 1
+
+
+def _restart(run: Run, step: Step, first_s: float, last_s: float) -> Event:
+    """Rows that stop and go on at another level."""
+    time, back = step.time_s[1:]
+    out = (
+        (first_s, time + run.row_period_s)
+        if back - first_s < last_s - back
+        else (back, last_s + run.row_period_s)
+    )
+    text = (
+        f"{run.file} has no rows for {back - time:g} s from {time:g} s on, and goes on {step.size_dph[0]:+.3g} deg/h "
+        f"away ({step.sigmas:.1f} times what noise makes there), as after a power-on: make the rows behind it a run of "
+        f"their own (from_s = {back!r}, with its power_on_s), or leave out {_hours(*out)}."
+    )
+    return Event("restart", step.run, run.file, (back, time, back), step.size_dph, "deg/h", text, out)
 
 
 def _undoes(one: Step, back: Step) -> bool:

@@ -42,7 +42,7 @@ def turned_runs(dataset: Dataset) -> list[Event]:
             f"The rates of {file} are those of the other runs times {factor:.3g} (95 % {low:.3g} ... {high:.3g}): its "
             "scale was another one. Mend it, or take the run out of dataset.toml."
         )
-        found[file] = ("gain_change", text, (factor, low, high))
+        found[file] = ("gain_changed", text, (factor, low, high))
     facts = [facts_of(run, run.rows()) for run in training]
     for finding in (*sign_findings(facts), *orientation_findings(dataset)):
         file = str(finding["evidence"]["file"])
@@ -56,7 +56,7 @@ def _event(dataset: Dataset, file: str, id: str, text: str, factor: tuple[float,
     number = next(k for k, run in enumerate(training) if run.file == file)
     time = training[number].rows().time_s
     first, last = float(time[0]), float(time[-1]) + training[number].row_period_s
-    return Event(id, number, file, (first, first, first), factor, "times", text, (first, last))
+    return Event(id, number, file, (first, first, first), factor, "times", text, (first, last), True)
 
 
 def _gains(curves: Sequence[Curve], axis: str | None) -> Iterator[tuple[str, float, float, float]]:
