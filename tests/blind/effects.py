@@ -142,6 +142,11 @@ def ageing(scene: Scene, rng: np.random.Generator) -> Effect:
     return days, {}
 
 
+def power_on_temperature(scene: Scene, rng: np.random.Generator) -> Effect:
+    """What the block had at power-on, or ten minutes before the first row, decides over the whole run."""
+    return [np.full(r.block_c.size, float(r.before_c[0]) - 20.0) for r in scene.runs], {}
+
+
 def path_length_periodicity(scene: Scene, rng: np.random.Generator) -> Effect:
     period, phase = log_uniform(rng, 5, 20), rng.uniform(0, 2 * np.pi)
     return [np.sin(2 * np.pi * r.block_c / period + phase) for r in scene.runs], {"period_c": period}
@@ -169,6 +174,7 @@ CATALOGUE: dict[str, Mechanism] = {
     "warm_up": warm_up,
     "turn_on_offset": turn_on_offset,
     "ageing": ageing,
+    "power_on_temperature": power_on_temperature,
     "path_length_periodicity": path_length_periodicity,
     "map_too_coarse": map_too_coarse,
     "auxiliary": auxiliary,
@@ -182,6 +188,7 @@ FAMILY = {
     "warm_up": "power_on",
     "turn_on_offset": "between_runs",
     "ageing": "between_runs",
+    "power_on_temperature": "between_runs",
     "path_length_periodicity": "static_map",
     "map_too_coarse": "static_map",
     "auxiliary": "auxiliary",

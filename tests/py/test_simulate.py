@@ -178,6 +178,7 @@ SWITCHED_ON: dict[str, dict[str, float | str]] = {
     "warm_up": {"tau_s": 600.0, "amplitude_dph": 1e-2},
     "turn_on_offset": {"std_dph": 1e-2},
     "ageing": {"slope_dph_per_day": 1e-3},
+    "power_on_temperature": {"slope_dph_per_c": 1e-4},
     "map_too_coarse": {"amplitude_dph": 1e-3, "at_c": 15.0},
     "path_length_periodicity": {"period_c": 11.0, "amplitude_dph": 1e-3},
     "auxiliary": {"channel": "supply_v", "slope_dph_per_unit": 0.1, "reference": 28.0},

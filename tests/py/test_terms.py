@@ -25,6 +25,7 @@ INTERFACE = {
     "warm_up": ("power_on", ["tau_s", "amplitude_dph"]),
     "turn_on_offset": ("between_runs", ["std_dph"]),
     "ageing": ("between_runs", ["slope_dph_per_day"]),
+    "power_on_temperature": ("between_runs", ["slope_dph_per_c"]),
     "map_too_coarse": ("static_map", []),
     "path_length_periodicity": ("static_map", ["period_c", "amplitude_dph"]),
     "auxiliary": ("auxiliary", ["slope_dph_per_unit"]),

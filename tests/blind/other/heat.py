@@ -39,7 +39,10 @@ class Body:
 
 @dataclass(frozen=True)
 class Heat:
-    """Temperatures of one run at `STEP_S` from its first row on, C; `on_s` is the time since power-on, s."""
+    """Temperatures of one run at `STEP_S` from its first row on, C; `on_s` is the time since power-on, s.
+
+    `soak_c` is what everything had when it was switched on.
+    """
 
     sensor: Array
     deep: Array
@@ -47,6 +50,7 @@ class Heat:
     case: Array
     air: Array
     on_s: Array
+    soak_c: float
 
 
 def draw_body(rng: np.random.Generator) -> Body:
@@ -88,7 +92,15 @@ def run_heat(
         state = _step(body, state, outside, body.discharge if lit else 0.0)
     out = out[lead:]
     on_s = (np.arange(command.size) + lead) * STEP_S
-    return Heat(out[:, 1 + body.sensor_cell], out[:, _CELLS], out[:, -1], out[:, 0], air[lead:], on_s)
+    return Heat(
+        out[:, 1 + body.sensor_cell],
+        out[:, _CELLS],
+        out[:, -1],
+        out[:, 0],
+        air[lead:],
+        on_s,
+        float(wanted[0]),
+    )
 
 
 def _step(body: Body, state: Array, outside: float, power: float) -> Array:

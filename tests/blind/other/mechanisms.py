@@ -152,6 +152,13 @@ def leak(scene: Scene, rng: np.random.Generator) -> Effect:
     ], False
 
 
+def start(scene: Scene, rng: np.random.Generator) -> Effect:
+    """The mode that the cavity locks to follows the length that it had when it was switched on, not quite in a line."""
+    bend = float(rng.uniform(-0.003, 0.003))
+    soaked = [h.soak_c - 20.0 for h in scene.heat]
+    return [np.full(h.sensor.size, s + bend * s * s) for h, s in zip(scene.heat, soaked, strict=True)], False
+
+
 def etalon(scene: Scene, rng: np.random.Generator) -> Effect:
     """Backscatter of a plate: Airy's function of temperature, no sine."""
     period = float(np.exp(rng.uniform(np.log(3.0), np.log(30.0))))
@@ -183,6 +190,7 @@ CATALOGUE: dict[str, Mechanism] = {
     "warm_up": switched_on,
     "turn_on_offset": run_offsets,
     "ageing": leak,
+    "power_on_temperature": start,
     "path_length_periodicity": etalon,
     "map_too_coarse": kinks,
     "auxiliary": supply,

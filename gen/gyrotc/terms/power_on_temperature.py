@@ -1,0 +1,59 @@
+"""Power-on temperature: every power-on sets an offset by the temperature that it finds. In no map: it knows one T.
+
+bias += slope · (T at power-on − 20 C), for the whole run
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .search import SearchRule, anywhere
+from .words import Telling, Wording
+
+__all__ = ["CAUSE"]
+
+_REPEATED = "the same hold after power-ons at three temperatures, each twice"
+_REFERENCE_C = 20.0  # room temperature: where the offset counts as none
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    found_c = scene.node_c[int(np.argmax(scene.on_s >= 0.0))]
+    return np.full(len(scene.time_s), values["slope_dph_per_c"] * (found_c - _REFERENCE_C))
+
+
+def _features(history: History, values: Values) -> Features:
+    """The first reading stands for the temperature at power-on: a run that was soaked before it had the same."""
+    found_c = float(history.temperature_c[0])
+    n = len(history.time_s)
+    return Features(np.full((n, 1), found_c - _REFERENCE_C), np.ones(n, dtype=bool))
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"slope_dph_per_c": float(weights[0])}
+
+
+CAUSE = Cause(
+    id="power_on_temperature",
+    family="between_runs",
+    rank=65,
+    kind="add",
+    equation="bias += slope (T at power-on - 20 C), for the whole run",
+    source="start-up of discharge and path-length control: the mode that is taken depends on the length found",
+    parameters=(Parameter("slope_dph_per_c", "deg/h/C", 1e-7, 1e-1, linear=True, signed=True),),
+    words=Wording(
+        name="Every power-on sets an offset by the temperature that it finds",
+        short="start T",
+        signature="means of the runs follow the temperature at power-on",
+        remedy="no map holds it: switch on at one temperature, or re-zero in the first minutes at rest",
+        experiment=_REPEATED,
+        telling=Telling.REPEATS,
+        beside={"turn_on_offset": _REPEATED, "ageing": _REPEATED},
+        recording="record three runs or more that are switched on at different temperatures, with their power_on_s",
+    ),
+    search=SearchRule(price=1, grid=anywhere, imitates=True),
+    needs=Needs(runs=3, power_on=True),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)
