@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-import secrets
 import sys
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from tests.blind.other.record import IMITATED, draw_recording  # noqa: E402
 from tests.blind.other.run import orders, run  # noqa: E402
 
 WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
-RECORDS = 3
+SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind-other`
 
 
 def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:
@@ -73,8 +72,6 @@ def test_a_seed_gives_the_same_recording_and_foreign_ones_are_foreign() -> None:
 
 
 def test_a_slice_of_the_world_is_diagnosed(tmp_path: Path) -> None:
-    seed = secrets.randbits(32)
-    print(f"seed {seed}")
-    rows = run(seed, RECORDS, tmp_path, hours=3.0)
+    rows = run(SEED, RECORDS, tmp_path, hours=2.0)
     assert len(rows) == RECORDS and table(rows)
     assert not [row["error"] for row in rows if row["verdict"] == "error"]
