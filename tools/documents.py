@@ -5,8 +5,10 @@ that ends in a backslash goes on in the next line), the lines behind it are what
 as a part of a line or, alone in a line, for any lines. The blocks of a page run in order in one folder, a copy of the
 sources' tracked files, with gyrotc of the environment on the PATH. A command whose exit status is not 0 is wrong unless
 the page says `$? = N` in the line behind its output. `needs: program` in the fence skips a block where it is missing.
+A block whose fence is ```` ```c file: lab/main.c ```` (any language) is a file: it is written there.
 
-    python tools/documents.py docs/trust.md        runs a page; exit status 1 and the difference if it is wrong
+    python tools/documents.py docs/trust.md            runs a page; exit status 1 and the difference if it is wrong
+    python tools/documents.py --times docs/trust.md    also tells how long each command takes
 """
 
 from __future__ import annotations
@@ -17,13 +19,15 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 _FENCE = re.compile(
-    r"^```console run(?: needs: (?P<needs>[\w -]+))?\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL
+    r"^```(?:console run(?: needs: (?P<needs>[\w -]+))?|\w+ file: (?P<file>[\w./-]+))\n(?P<body>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
 )
 _LINK = re.compile(r"(?<!!)\[[^\]\n]*\]\(([^)\s]+)\)|!\[[^\]\n]*\]\(([^)\s]+)\)")
 _OUTSIDE = re.compile(r"^[a-z]+:")
@@ -31,21 +35,25 @@ _OUTSIDE = re.compile(r"^[a-z]+:")
 
 @dataclass
 class Step:
-    """A command of a page with what it prints."""
+    """A command of a page with what it prints; or a file, with its text as `text`."""
 
     command: str
     line: int
     needs: tuple[str, ...]
     output: list[str] = field(default_factory=list)
     status: int = 0
+    text: str | None = None
 
 
 def steps(text: str) -> list[Step]:
-    """Every command of the marked blocks, in order."""
+    """Every command of the marked blocks, and every file, in order."""
     found: list[Step] = []
     for block in _FENCE.finditer(text):
         line = text[: block.start("body")].count("\n")
         needs = tuple((block["needs"] or "").split())
+        if block["file"]:
+            found.append(Step(block["file"], line, needs, text=block["body"]))
+            continue
         open_line = False
         for content in block["body"].splitlines():
             line += 1
@@ -73,10 +81,10 @@ def agrees(printed: str, wanted: list[str]) -> bool:
     return re.fullmatch("".join(parts), text) is not None
 
 
-def run(page: Path) -> Iterator[str]:
+def run(page: Path, timed: Callable[[Step, float], None] = lambda step, seconds: None) -> Iterator[str]:
     """What is wrong with a page: one text for each command that prints or ends otherwise.
 
-    Missing programs are told as `skipped: ...`.
+    Missing programs are told as `skipped: ...`; `timed` is told how long each command took, in s.
     """
     with tempfile.TemporaryDirectory() as folder:
         work = _copy(Path(folder))
@@ -85,14 +93,20 @@ def run(page: Path) -> Iterator[str]:
         }  # fmt: skip
         for step in steps(page.read_text("utf-8")):
             where = f"{page.name}:{step.line}"
+            if step.text is not None:
+                (work / step.command).parent.mkdir(parents=True, exist_ok=True)
+                (work / step.command).write_text(step.text, "utf-8")
+                continue
             missing = [name for name in step.needs if shutil.which(name) is None]
             if missing:
                 yield f"skipped: {where} needs {', '.join(missing)}"
                 continue
+            begun = time.monotonic()
             done = subprocess.run(
                 ["bash", "-c", step.command], cwd=work, env=environment, text=True, check=False, timeout=600,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             )  # fmt: skip
+            timed(step, time.monotonic() - begun)
             if done.returncode != step.status:
                 yield f"{where}: {step.command}\n  ends with {done.returncode}, not {step.status}:\n{done.stdout}"
             elif not agrees(done.stdout, step.output):
@@ -138,12 +152,16 @@ def pages() -> list[Path]:
     return sorted([*ROOT.glob("*.md"), *(p for f in folders for p in (ROOT / f).rglob("*.md"))])
 
 
+def _tell(step: Step, seconds: float) -> None:
+    print(f"{seconds:7.1f} s  {step.command.splitlines()[0][:90]}", flush=True)
+
+
 def main() -> int:
     """Runs the pages that are named, by default all that have something to run."""
-    named = [Path(word).resolve() for word in sys.argv[1:]] or [
-        p for p in pages() if steps(p.read_text("utf-8"))
-    ]
-    wrong = [text for page in named for text in run(page)]
+    words = [word for word in sys.argv[1:] if word != "--times"]
+    named = [Path(word).resolve() for word in words] or [p for p in pages() if steps(p.read_text("utf-8"))]
+    timed = _tell if "--times" in sys.argv[1:] else (lambda step, seconds: None)
+    wrong = [text for page in named for text in run(page, timed)]
     print("\n".join(wrong) or f"{len(named)} pages are what they say")
     return 1 if any(not text.startswith("skipped") for text in wrong) else 0
 

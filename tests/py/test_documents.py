@@ -78,6 +78,13 @@ def test_a_page_that_says_something_else_is_seen(tmp_path: Path, monkeypatch: py
     assert [text.splitlines()[0] for text in wrong] == ["page.md:2: echo a", "page.md:4: exit 3"]
 
 
+def test_a_block_that_is_a_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents, "_copy", lambda folder: folder)
+    page = tmp_path / "page.md"
+    page.write_text("```c file: a/main.c\nint x;\n```\n```console run\n$ cat a/main.c\nint x;\n```\n")
+    assert list(documents.run(page)) == []
+
+
 def test_the_table_of_deviations_is_what_the_sources_declare() -> None:
     page = (ROOT / "docs" / "certification.md").read_text("utf-8")
     listed = dict(re.findall(r"^\| (\d+\.\d+) \| (?:advisory|required) \| (.+?) \|", page, re.MULTILINE))
