@@ -36,9 +36,10 @@ else
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
 endif
 
-## docs/FORMAT.md's tables of fields and the JSON Schemas, from the classes of the results
+## from the code: docs/FORMAT.md's tables of fields, the JSON Schemas, the pages docs/reference-*.md
 formats:
 	@.venv/bin/python tools/formats.py
+	@.venv/bin/python tools/reference.py
 
 ## all tests (CTest for the C library, pytest for the generator); installs its own tools
 test:
@@ -178,11 +179,19 @@ cycles: setup
 dist: setup
 	@$(PYTHON) tools/archives.py build/dist
 
+## the lock file of the developers' environment, with hashes: gen/requirements.lock
+lock:
+	@tools/lock.sh
+
+## the archives on a machine without a network: a folder of wheels, installed and run there (root rights)
+offline: dist
+	@tools/offline.sh
+
 ## all pages as a site, with search, in build/site
 site:
 	@[ -x build/site-tools/bin/mkdocs ] || { python3 -m venv build/site-tools && \
 	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
-	@build/site-tools/bin/mkdocs build -q -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (with search: python3 -m http.server -d build/site)"
+	@build/site-tools/bin/mkdocs build -q -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
 packages: setup
@@ -192,4 +201,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist site clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist lock offline site clean

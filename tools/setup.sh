@@ -9,12 +9,16 @@
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
 #   tools/setup.sh picture    besides, the browser of `make picture`
 #
+# `locked` behind a level takes the versions of gen/requirements.lock, each file held against its SHA-256.
+#
 # No release's number stands in a package's name here: what belongs to one version of a compiler is asked of that compiler.
 # Without the packages of `demo` nothing works; any other that this release does not have is named, and what needs it is skipped.
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 level=${1:-demo}
+locked=${2:-}
+[ -z "$locked" ] || [ "$locked" = locked ] || { echo "setup: unknown word '$locked' (locked)" >&2; exit 2; }
 
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
 firmware=(gcc-arm-none-eabi qemu-system-arm)
@@ -93,11 +97,17 @@ fi
 extras=""
 case $level in demo | firmware | picture) ;; *) extras="[test]" ;; esac
 stamp=.venv/.gyrotc$extras
-fingerprint=$({ cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
+fingerprint=$({ echo "$locked"; cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
 if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
   [ -x .venv/bin/python ] || { echo "setup: making .venv"; python3 -m venv .venv; }
   echo "setup: installing gyrotc into .venv (builds the C++ core)"
-  .venv/bin/python -m pip install -q --disable-pip-version-check -e "gen$extras"
+  pip=(.venv/bin/python -m pip install -q --disable-pip-version-check)
+  if [ -n "$locked" ]; then
+    "${pip[@]}" --require-hashes --only-binary :all: -r gen/requirements.lock
+    "${pip[@]}" --no-deps --no-build-isolation -e gen
+  else
+    "${pip[@]}" -e "gen$extras"
+  fi
   echo "$fingerprint" >"$stamp"
   [ -z "$extras" ] || echo "$fingerprint" >.venv/.gyrotc
 fi

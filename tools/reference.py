@@ -1,0 +1,152 @@
+"""Reference pages made from the code: docs/reference-{c,cli,schemas,python}.md.
+
+`make formats` writes them; with `--check` nothing is written, and the exit status is 1 where a page is stale
+(tests/py/test_reference_pages.py).
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+#: Modules that may be imported by users' programs; what stands in their `__all__`.
+PYTHON = (
+    "model", "dataset", "frontend", "train", "quantise", "reference", "emit", "verify", "judge.evaluate", "diagnose",
+    "simulate", "plan", "metrics", "errors",
+)  # fmt: skip
+_C_PART = re.compile(
+    r"/\* (?P<text>(?:(?!\*/).)*?) ?\*/\n(?P<code>(?:GTC_MUST_CHECK int gtc_\w+\([^;]*;\n)+)", re.DOTALL
+)
+
+
+def c_page() -> str:
+    """Every function of gtc.h with its comment."""
+    header = (ROOT / "include" / "gtc.h").read_text("ascii")
+    parts = [
+        "# C reference\n",
+        "Made from `include/gtc.h` by `tools/reference.py`; there stand the types, too.\n",
+    ]
+    for part in _C_PART.finditer(header):
+        names = re.findall(r"int gtc_f32_(\w+)\(", part["code"])
+        if not names:
+            continue
+        text = "\n".join(re.sub(r"^ \* ?", "", line) for line in part["text"].splitlines())
+        parts += [f"## {', '.join(f'gtc_<n>_{name}' for name in names)}\n"]
+        parts += [
+            f"```c\n{part['code'].replace('GTC_MUST_CHECK ', '')}```\n",
+            f"```text\n{text.strip()}\n```\n",
+        ]
+    return "\n".join(parts)
+
+
+def cli_page() -> str:
+    """Every command with its arguments and options."""
+    from gyrotc.commands import app
+    from typer.main import get_command
+
+    parts = [
+        "# Command line reference\n",
+        "Made from the commands by `tools/reference.py`; `gyrotc COMMAND --help` says the same.\n",
+    ]
+    commands: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
+    for name, command in sorted(commands.items()):
+        text = inspect.cleandoc(command.help or "")
+        parts += [
+            f"## gyrotc {name}\n",
+            re.sub(r"\nExample: (.*)$", r"\n`\1`", text, flags=re.MULTILINE) + "\n",
+        ]
+        parts += ["| argument or option | default | meaning |", "| --- | --- | --- |"]
+        parts += [_option(parameter) for parameter in command.params if parameter.name != "help"]
+        parts.append("")
+    return "\n".join(parts)
+
+
+def _option(parameter: Any) -> str:
+    shown = ", ".join(f"`{o}`" for o in parameter.opts if o.startswith("-")) or f"`{parameter.name}`"
+    default = parameter.default
+    said = (
+        ""
+        if default is None or isinstance(default, bool | tuple) or callable(default) or parameter.required
+        else f"`{default}`"
+    )
+    return f"| {shown} | {said} | {_cell(getattr(parameter, 'help', None) or '')} |"
+
+
+def _cell(text: str) -> str:
+    return re.sub(r"\s+", " ", text).replace("|", "\\|").strip()
+
+
+def schemas_page() -> str:
+    """Every JSON Schema with its first fields; docs/FORMAT.md has what each field means."""
+    parts = [
+        "# JSON reference\n",
+        "Made from the schemas by `tools/reference.py`. `gyrotc schema NAME` prints one; fields within objects",
+        "and what they mean: [FORMAT.md](FORMAT.md).\n",
+    ]
+    for path in sorted((ROOT / "gen" / "gyrotc" / "results" / "schemas").glob("*.json")):
+        schema = json.loads(path.read_text("utf-8"))
+        required = set(schema.get("required", []))
+        parts += [f"## {path.stem}\n", _cell(schema.get("description", "")) + "\n"]
+        parts += ["| field | always there | meaning |", "| --- | --- | --- |"]
+        for name, field in schema.get("properties", {}).items():
+            parts.append(
+                f"| `{name}` | {'yes' if name in required else ''} | {_cell(field.get('description', ''))} |"
+            )
+        parts.append("")
+    return "\n".join(parts)
+
+
+def python_page() -> str:
+    """Every public name of the modules above with its signature and documentation."""
+    parts = ["# Python reference\n", "Made from the docstrings by `tools/reference.py`.\n"]
+    for room in PYTHON:
+        module = importlib.import_module(f"gyrotc.{room}")
+        parts += [f"## gyrotc.{room}\n", inspect.cleandoc(module.__doc__ or "") + "\n"]
+        for name in sorted(module.__all__):
+            parts += _documented(name, getattr(module, name))
+    return "\n".join(parts)
+
+
+def _documented(name: str, thing: Any) -> Iterator[str]:
+    """Heading, signature and docstring; constants are named."""
+    yield f"### {name}\n"
+    if inspect.isclass(thing) or inspect.isroutine(thing):
+        if inspect.isroutine(thing):
+            signature = re.sub(r"<(\w+) [^<>]*>", r"<\1>", str(inspect.signature(thing)))
+            yield f"```python\n{name}{signature}\n```\n"
+        text = inspect.cleandoc(thing.__doc__ or "")
+        if text and not text.startswith(f"{name}("):  # a dataclass without words of its own
+            yield f"```text\n{text}\n```\n"
+    else:
+        yield "A constant or a type.\n"
+
+
+PAGES = {"c": c_page, "cli": cli_page, "schemas": schemas_page, "python": python_page}
+
+
+def main() -> int:
+    """Writes the pages, or says which are stale."""
+    stale = []
+    for name, made in PAGES.items():
+        page = DOCS / f"reference-{name}.md"
+        text = made().rstrip() + "\n"
+        if not page.exists() or page.read_text("utf-8") != text:
+            stale.append(page.name)
+            if "--check" not in sys.argv[1:]:
+                page.write_text(text, "utf-8")
+    if stale and "--check" in sys.argv[1:]:
+        print(f"stale, `make formats` writes them: {', '.join(stale)}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
