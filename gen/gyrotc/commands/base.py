@@ -106,6 +106,16 @@ LotOption = Annotated[
     Path | None,
     typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs."),
 ]
+PriorOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."
+    ),
+]
+AgeingOption = Annotated[
+    float | None,
+    typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h."),
+]
 AppliedOption = Annotated[
     Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
 ]

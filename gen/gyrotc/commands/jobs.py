@@ -11,6 +11,7 @@ import typer
 from ..errors import CheckFailed, InputError
 from ..outputs import json_text, result_folder, write_atomically
 from .base import (
+    AgeingOption,
     AppliedOption,
     AverageOption,
     AxisOption,
@@ -23,6 +24,7 @@ from .base import (
     MethodOption,
     NumericOption,
     OutOption,
+    PriorOption,
     RhoOption,
     SeedOption,
     TrustUnitsOption,
@@ -41,6 +43,7 @@ from .results import (
     ladder_lines,
     limit_lines,
     lot_lines,
+    prior_lines,
     span_lines,
     summary,
     verify_table,
@@ -74,6 +77,8 @@ def build(
         Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met.")
     ] = None,
     lot: LotOption = None,
+    prior: PriorOption = None,
+    ageing: AgeingOption = None,
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
     ] = None,
@@ -104,6 +109,8 @@ def build(
             extend=extend,
             limits=limits,
             previous=previous,
+            prior=prior,
+            ageing_dph=ageing,
             any_serial=any_serial,
             progress=say,
         )
@@ -133,6 +140,7 @@ def _print_built(result: Built) -> None:
         *ladder_lines(result.training),
         *channel_lines(result.training),
         *lot_lines(result.training),
+        *prior_lines(result.training),
     ):
         tell(line)
     for name, reason in result.refused.items():

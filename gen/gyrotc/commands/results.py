@@ -57,6 +57,19 @@ def lot_lines(training: Training) -> Iterator[str]:
         yield f"lot: {training.lot.text}"
 
 
+def prior_lines(training: Training) -> Iterator[str]:
+    """Whether the earlier model still holds, and where not."""
+    if training.prior is not None:
+        yield f"earlier model: {training.prior.text}"
+        for cell in training.prior.cells:
+            if not cell.within:
+                (t0, t1), (r0, r1) = cell.temperature_c, cell.slope_c_per_min
+                yield (
+                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {cell.found_dph:+.2g} deg/h, "
+                    f"limit {cell.limit_dph:.2g}"
+                )
+
+
 def ladder_lines(training: Training) -> Iterator[str]:
     """Which correction was chosen, why, and what each leaves on history that it has not seen."""
     if training.ladder:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from ..errors import CheckFailed, InputError
 from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     ERR,
+    AgeingOption,
     AppliedOption,
     AverageOption,
     AxisOption,
@@ -25,6 +27,7 @@ from .base import (
     MethodOption,
     NumericOption,
     OutOption,
+    PriorOption,
     RhoOption,
     SeedOption,
     TrustOption,
@@ -43,6 +46,7 @@ from .results import (
     ladder_lines,
     lot_lines,
     prediction_line,
+    prior_lines,
     span_lines,
     verify_notes,
     verify_table,
@@ -66,6 +70,8 @@ def fit(
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
+    prior: PriorOption = None,
+    ageing: AgeingOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
@@ -74,16 +80,20 @@ def fit(
     """
     from ..dataset import load
     from ..jobs.lot import load_lot
+    from ..jobs.recalibration import prior_from, refuse_together
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
     options = FitOptions(
         method, seed, centers, rho, block_s, average_s, channels, load_lot(lot) if lot else None
     )
+    refuse_together(options, prior, ageing)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
+        if prior is not None:
+            options = replace(options, prior=prior_from(prior, recordings, ageing_dph=ageing))
         fitted = fit_dataset(recordings, options, progress=say)
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
@@ -93,6 +103,7 @@ def fit(
         *ladder_lines(fitted.training),
         *channel_lines(fitted.training),
         *lot_lines(fitted.training),
+        *prior_lines(fitted.training),
     ):
         tell(line)
     for finding in fitted.training.findings:

@@ -32,6 +32,7 @@ from ..results.verification import Verification
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
 from .axes import join_axes
+from .recalibration import prior_from, refuse_together
 
 __all__ = ["Built", "build", "build_into"]
 
@@ -67,6 +68,8 @@ class _Order:
     extend: bool
     limits: Limits | None
     previous: Path | None
+    prior: Path | None = None
+    ageing_dph: float | None = None
     compiled: bool = True
     watch: Watch | None = None
 
@@ -83,6 +86,8 @@ def build(
     extend: bool = False,
     limits: Path | None = None,
     previous: Path | None = None,
+    prior: Path | None = None,
+    ageing_dph: float | None = None,
     any_serial: bool = False,
     progress: Progress | None = None,
 ) -> list[Built]:
@@ -98,6 +103,9 @@ def build(
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
         limits: A limits file that the result is held against.
         previous: An earlier result of the same gyro, to say what changed.
+        prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
+            check run) do not speak against it; also the `previous` one where none is given.
+        ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
         any_serial: An earlier result in `out` may be of another gyro.
 
     Raises:
@@ -107,9 +115,11 @@ def build(
     say = progress or (lambda _: None)
     say("reading")
     known = applied_of(applied) if applied else None
-    if extend and options.lot is not None:
-        raise InputError("--extend", "with --lot: a lot knows maps alone", "one of the two")
-    order = _Order(numerics, extend, load_limits(limits) if limits else None, previous)
+    if extend and (options.lot is not None or prior is not None):
+        raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
+    refuse_together(options, prior, ageing_dph)
+    held = load_limits(limits) if limits else None
+    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph)
     axes = axes_of(source) if axis == "all" else ()
     if axis == "all" and not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
@@ -154,13 +164,20 @@ def build_into(
         CheckFailed: Every arithmetic is refused.
     """
     return _build_axis(
-        dataset, work, options, _Order(numerics, False, limits, None, compiled, watch), lambda _: None
+        dataset,
+        work,
+        options,
+        _Order(numerics, False, limits, None, compiled=compiled, watch=watch),
+        lambda _: None,
     )
 
 
 def _build_axis(
     dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress
 ) -> Built:  # long: the stages in their order
+    if order.prior:
+        told = prior_from(order.prior, dataset, ageing_dph=order.ageing_dph, limits=order.limits)
+        options = replace(options, prior=told)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)

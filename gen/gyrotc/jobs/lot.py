@@ -21,6 +21,7 @@ from ..train.lot.basis import PARAMETERS
 from ..train.lot.learn import Envelope, folds_of
 from ..train.lot.model import LotState
 from ..train.process import MEAN_S
+from .recalibration import between_of, means_of
 
 __all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
 
@@ -86,7 +87,7 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
         envelope,
         axis=units[0].model.axis,
         mean_s=float(np.median([u.training.means.mean_s for u in kept if u.training.means])),
-        between_dph=float(np.sqrt(np.mean([_between(u.model) ** 2 for u in kept]))),
+        between_dph=float(np.sqrt(np.mean([between_of(u.model) ** 2 for u in kept]))),
     )
 
 
@@ -101,10 +102,16 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
         raise InputError(
             "--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own"
         )
-    chosen = [u for u in units if u.model.axis == axis and u.training.lot is None]
+    chosen = [
+        u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None
+    ]
     distinct = {u.model.serial: u for u in chosen}
     if len(distinct) < LEAST_UNITS:
-        others = f", {len(units) - len(chosen)} of another axis or calibrated with a lot" if units else ""
+        others = (
+            f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
+            if units
+            else ""
+        )
         raise InputError(str(fleet), f"{len(distinct)} calibrated units{others}", f"{LEAST_UNITS} at least")
     return [*distinct.values()]
 
@@ -112,21 +119,7 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
 def _unit(place: Path) -> _Calibrated:
     training = read_result(place / "training.json", Training)
     model = load_model(place / "model.json")
-    means = training.means
-    if means is None:
-        raise InputError(
-            str(place / "training.json"),
-            "has no means (an extended model, or an earlier gyrotc)",
-            "a unit as gyrotc fleet makes it: give that command again",
-        )
-    arrays = [np.array(x) for x in (means.temperature_c, means.slope_c_per_min, means.bias_dph, means.count)]
-    if len({len(x) for x in arrays}) != 1 or len(arrays[0]) == 0 or arrays[3].min() <= 0.0:
-        raise InputError(
-            f"{place / 'training.json'}, field means", "lists that do not go together", "one of each a mean"
-        )
-    return _Calibrated(
-        model, training, UnitMeans(arrays[0], arrays[1], arrays[2], arrays[3], means.sigma_dph)
-    )
+    return _Calibrated(model, training, means_of(training.means, place / "training.json"))
 
 
 def _envelope(models: Sequence[Model]) -> Envelope:
@@ -226,11 +219,6 @@ def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, .
         )
         for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
     )
-
-
-def _between(model: Model) -> float:
-    known = model.uncertainty_dph
-    return float(known.rules.between_dph) if known is not None and known.rules is not None else 0.0
 
 
 def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> Floats:

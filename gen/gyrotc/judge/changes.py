@@ -32,7 +32,7 @@ from ..results.manifest import Manifest
 from .as_found import as_found, history_of
 from .limits import Limits
 
-__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "refuse_another"]
+__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "refuse_another", "started_on"]
 
 Floats = NDArray[np.float64]
 
@@ -52,8 +52,13 @@ class Earlier:
         self.date = _stated(self.model)
 
 
-def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
+def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--previous") -> Earlier:
     """Reads an earlier result folder of a gyro, of one of its axes where it has several.
+
+    Args:
+        folder: The result.
+        serial, axis: Of the gyro.
+        option: By which it was named.
 
     Raises:
         InputError: There is none, it is of another gyro or axis, or a file of it cannot be read.
@@ -61,11 +66,11 @@ def load_earlier(folder: Path, serial: str, axis: str | None) -> Earlier:
     if axis is not None and not (folder / "model.json").is_file() and (folder / axis).is_dir():
         folder = folder / axis
     if not (folder / "model.json").is_file():
-        raise InputError(f"--previous {folder}", "has no model.json", "a folder that gyrotc build wrote")
+        raise InputError(f"{option} {folder}", "has no model.json", "a folder that gyrotc build wrote")
     earlier = Earlier(folder)
     old = earlier.model
     if (old.serial, old.axis) != (serial, axis):
-        raise InputError(f"--previous {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
+        raise InputError(f"{option} {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
     return earlier
 
 
@@ -134,7 +139,7 @@ def changes_since(
         files=_files(earlier.manifest, manifest),
         as_found=found,
         as_found_missing=missing,
-        history=history_of(earlier, model, evaluation, found, moved, _stated(model) or _started(dataset)),
+        history=history_of(earlier, model, evaluation, found, moved, _stated(model) or started_on(dataset)),
     )
 
 
@@ -143,7 +148,7 @@ def _stated(model: Model) -> str | None:
     return None if date is None else str(date)
 
 
-def _started(dataset: Dataset | None) -> str | None:
+def started_on(dataset: Dataset | None) -> str | None:
     """Day of the last recording, where the recordings carry dates."""
     days = [run.started for run in dataset.runs if run.started is not None] if dataset else []
     return max(days).date().isoformat() if days else None

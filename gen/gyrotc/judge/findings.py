@@ -44,7 +44,13 @@ _PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature an
 _COMMON_PLACES = 5  # fewer do not make a median
 _CONTRADICTION = 5.0  # times the scatter of a minute within such a place
 _LEAST_FREEDOM = 10  # degrees of freedom: with fewer a scatter is known to no better than a quarter
-_OF_TRAINING = ("does_not_generalise", "map_refused", "map_beyond_data", "not_of_its_lot")
+_OF_TRAINING = (
+    "does_not_generalise",
+    "map_refused",
+    "map_beyond_data",
+    "not_of_its_lot",
+    "prior_does_not_hold",
+)
 _POLYNOMIALS = ("cubic", "cubic_slope")
 
 

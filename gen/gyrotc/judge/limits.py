@@ -31,7 +31,7 @@ Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
-    "not_of_its_lot",
+    "not_of_its_lot", "prior_does_not_hold",
     "shared_rows", "sign_reversed",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None

@@ -16,10 +16,12 @@ from ..results.changes import Calibration, Changes
 from ..results.verification import Verification
 from .limits import Limits
 
-__all__ = ["Known", "ageing", "arithmetic", "combined", "part", "reference", "thermometer"]
+__all__ = [
+    "DAYS_A_YEAR", "Known", "ageing", "arithmetic", "combined", "part", "reference", "thermometer", "yearly_drifts",
+]  # fmt: skip
 
 _STEP = 0.01  # of the range of temperatures, for the map's gradient
-_DAYS_A_YEAR = 365.25  # the Julian year
+DAYS_A_YEAR = 365.25  # the Julian year
 Known = tuple[float, float | None]
 """A contribution, deg/h, and its degrees of freedom (None: many)."""
 
@@ -140,7 +142,7 @@ def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str
     interval = limits.interval if limits else None
     if interval is None:
         return "ageing: no interval until the next calibration is stated"
-    years = interval.days / _DAYS_A_YEAR
+    years = interval.days / DAYS_A_YEAR
     if interval.drift_dph_per_year is not None:
         return part(
             "ageing",
@@ -151,7 +153,7 @@ def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str
             sensitivity=years,
             rectangular=True,
         )
-    drifts = _drifts(changes.history if changes else ())
+    drifts = yearly_drifts(changes.history if changes else ())
     if not drifts:
         return "ageing: neither a drift of the type nor an earlier calibration with its date is known"
     return part(
@@ -166,7 +168,7 @@ def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str
     )
 
 
-def _drifts(history: Sequence[Calibration]) -> list[float]:
+def yearly_drifts(history: Sequence[Calibration]) -> list[float]:
     """Move of the map's mean between calibrations that have dates, deg/h a year."""
     found = []
     for before, after in pairwise(history):
@@ -176,5 +178,5 @@ def _drifts(history: Sequence[Calibration]) -> list[float]:
             except ValueError:
                 continue
             if days > 0:
-                found.append(after.moved_mean_dph * _DAYS_A_YEAR / days)
+                found.append(after.moved_mean_dph * DAYS_A_YEAR / days)
     return found

@@ -1,4 +1,4 @@
-"""The picture of a unit with its lot: what the lot says, what the unit's runs say, and both together."""
+"""The picture of a unit with its lot or its earlier model: what these say, what its runs say, and both together."""
 
 from __future__ import annotations
 
@@ -16,13 +16,18 @@ _BAND = 2.0  # sigma that a band reaches, about 95 %
 
 
 def prior_and_posterior(training: Training) -> str | None:
-    """Prior, recordings and posterior where temperature stands still, deg/h over C; None without a lot."""
-    curve = training.lot.curve if training.lot else None
-    if curve is None or training.lot is None:
+    """Prior, recordings and posterior where temperature stands still, deg/h over C; None where nothing was known."""
+    if training.lot is not None:
+        curve, name = training.lot.curve, f"the lot alone, {training.lot.units} units"
+    elif training.prior is not None:
+        curve, name = training.prior.curve, "the earlier model after ageing"
+    else:
+        return None
+    if curve is None:
         return None
     t = np.array(curve.temperature_c)
     bands = (
-        (curve.prior_dph, curve.prior_sigma_dph, COVERED, f"the lot alone, {training.lot.units} units"),
+        (curve.prior_dph, curve.prior_sigma_dph, COVERED, name),
         (curve.posterior_dph, curve.posterior_sigma_dph, AFTER, "with this unit's own runs"),
     )
     with mpl.rc_context(STYLE):

@@ -11,6 +11,7 @@ from .base import Amount, Axis, Count, Figure, Part, Positive, Result
 __all__ = [
     "AtRest",
     "CrossValidation",
+    "KnownMap",
     "Lot",
     "LotCluster",
     "LotFunctions",
@@ -27,7 +28,7 @@ _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class LotFunctions(Part):
-    """The functions that maps are written in: docs/lot.md, section 6."""
+    """The functions that maps are written in: docs/lot.md, section 7."""
 
     center_c: Celsius = Field(description="z_T = (T - center)/half range")
     half_range_c: Positive = Field(description="of T, C")
@@ -146,3 +147,20 @@ class LotUse(Part):
     prior_sigma_dph: Amount = Field(description="1 sigma by the lot alone, RMS over where units are, deg/h")
     sigma_dph: Amount = Field(description="1 sigma of lot and runs together, the same, deg/h")
     curve: UnitCurve | None = Field(description="for the picture; null: the lot was not used")
+
+
+class KnownMap(Part):
+    """What was known of a unit's map when its table was made, where its own recordings do not say it all."""
+
+    temperature_c: tuple[Celsius, Celsius] = Field(description="envelope, C")
+    slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
+    center_dph: float = Field(description="0 of the coefficients, deg/h")
+    unit_dph: Positive = Field(description="1 of the coefficients, deg/h")
+    functions: LotFunctions = Field(description="what maps are written in: docs/lot.md, section 7")
+    mean: Numbers = Field(description="coefficients of the map")
+    covariance: tuple[Numbers, ...] = Field(description="of the coefficients: lower triangle, row by row")
+    rest: LotProcess = Field(description="the smooth process behind it")
+    asked_temperature_c: Numbers = Field(description="where corrections are asked for, C")
+    asked_slope_c_per_min: Numbers = Field(description="the same, C/min")
+    asked_share: Numbers = Field(description="the same, share of time")
+    between_dph: Amount = Field(description="of the constant from power-on to power-on, 1 sigma, deg/h")

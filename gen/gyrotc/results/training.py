@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from .base import Amount, Axis, Count, Figure, Part, Result
+from .earlier import EarlierUse
 from .evaluation import FoundIn, Pooled
-from .lot import LotUse
+from .lot import KnownMap, LotUse
 
 __all__ = [
     "AllanPoint",
@@ -175,3 +176,10 @@ class Training(Result):
         default=None, description="what the runs say of the map; absent of an extended model"
     )
     lot: LotUse | None = Field(default=None, description="with `--lot`: what the lot did for this unit")
+    prior: EarlierUse | None = Field(
+        default=None, description="with `--prior`: whether the earlier model still holds, and what it did"
+    )
+    known: KnownMap | None = Field(
+        default=None,
+        description="with a lot or an earlier model: what `--prior` of the next recalibration reads",
+    )

@@ -13,8 +13,9 @@ from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
 from .linear import fit_mlr, fit_poly
+from .lot.earlier import EarlierPrior, fit_with_earlier
 from .lot.prior import LotPrior
-from .lot.use import WithLot, fit_with_lot
+from .lot.use import Given, fit_with_lot
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .ols import SIZE_RULES, fit_ols
 from .process import TrainingFailed
@@ -62,6 +63,7 @@ def fit(
     power_on: NDArray[np.int64] | None = None,
     lot: LotPrior | None = None,
     serial: str = "",
+    prior: EarlierPrior | None = None,
 ) -> Fit:  # long: the ways to a map, one after the other
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
 
@@ -78,6 +80,8 @@ def fit(
         lot: What units of the type share; for `AUTO` and "mrbf" without a number of centers. A unit that does not fit
             it is fitted without it, with a finding.
         serial: The unit's, to tell whether the lot has seen it.
+        prior: The unit's earlier model, in the place of a lot; samples are those of a check run. Where it no longer
+            holds they are fitted without it, with a finding.
 
     Raises:
         InputError: Bad samples or arguments.
@@ -90,12 +94,14 @@ def fit(
     findings: list[dict[str, object]] = []
     rows: list[dict[str, object]] = []
     reason = ""
-    given: WithLot | None = None
-    if lot is not None and method in (AUTO, "mrbf") and centers is None:
-        given = fit_with_lot(samples, scaling, lot, serial, seed=seed, average_s=average_s)
-        findings += given.findings
+    like_auto = method in (AUTO, "mrbf") and centers is None
+    given = (
+        _given(samples, scaling, lot, prior, serial, seed=seed, average_s=average_s) if like_auto else None
+    )
+    findings += given.findings if given else []
     if given is not None and given.map is not None:
-        (outcome, scaling), method, reason = given.map, "mrbf", "the unit fits its lot"
+        (outcome, scaling), method = given.map, "mrbf"
+        reason = "the unit fits its lot" if given.lot else "the earlier model still holds"
     elif np.ptp(samples.temperature_c) < LEAST_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
@@ -114,8 +120,27 @@ def fit(
     residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
     floor = floor_dph(samples, residual, average_s)
     return Fit(
-        method, outcome, scaling, findings, floor, average_s, mean, rows, reason, given.use if given else None
-    )
+        method, outcome, scaling, findings, floor, average_s, mean, rows, reason,
+        given.lot if given else None, given.prior if given else None, given.posterior if given else None,
+    )  # fmt: skip
+
+
+def _given(
+    samples: TrainingData,
+    scaling: Scaling,
+    lot: LotPrior | None,
+    prior: EarlierPrior | None,
+    serial: str,
+    *,
+    seed: int,
+    average_s: float,
+) -> Given | None:
+    """What is known beforehand, and the map that it gives with the samples."""
+    if prior is not None:
+        return fit_with_earlier(samples, scaling, prior, seed=seed, average_s=average_s)
+    if lot is not None:
+        return fit_with_lot(samples, scaling, lot, serial, seed=seed, average_s=average_s)
+    return None
 
 
 def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:

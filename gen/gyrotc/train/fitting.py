@@ -40,6 +40,7 @@ from .channels import chosen_channels, seen_by_target, with_channels
 from .data import cleaned, joined, scaling_of
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .left_out import outliers_of, stretches_left_out
+from .lot.earlier import EarlierPrior, known_map
 from .lot.means import unit_means
 from .lot.prior import prior_of
 from .noisefloor import noise_terms, sensitivities, stretches
@@ -78,7 +79,7 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 class FitOptions:
     """Options of `gyrotc fit`; the method `auto` is the ladder of corrections.
 
-    `channels`: recorded channels become inputs where they earn their place.
+    `channels`: recorded channels become inputs where they earn their place. `prior`: the unit's earlier model.
     """
 
     method: str = AUTO
@@ -89,6 +90,7 @@ class FitOptions:
     average_s: float = 100.0
     channels: bool = False
     lot: Lot | None = None
+    prior: EarlierPrior | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,12 +207,16 @@ def fit_dataset(
     fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
     spans = training_spans(stretches, data)
     lot = options.lot if fitted.lot and fitted.lot.accepted else None
-    left_out = _left_out(data, spans, replace(options, method=fitted.method, lot=lot), say) if spans else None
+    prior = options.prior if fitted.prior and fitted.prior.accepted else None
+    again = replace(options, method=fitted.method, lot=lot, prior=prior)
+    left_out = _left_out(data, spans, again, say) if spans else None
     front = replace(front, stuck_s=stuck_after_s(longest_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
     told: dict[str, Any] = {"outliers": outliers_of(left_out_rows, data), "means": _means(data, fitted)}
     told |= {"lot": fitted.lot} if fitted.lot else {}
+    told |= {"prior": fitted.prior} if fitted.prior else {}
+    told |= {"known": known_map(fitted.posterior)} if fitted.posterior else {}
     if choice:
         told["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
@@ -259,6 +265,7 @@ def _fit(
         power_on=power_on,
         lot=prior_of(options.lot) if options.lot else None,
         serial=serial,
+        prior=options.prior,
     )
 
 
@@ -323,6 +330,8 @@ def model_of(  # long: one line for each field of model.json
     warnings = [*dataset.warnings, earth_rate_warning(dataset.earth_rate, mean)]
     if fitted.lot is not None:
         meta["lot"] = f"{fitted.lot.checksum[:16]}: {fitted.lot.text}"
+    if fitted.prior is not None:
+        meta["prior"] = fitted.prior.text
     meta["warnings"] = [warning for warning in warnings if warning]
     known = _uncertainty(data, fitted, front.block_s, added)
     return Model.from_dict(

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..results.earlier import EarlierUse
 from ..results.lot import LotUse
 from .data import Scaling
 from .process import Process
+
+if TYPE_CHECKING:
+    from .lot.prior import MapPosterior
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict"]
 
@@ -55,6 +59,8 @@ class Fit:
         ladder: What was tried and chosen from, where the method was left to the data; as in `training.json`.
         reason: Why this one was chosen, in words.
         lot: What a lot did for it, where one was given.
+        prior: What an earlier model did for it, where one was given.
+        posterior: What it follows, where a lot or an earlier model was used.
     """
 
     method: str
@@ -67,6 +73,8 @@ class Fit:
     ladder: Sequence[Mapping[str, Any]] = ()
     reason: str = ""
     lot: LotUse | None = None
+    prior: EarlierUse | None = None
+    posterior: MapPosterior | None = None
 
     @property
     def networks(self) -> Sequence[Network]:

@@ -38,7 +38,9 @@ class Task:
         """Changes with the contents of the recordings, the options, the limits and the program."""
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
         lot = self.fleet.options.lot
-        plain = asdict(replace(self.fleet.options, lot=None)) | ({"lot": lot.checksum} if lot else {})
+        plain = asdict(replace(self.fleet.options, lot=None, prior=None)) | (
+            {"lot": lot.checksum} if lot else {}
+        )
         options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 

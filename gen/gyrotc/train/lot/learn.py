@@ -12,7 +12,7 @@ from .basis import LotBasis
 from .model import LotState, UnitSums, evidence, fitted, predictive
 from .surprise import FALSE_ALARM, inflation, p_value, scores
 
-__all__ = ["LEAST_UNITS", "Envelope", "Learned", "UnitMeans", "folds_of", "learn", "sums_of"]
+__all__ = ["LEAST_UNITS", "Envelope", "Learned", "UnitMeans", "folds_of", "learn", "sums_of", "that_count"]
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -90,7 +90,7 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
     together = np.zeros(len(units), dtype=np.int64)
     say("smoothness of the maps")
     first = fitted(sums, every, 0, together, _ROUNDS[0])
-    used = _that_count(sums, first)
+    used = that_count(sums, every.variance(first.rest) + every.variance(first.of_mean))
     sums, basis = sums.only(used), every.only(used)
     inside = np.ones(len(units), dtype=bool)
     state = _chosen(sums, basis, say)
@@ -117,9 +117,9 @@ def sums_of(units: Sequence[UnitMeans], basis: LotBasis, center: float, unit: fl
     return UnitSums(np.array(precision), np.array(moment))
 
 
-def _that_count(sums: UnitSums, state: LotState) -> NDArray[np.bool_]:
+def that_count(sums: UnitSums, variance: Floats) -> NDArray[np.bool_]:
+    """Which functions of a process with these variances recordings say anything of."""
     most = np.diagonal(sums.precision, axis1=1, axis2=2).max(axis=0)
-    variance = state.basis.variance(state.rest) + state.basis.variance(state.of_mean)
     used = variance * most > _COUNTS
     used[0] = True
     return np.asarray(used)

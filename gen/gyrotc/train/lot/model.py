@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
+from .surprise import freedom_of
 
 __all__ = ["LotState", "UnitSums", "evidence", "fitted", "predictive"]
 
@@ -76,8 +77,8 @@ class LotState:
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom of the spread: units less what was fitted to them; 2 at least."""
-        return float(max(len(self.cluster) - len(self.means) - self.rank, 2))
+        """Degrees of freedom of the spread."""
+        return freedom_of(len(self.cluster), len(self.means), self.rank)
 
     def spread(self) -> Floats:
         """Covariance of units about the mean of their cluster, shape (n, n)."""

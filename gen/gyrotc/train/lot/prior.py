@@ -13,37 +13,43 @@ from ..process import Asked
 from .basis import PARAMETERS, LotBasis
 from .learn import UnitMeans, sums_of
 from .model import evidence
-from .surprise import p_value, scores
+from .surprise import freedom_of, p_value, scores
 
-__all__ = ["LotPosterior", "LotPrior", "prior_of"]
+__all__ = ["LotPrior", "MapPosterior", "MapPrior", "check_positive", "prior_of", "processed", "triangle"]
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class LotPrior:
-    """What a lot says of a unit that was not seen.
+class MapPrior:
+    """What is known of a unit's map before its runs: a mixture of normal distributions of its coefficients.
 
     Attributes:
-        lot: The file.
         basis: Functions of T and dT/dt.
+        center_dph, unit_dph: Zero and unit of the coefficients, deg/h.
+        temperature_c, slope_c_per_min: Envelope, C and C/min.
         means, covariances: Of the coefficients, one for each cluster.
         share: Of units in each cluster.
-        asked: Where units of the lot were.
-        freedom: Degrees of freedom of its spread.
+        rest: Log parameters of the smooth process of what is a unit's own (`basis.PARAMETERS`).
+        asked: Where corrections are asked for.
+        freedom: Degrees of freedom of the spread.
     """
 
-    lot: Lot
     basis: LotBasis
+    center_dph: float
+    unit_dph: float
+    temperature_c: tuple[float, float]
+    slope_c_per_min: tuple[float, float]
     means: Floats
     covariances: Floats
     share: Floats
+    rest: Floats
     asked: Asked
     freedom: float
 
-    def with_runs(self, unit: UnitMeans) -> LotPosterior:
-        """What lot and recordings of a unit say together, and how far the unit is from the lot."""
-        sums = sums_of([unit], self.basis, self.lot.center_dph, self.lot.unit_dph)
+    def with_runs(self, unit: UnitMeans) -> MapPosterior:
+        """What prior and recordings of a unit say together, and how far the unit is from the prior."""
+        sums = sums_of([unit], self.basis, self.center_dph, self.unit_dph)
         precision, moment = sums.precision[0], sums.moment[0]
         found, likely, p = [], [], []
         for mean, covariance, share in zip(self.means, self.covariances, self.share, strict=True):
@@ -54,26 +60,37 @@ class LotPrior:
         weight = np.exp(np.array(likely) - max(likely))
         weight /= weight.sum()
         mean, covariance = _mixed(found, weight)
-        return LotPosterior(self, mean, covariance, int(np.argmax(weight)), max(p))
+        return MapPosterior(self, mean, covariance, int(np.argmax(weight)), max(p))
 
-    def alone(self) -> LotPosterior:
-        """What the lot says before any run."""
+    def alone(self) -> MapPosterior:
+        """What is known before any run."""
         mean, covariance = _mixed([*zip(self.means, self.covariances, strict=True)], self.share)
-        return LotPosterior(self, mean, covariance, 0, 1.0)
+        return MapPosterior(self, mean, covariance, 0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class LotPosterior:
+class LotPrior(MapPrior):
+    """What a lot says of a unit that was not seen.
+
+    Attributes:
+        lot: The file.
+    """
+
+    lot: Lot
+
+
+@dataclass(frozen=True, slots=True)
+class MapPosterior:
     """A normal distribution of a unit's coefficients.
 
     Attributes:
         prior: Where it comes from.
-        mean, covariance: Shapes (n,) and (n, n), in units of the lot.
+        mean, covariance: Shapes (n,) and (n, n), in units of the prior.
         cluster: Number of the cluster that fits best.
-        p_value: Probability that a unit of the lot lies as far from it as the recordings do.
+        p_value: Probability that a unit that fits the prior lies as far from it as the recordings do.
     """
 
-    prior: LotPrior
+    prior: MapPrior
     mean: Floats
     covariance: Floats
     cluster: int
@@ -81,17 +98,16 @@ class LotPosterior:
 
     def mean_dph(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
         """Mean map, deg/h."""
-        lot = self.prior.lot
         values = self.prior.basis.values(temperature_c, slope_c_per_min)
-        return np.asarray(lot.center_dph + lot.unit_dph * (values @ self.mean))
+        return np.asarray(self.prior.center_dph + self.prior.unit_dph * (values @ self.mean))
 
     def variance_dph2(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
         """Its variance, (deg/h)²."""
         values = self.prior.basis.values(temperature_c, slope_c_per_min)
-        return np.asarray(self.prior.lot.unit_dph**2 * np.sum((values @ self.covariance) * values, axis=1))
+        return np.asarray(self.prior.unit_dph**2 * np.sum((values @ self.covariance) * values, axis=1))
 
     def rms_sigma_dph(self) -> float:
-        """1 sigma, RMS over where units of the lot were, deg/h."""
+        """1 sigma, RMS over where corrections are asked for, deg/h."""
         asked = self.prior.asked
         variance = self.variance_dph2(asked.temperature_c, asked.slope_c_per_min)
         return float(np.sqrt(np.average(variance, weights=asked.share)))
@@ -109,17 +125,17 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     directions = (
         np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
     )
-    rest = np.diag(basis.variance(_log(lot.rest))) + directions.T @ directions
-    freedom = max(sum(c.units for c in lot.clusters) - len(lot.clusters) - len(directions), 3)
+    rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
+    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
     scale = lot.cross_validation.spread_scale * freedom / (freedom - 2.0)  # variance of Student's t
     means, covariances = [], []
     for number, cluster in enumerate(lot.clusters):
         at = f"{where}, clusters, {number}"
-        lower = _triangle(cluster.covariance, len(kept), at)
+        lower = triangle(cluster.covariance, len(kept), at)
         if len(cluster.mean) != len(kept):
             raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{len(kept)}, one a function")
         covariance = scale * (rest + lower + np.tril(lower, -1).T)
-        _check_positive(covariance, at)
+        check_positive(covariance, at)
         means.append(np.array(cluster.mean))
         covariances.append(covariance)
     sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
@@ -127,7 +143,18 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
         raise InputError(f"{where}, clusters", "one without units", "units in each")
     shares = sizes / sizes.sum()
     return LotPrior(
-        lot, basis, np.array(means), np.array(covariances), shares, _asked(lot, where), float(freedom)
+        basis=basis,
+        center_dph=lot.center_dph,
+        unit_dph=lot.unit_dph,
+        temperature_c=lot.temperature_c,
+        slope_c_per_min=lot.slope_c_per_min,
+        means=np.array(means),
+        covariances=np.array(covariances),
+        share=shares,
+        rest=processed(lot.rest),
+        asked=_asked(lot, where),
+        freedom=freedom,
+        lot=lot,
     )
 
 
@@ -138,11 +165,17 @@ def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, 
     return np.asarray(mean), np.asarray(np.sum(spread, axis=0))
 
 
-def _log(process: LotProcess) -> Floats:
+def processed(process: LotProcess) -> Floats:
+    """Log parameters of a process as a file holds it."""
     return np.asarray(np.log([getattr(process, name) for name in PARAMETERS]))
 
 
-def _triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:
+def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:
+    """The lower triangle that a file holds row by row, shape (n, n).
+
+    Raises:
+        InputError: A row has another length.
+    """
     lower = np.zeros((n, n))
     if [len(row) for row in rows] != list(range(1, n + 1)):
         raise InputError(f"{where}, covariance", "rows of other lengths", f"a lower triangle of {n} rows")
@@ -151,7 +184,12 @@ def _triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats
     return lower
 
 
-def _check_positive(covariance: Floats, where: str) -> None:
+def check_positive(covariance: Floats, where: str) -> None:
+    """Refuses what is no covariance.
+
+    Raises:
+        InputError: It is none.
+    """
     try:
         np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError:

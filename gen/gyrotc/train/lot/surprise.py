@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
 
-__all__ = ["FALSE_ALARM", "inflation", "p_value", "scores"]
+__all__ = ["FALSE_ALARM", "freedom_of", "inflation", "p_value", "scores"]
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +19,13 @@ FALSE_ALARM = 0.01  # of the test: docs/lot.md
 _STRANGE = (
     16.0  # a stranger's variance over the lot's, for which the test has most power: four times as far away
 )
+_LEAST_FREEDOM = 3  # below it Student's t has no variance, and a prior must have one
 _TELLING = 1.0  # variance by the lot over variance by noise, from which on a score says how wide the lot is
+
+
+def freedom_of(units: int, clusters: int, directions: int) -> float:
+    """Degrees of freedom of a lot's spread: units less what was fitted to them; 3 at least."""
+    return float(max(units - clusters - directions, _LEAST_FREEDOM))
 
 
 def scores(precision: Floats, moment: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:

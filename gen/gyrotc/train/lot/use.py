@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...results.earlier import EarlierUse
 from ...results.lot import LotUse, UnitCurve
 from ..data import Bins, Scaling, TrainingData, average
 from ..guard import objection
@@ -20,10 +21,10 @@ from ..process import MEAN_S, Process, TrainingFailed, fit_process
 from ..result import Outcome
 from .learn import UnitMeans
 from .means import unit_means
-from .prior import LotPosterior, LotPrior
+from .prior import LotPrior, MapPosterior, MapPrior
 from .surprise import FALSE_ALARM
 
-__all__ = ["WithLot", "fit_with_lot"]
+__all__ = ["Given", "curve_of", "fit_with_lot", "followed", "seen_alone"]
 
 Floats = NDArray[np.float64]
 _CURVE = 41  # points of the picture
@@ -31,25 +32,28 @@ _KEPT_DIGITS = 6  # of its numbers
 
 
 @dataclass(frozen=True, slots=True)
-class WithLot:
-    """What a lot made of a unit.
+class Given:
+    """What a lot, or an earlier model, made of a unit.
 
     Attributes:
-        use: For `training.json`.
-        map: Networks and scaling over the lot's envelope; None: the lot was not used.
+        map: Networks and scaling over both envelopes; None: the prior was not used.
         findings: What a user should know.
+        lot, prior: For `training.json`: what a lot did, or an earlier model.
+        posterior: What the map follows; None: the prior was not used.
     """
 
-    use: LotUse
     map: tuple[Outcome, Scaling] | None
     findings: list[dict[str, Any]]
+    lot: LotUse | None = None
+    prior: EarlierUse | None = None
+    posterior: MapPosterior | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class _PosteriorMap:
     """A posterior in standardised units of a fit; what the compression and the table's sigma ask of a process."""
 
-    posterior: LotPosterior
+    posterior: MapPosterior
     scaling: Scaling
     center: float
     spread: float
@@ -61,12 +65,12 @@ class _PosteriorMap:
     @property
     def log_parameters(self) -> Floats:
         """As of the evidence model: what a unit differs by has the scales of the lot's rest."""
-        p = self.posterior.prior.lot.rest
+        _, short, short_scale, long, long_scale, coupled, scale_t, scale_r = np.exp(self.posterior.prior.rest)
         basis = self.posterior.prior.basis
         of_t = basis.half_range_c / self.scaling.half_range_c
         of_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
-        scales = p.short_scale * of_t, p.long_scale * of_t, p.coupled_scale_t * of_t, p.coupled_scale_r * of_r
-        return np.log([p.short, scales[0], p.long, scales[1], p.coupled, scales[2], scales[3], self.sigma])
+        of_both = coupled, scale_t * of_t, scale_r * of_r
+        return np.log([short, short_scale * of_t, long, long_scale * of_t, *of_both, self.sigma])
 
     def mean(self, t: Floats, r: Floats) -> Floats:
         return (self.posterior.mean_dph(*self._physical(t, r)) - self.center) / self.spread
@@ -81,7 +85,7 @@ class _PosteriorMap:
 
 def fit_with_lot(
     samples: TrainingData, own: Scaling, prior: LotPrior, serial: str, *, seed: int, average_s: float
-) -> WithLot:
+) -> Given:
     """Tests whether a unit fits its lot, and fits it with the lot if it does.
 
     Args:
@@ -92,43 +96,71 @@ def fit_with_lot(
         seed: Of the Kohonen network.
         average_s: Averaging of RMS figures, s.
     """
-    try:
-        alone = fit_process(samples, own)
-    except TrainingFailed:
-        alone = None
-    unit, _ = unit_means(samples, own, alone)
+    alone, unit = seen_alone(samples, own)
     posterior = prior.with_runs(unit)
     if posterior.p_value < FALSE_ALARM:
         use = _use(prior, posterior, serial, accepted=False, scaling=own)
-        return WithLot(use, None, [_stranger(use)])
-    scaling = _over_both(own, prior)
+        return Given(None, [_stranger(use)], lot=use)
+    found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+    if isinstance(found, str):
+        use = _use(prior, posterior, serial, accepted=False, scaling=own)
+        text = f"The lot is not used: a map with it is refused: {found}."
+        return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}], lot=use)
+    use = _use(prior, posterior, serial, accepted=True, scaling=found[1])
+    return Given(found, [], lot=use, posterior=posterior)
+
+
+def followed(
+    samples: TrainingData,
+    own: Scaling,
+    alone: Process | None,
+    unit: UnitMeans,
+    posterior: MapPosterior,
+    *,
+    seed: int,
+    average_s: float,
+) -> tuple[Outcome, Scaling] | str:
+    """The network that follows a posterior over the envelopes of prior and unit, or why it must not be used.
+
+    Args:
+        samples: Cleaned samples of the unit.
+        own: Their scaling.
+        alone: The process of the unit alone, for its outliers.
+        unit: The unit's means.
+        posterior: What prior and means say together.
+        seed, average_s: As for `fit`.
+    """
+    scaling = _over_both(own, posterior.prior)
     process = _process(samples, scaling, alone, unit, posterior)
     try:
         outcome = fit_mrbf(samples, scaling, seed=seed, centers=None, average_s=average_s, process=process)
         against = objection(outcome, samples, scaling, average_s)
     except TrainingFailed as failure:
-        against = str(failure)
-    if against:
-        use = _use(prior, posterior, serial, accepted=False, scaling=own)
-        text = f"The lot is not used: a map with it is refused: {against}."
-        return WithLot(use, None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}])
-    return WithLot(_use(prior, posterior, serial, accepted=True, scaling=scaling), (outcome, scaling), [])
+        return str(failure)
+    return against or (outcome, scaling)
 
 
-def _over_both(own: Scaling, prior: LotPrior) -> Scaling:
-    """Scaling over the envelope of the lot and of the unit's own samples."""
-    lot = prior.lot
-    t0, t1 = min(own.temperature_c[0], lot.temperature_c[0]), max(own.temperature_c[1], lot.temperature_c[1])
-    r0, r1 = (
-        min(own.slope_c_per_min[0], lot.slope_c_per_min[0]),
-        max(own.slope_c_per_min[1], lot.slope_c_per_min[1]),
-    )
+def seen_alone(samples: TrainingData, own: Scaling) -> tuple[Process | None, UnitMeans]:
+    """The process of a unit alone, None where it cannot be solved, and the unit's means."""
+    try:
+        alone = fit_process(samples, own)
+    except TrainingFailed:
+        alone = None
+    return alone, unit_means(samples, own, alone)[0]
+
+
+def _over_both(own: Scaling, prior: MapPrior) -> Scaling:
+    """Scaling over the envelope of the prior and of the unit's own samples."""
+    (a, b), (c, d) = own.temperature_c, prior.temperature_c
+    t0, t1 = min(a, c), max(b, d)
+    (a, b), (c, d) = own.slope_c_per_min, prior.slope_c_per_min
+    r0, r1 = min(a, c), max(b, d)
     half_c, half_r = max(0.5 * (t1 - t0), own.half_range_c), max(-r0, r1, own.half_range_c_per_min)
     return Scaling(0.5 * (t0 + t1), half_c, half_r, (t0, t1), (r0, r1))
 
 
 def _process(
-    samples: TrainingData, scaling: Scaling, alone: Process | None, unit: UnitMeans, posterior: LotPosterior
+    samples: TrainingData, scaling: Scaling, alone: Process | None, unit: UnitMeans, posterior: MapPosterior
 ) -> Process:
     """The posterior in the form of a process that has seen the unit's means, asked where the lot's units were."""
     means = average(samples, MEAN_S)
@@ -163,7 +195,7 @@ def _process(
 
 
 def _use(
-    prior: LotPrior, posterior: LotPosterior, serial: str, *, accepted: bool, scaling: Scaling
+    prior: LotPrior, posterior: MapPosterior, serial: str, *, accepted: bool, scaling: Scaling
 ) -> LotUse:
     lot, alone = prior.lot, prior.alone()
     before, after = alone.rms_sigma_dph(), posterior.rms_sigma_dph()
@@ -180,7 +212,7 @@ def _use(
         own_share=share if accepted else None,
         prior_sigma_dph=before,
         sigma_dph=after,
-        curve=_curve(alone, posterior, scaling) if accepted else None,
+        curve=curve_of(alone, posterior, scaling) if accepted else None,
     )
     return use.model_copy(update={"text": _text(use, len(lot.clusters))})
 
@@ -198,7 +230,8 @@ def _text(use: LotUse, clusters: int) -> str:
     )
 
 
-def _curve(alone: LotPosterior, posterior: LotPosterior, scaling: Scaling) -> UnitCurve:
+def curve_of(alone: MapPosterior, posterior: MapPosterior, scaling: Scaling) -> UnitCurve:
+    """Prior and posterior where temperature stands still, for the picture."""
     t = np.linspace(*scaling.temperature_c, _CURVE)
     still = np.zeros(_CURVE)
 

@@ -1,0 +1,133 @@
+"""`--prior DIR`: from the folder of an earlier calibration to the prior of a unit's recalibration."""
+
+from __future__ import annotations
+
+import math
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from ..dataset import Dataset
+from ..errors import InputError
+from ..judge.changes import Earlier, load_earlier, started_on
+from ..judge.limits import Limits
+from ..judge.stated import DAYS_A_YEAR, yearly_drifts
+from ..model import Model
+from ..results.base import read_result
+from ..results.training import MapMeans, Training
+from ..train.fitting import FitOptions
+from ..train.lot import UnitMeans
+from ..train.lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, widened
+from ..train.lot.prior import MapPosterior
+
+__all__ = ["between_of", "means_of", "posterior_in", "prior_from", "refuse_together"]
+
+
+def prior_from(
+    folder: Path, dataset: Dataset, *, ageing_dph: float | None = None, limits: Limits | None = None
+) -> EarlierPrior:
+    """What an earlier result says of a unit today.
+
+    Args:
+        folder: What `gyrotc build` wrote of the same gyro.
+        dataset: The recordings of the check run.
+        ageing_dph: How far the bias may have moved since, 1 sigma; None: by the limits file's drift of the type or by
+            the unit's earlier calibrations, and the dates; else 0.
+        limits: Limits of the product.
+
+    Raises:
+        InputError: It is of another gyro, cannot be read, or is made from the same recordings.
+    """
+    earlier = load_earlier(folder, dataset.serial, dataset.axis, "--prior")
+    seen = {d.sha256 for d in earlier.model.data}
+    for run in dataset.runs:
+        if run.role == "train" and run.sha256 in seen:
+            raise InputError(run.file, f"the model in {folder} was made from it", "recordings of its own")
+    posterior = posterior_in(earlier.folder, earlier.model)
+    aged, told = _ageing(earlier, dataset, ageing_dph, limits)
+    return widened(posterior, aged, told, earlier.model.hash, earlier.date)
+
+
+def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float | None) -> None:
+    """Refuses options that say different things.
+
+    Raises:
+        InputError: They do.
+    """
+    if prior is not None and options.lot is not None:
+        found = "with --prior: what the lot knew of the unit is in its earlier model already"
+        raise InputError("--lot", found, "one of the two")
+    if prior is None and ageing_dph is not None:
+        raise InputError("--ageing", "without --prior", "an earlier model that may have aged")
+
+
+def posterior_in(folder: Path, model: Model) -> MapPosterior:
+    """What is known of a unit's map by its result.
+
+    Raises:
+        InputError: Its `training.json` does not say enough.
+    """
+    where = folder / "training.json"
+    training = read_result(where, Training)
+    if training.known is not None:
+        return posterior_of_known(training.known, str(where))
+    means = means_of(training.means, where)
+    envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    return posterior_of_means(means, envelope, between_of(model))
+
+
+def means_of(means: MapMeans | None, where: Path) -> UnitMeans:
+    """Means of a unit as arrays.
+
+    Args:
+        where: The `training.json` that they are of.
+
+    Raises:
+        InputError: There are none, or they do not go together.
+    """
+    if means is None:
+        raise InputError(
+            str(where),
+            "has no means (an extended model, or an earlier gyrotc)",
+            "a unit as gyrotc fleet or build makes it: give that command again",
+        )
+    arrays = [np.array(x) for x in (means.temperature_c, means.slope_c_per_min, means.bias_dph, means.count)]
+    if len({len(x) for x in arrays}) != 1 or len(arrays[0]) == 0 or arrays[3].min() <= 0.0:
+        raise InputError(f"{where}, field means", "lists that do not go together", "one of each a mean")
+    return UnitMeans(arrays[0], arrays[1], arrays[2], arrays[3], means.sigma_dph)
+
+
+def between_of(model: Model) -> float:
+    """Standard deviation of a unit's constant from power-on to power-on, deg/h."""
+    known = model.uncertainty_dph
+    return float(known.rules.between_dph) if known is not None and known.rules is not None else 0.0
+
+
+def _ageing(
+    earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None
+) -> tuple[float, str]:
+    """How far the bias may have moved, 1 sigma, deg/h, and where that comes from."""
+    if stated is not None:
+        if not (math.isfinite(stated) and stated >= 0.0):
+            raise InputError("--ageing", f"{stated:g}", "deg/h, 0 or more")
+        return stated, "as stated"
+    years = _years(earlier.date, started_on(dataset))
+    if years is None:
+        return 0.0, "none: one of the calibrations has no date, and no --ageing is stated"
+    drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
+    if drift is not None:
+        return drift * years / math.sqrt(3.0), "the type's largest drift, by the limits file"
+    drifts = yearly_drifts(earlier.history)
+    if not drifts:
+        return 0.0, "none: neither --ageing, nor a drift of the type, nor earlier calibrations"
+    drift = math.sqrt(math.fsum(d**2 for d in drifts) / len(drifts))
+    return drift * years, f"by {len(drifts) + 1} earlier calibrations"
+
+
+def _years(before: str | None, after: str | None) -> float | None:
+    try:
+        days = (date.fromisoformat(str(after)[:10]) - date.fromisoformat(str(before)[:10])).days
+    except ValueError:
+        return None
+    return max(days, 0) / DAYS_A_YEAR

@@ -1,0 +1,236 @@
+"""A unit's earlier model as a prior: a check run confirms it, or says where it no longer holds."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.commands import app
+from gyrotc.errors import InputError
+from gyrotc.results.training import Training
+from gyrotc.train import TrainingData, fit, predict
+from gyrotc.train.data import cleaned, scaling_of
+from gyrotc.train.lot import UnitMeans
+from gyrotc.train.lot.earlier import (
+    EarlierPrior,
+    known_map,
+    posterior_of_known,
+    posterior_of_means,
+    widened,
+)
+from gyrotc.train.lot.held import Held, held
+from gyrotc.train.lot.means import unit_means
+from numpy.typing import NDArray
+from recordings import write_csv
+from scipy.stats import kstest
+from typer.testing import CliRunner
+
+Floats = NDArray[np.float64]
+Change = Callable[[Floats, Floats], Floats]
+
+NOISE = 7e-4  # deg/h of a mean of 50 s
+STEP_S = 50.0
+ENVELOPE = ((-20.0, 50.0), (-2.4, 2.4))
+CALIBRATION = ((20.0, 50.0, -20.0, 20.0), (-20.0, 40.0, 0.0, 50.0), (50.0, -10.0, 30.0, -20.0))
+CHECK = ((0.0, 50.0, -20.0, 10.0),)
+CHANGES: dict[str, Change] = {
+    "offset": lambda t, r: np.full(len(t), 6e-4),
+    "slope": lambda t, r: 1.2e-3 * (t - 15.0) / 70.0,
+    "rate": lambda t, r: 6e-4 * r / 2.4,
+    "local": lambda t, r: 3e-3 * np.exp(-0.5 * ((t - 35.0) / 5.0) ** 2),
+}
+
+
+def bias(t: Floats, r: Floats) -> Floats:
+    return 7e-3 + 1e-3 * np.tanh((t - 15.0) / 25.0) - 4e-4 * np.sin(t / 12.0) + 2e-4 * r
+
+
+def recorded(
+    rng: np.random.Generator, programmes: tuple[tuple[float, ...], ...], change: Change | None = None
+) -> TrainingData:
+    """Ramps at 2 C/min between corners of T, with 40 min at each; samples of 50 s."""
+    parts = []
+    for corners in programmes:
+        steps = [np.full(48, corners[0])]
+        for low, high in pairwise(corners):
+            steps += [np.linspace(low, high, round(abs(high - low) / 2.0 * 60.0 / STEP_S)), np.full(48, high)]
+        parts.append(np.concatenate(steps))
+    t = np.concatenate(parts)
+    run = np.concatenate([np.full(len(p), k, dtype=np.int64) for k, p in enumerate(parts)])
+    r = np.concatenate([np.clip(np.gradient(p) * 60.0 / STEP_S, -2.4, 2.4) for p in parts])
+    n = len(t)
+    measured = bias(t, r) + (change(t, r) if change else 0.0) + NOISE * rng.normal(size=n)
+    time_s = np.concatenate([STEP_S * np.arange(len(p)) for p in parts])
+    return TrainingData(t, r, measured, np.full(n, 5.0), run, time_s, np.full(n, STEP_S))
+
+
+def means(data: TrainingData) -> UnitMeans:
+    samples = cleaned(data)
+    return unit_means(samples, scaling_of(samples), None)[0]
+
+
+def earlier(rng: np.random.Generator, ageing_dph: float = 0.0) -> EarlierPrior:
+    known = posterior_of_means(means(recorded(rng, CALIBRATION)), ENVELOPE, 0.0)
+    return widened(known, ageing_dph, "as stated", "a" * 64, "2026-01-01")
+
+
+@cache
+def one() -> EarlierPrior:
+    return earlier(np.random.default_rng(1))
+
+
+def checked(rng: np.random.Generator, prior: EarlierPrior, change: Change | None = None) -> Held:
+    return held(prior.alone(), means(recorded(rng, CHECK, change)))
+
+
+def test_units_as_the_model_says_have_uniform_p_values() -> None:
+    """Maps drawn from the earlier posterior itself: the share of false alarms is what is stated."""
+    prior, rng = one(), np.random.default_rng(2)
+    run = means(recorded(rng, CHECK))
+    values = prior.basis.values(run.temperature_c, run.slope_c_per_min)
+    factor = np.linalg.cholesky(prior.covariances[0])
+    found = []
+    for _ in range(50):
+        w = prior.means[0] + factor @ rng.normal(size=len(factor))
+        noise = run.sigma_dph * rng.normal(size=len(run.count)) / np.sqrt(run.count)
+        drawn = prior.center_dph + prior.unit_dph * (values @ w) + noise
+        found.append(held(prior.alone(), replace(run, bias_dph=drawn)).p_value)
+    assert kstest(found, "uniform").pvalue > 1e-3
+
+
+def test_unchanged_units_are_confirmed() -> None:
+    """Calibrations and check runs of one map: false alarms at about the stated 1 %."""
+    seed = secrets.randbits(30)
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    priors = [earlier(rng) for _ in range(4)]
+    found = [checked(rng, prior) for prior in priors for _ in range(5)]
+    assert sum(one.change is not None for one in found) <= 4  # of 20: beyond it once in a million times
+    assert all(one.cells for one in found)
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_planted_change_is_named_with_its_region(kind: str) -> None:
+    seed = secrets.randbits(30)
+    print("seed", seed)
+    found = checked(np.random.default_rng(seed), one(), CHANGES[kind])
+    assert found.p_value < 0.01 and found.change is not None
+    change = found.change
+    assert change.kind == kind, change.text
+    assert any(not cell.within for cell in found.cells) or kind == "rate"
+    if kind == "local":
+        assert change.temperature_c[0] < 35.0 < change.temperature_c[1]
+        assert change.temperature_c[1] - change.temperature_c[0] <= 40.0
+        outside = [cell for cell in found.cells if not cell.within]
+        assert all(cell.temperature_c[0] < 50.0 and cell.temperature_c[1] > 20.0 for cell in outside)
+    if kind == "offset":
+        assert abs(change.size_dph - 6e-4) < 5.0 * change.standard_uncertainty_dph
+
+
+def test_ageing_that_is_stated_is_no_finding() -> None:
+    seed = secrets.randbits(30)
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    known = posterior_of_means(means(recorded(rng, CALIBRATION)), ENVELOPE, 0.0)
+    aged = widened(known, 6e-4, "as stated", "a" * 64, None)
+    assert checked(rng, aged, CHANGES["offset"]).change is None
+    assert checked(rng, aged, CHANGES["local"]).change is not None
+    assert aged.alone().rms_sigma_dph() == pytest.approx(6e-4, rel=0.4)
+
+
+def test_a_confirmed_model_and_its_check_run_are_one_table() -> None:
+    rng = np.random.default_rng(7)
+    prior = earlier(rng, 1e-4)
+    data = recorded(rng, CHECK)
+    both, alone = fit(data, method="auto", prior=prior), fit(data, method="mrbf")
+    assert both.prior is not None and both.prior.confirmed and both.prior.accepted
+    assert both.prior.sigma_dph < both.prior.prior_sigma_dph
+    t, r = (x.ravel() for x in np.meshgrid(np.linspace(-19, 49, 30), np.linspace(-2.0, 2.0, 9)))
+    left = [np.sqrt(np.mean((predict(f, t, r) - bias(t, r)) ** 2)) for f in (both, alone)]
+    assert left[0] < left[1]
+    changed = fit(recorded(rng, CHECK, CHANGES["local"]), method="auto", prior=prior)
+    assert changed.prior is not None and not changed.prior.accepted and changed.posterior is None
+    assert "prior_does_not_hold" in [f["id"] for f in changed.findings]
+
+
+def test_what_is_known_of_a_map_is_read_back() -> None:
+    known = posterior_of_means(means(recorded(np.random.default_rng(8), CALIBRATION)), ENVELOPE, 2e-5)
+    stored = known_map(known)
+    again = posterior_of_known(stored, "training.json")
+    t = np.linspace(-20.0, 50.0, 20)
+    assert again.mean_dph(t, 0.0 * t) == pytest.approx(known.mean_dph(t, 0.0 * t), abs=1e-9)
+    assert again.variance_dph2(t, 0.0 * t) == pytest.approx(known.variance_dph2(t, 0.0 * t), rel=1e-3)
+    for field in ("mean", "asked_share"):
+        with pytest.raises(InputError, match=rf"training\.json, known, {field}"):
+            posterior_of_known(stored.model_copy(update={field: getattr(stored, field)[1:]}), "training.json")
+
+
+def run(*arguments: str | Path) -> str:
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    if isinstance(done.exception, Exception):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def dataset(folder: Path, seed: int, day: str, *, check: bool, change: Change | None = None) -> Path:
+    data = recorded(np.random.default_rng(seed), CHECK if check else CALIBRATION, change)
+    text = 'schema = 1\nserial = "RLG-0007"\nearth_rate = "removed"\n'
+    for k in range(int(data.run.max()) + 1):
+        mine = data.select(data.run == k)
+        columns = {
+            "time_s": mine.time_s,
+            "temperature_c": mine.temperature_c,
+            "rate_dph": mine.bias_dph,
+        }
+        write_csv(folder / f"run-{k}.csv", columns)
+        text += f'[[run]]\nfile = "run-{k}.csv"\nstarted = {day}T00:00:00Z\nenvironment = "e{k}"\n'
+    (folder / "dataset.toml").write_text(text, "utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("recalibration")
+    block = ("--block-s", "50")
+    run("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old", *block)
+    dataset(place / "check", 12, "2026-01-01", check=True)
+    told = run("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
+    assert "earlier model: the model " in told and "is confirmed" in told
+    return place
+
+
+def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path: Path) -> None:
+    training = Training.model_validate_json((world / "new" / "training.json").read_text())
+    assert training.prior is not None and training.prior.date == "2025-01-01"
+    assert "is confirmed" in json.loads((world / "new" / "model.json").read_text())["meta"]["prior"]
+    bumped = dataset(tmp_path / "bumped", 13, "2026-06-01", check=True, change=CHANGES["local"])
+    block = ("--block-s", "50")
+    told = run("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
+    assert "no longer holds" in told and "finding prior_does_not_hold" in told
+    told = run(
+        "fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged", *block
+    )
+    assert "ageing of 0.005 deg/h" in told
+
+
+def test_what_cannot_be_a_prior_is_told(world: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="was made from it"):
+        run("fit", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
+    with pytest.raises(InputError, match="--ageing"):
+        run("fit", world / "check", "--ageing", "1e-4", "--out", tmp_path / "a")
+    with pytest.raises(InputError, match=r"--prior .* has no model\.json"):
+        run("fit", world / "check", "--prior", world, "--out", tmp_path / "a")
+    other = dataset(tmp_path / "other", 14, "2026-01-01", check=True)
+    text = (other / "dataset.toml").read_text().replace("RLG-0007", "RLG-0008")
+    (other / "dataset.toml").write_text(text)
+    with pytest.raises(InputError, match="RLG-0008"):
+        run("fit", other, "--prior", world / "old", "--out", tmp_path / "a")
+    assert not (tmp_path / "a").exists()
