@@ -30,6 +30,7 @@ from gyrotc.results.lot_plan import LotPlan
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.map import MapOnGrid
 from gyrotc.results.marker import Marker
+from gyrotc.results.next_run import NextRun
 from gyrotc.results.planned import Plan
 from gyrotc.results.training import Training
 from gyrotc.results.truth import SimulatedTruth
@@ -58,6 +59,7 @@ RESULTS: dict[str, type[Part]] = {
     "lot-plan": LotPlan,
     "manifest": Manifest,
     "map": MapOnGrid,
+    "next-run": NextRun,
     "plan": Plan,
     "result": Marker,
     "training": Training,
@@ -67,7 +69,11 @@ RESULTS: dict[str, type[Part]] = {
 }
 """Results whose tables stand in docs/FORMAT.md."""
 
-TOLD_ABOVE: dict[str, tuple[type[Part], ...]] = {"entry": (FleetSummary,), "verify-axes": (Verification,)}
+TOLD_ABOVE: dict[str, tuple[type[Part], ...]] = {
+    "next-run": (LotPlan,),
+    "entry": (FleetSummary,),
+    "verify-axes": (Verification,),
+}
 """Results whose objects are those of a result above them."""
 
 KINDS: dict[str, type[BaseModel]] = {**RESULTS, "model": Model}

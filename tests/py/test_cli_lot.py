@@ -13,6 +13,7 @@ from gyrotc.model import load_model
 from gyrotc.outputs import json_text
 from gyrotc.plan.with_lot import plan_with_lot
 from gyrotc.results.lot_plan import LotPlan
+from gyrotc.results.next_run import NextRun
 from gyrotc.train.lot import prior_of
 from typer.testing import CliRunner
 
@@ -123,6 +124,25 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
     assert steeper.with_lot.hours > found.with_lot.hours
     with pytest.raises(InputError, match="--require"):
         run("plan", "paper", "--lot", world / "lot.json", "--require", "hysteresis=1e-4")
+
+
+def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Path) -> None:
+    unit, scenario = world / "fleet" / "LOT-0005-001", world / "whole.toml"
+    price = ("--hours", "0.5", "--price-per-hour", "90", "--price-per-run", "150")
+    told = run("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
+    found = NextRun.model_validate_json((tmp_path / "next" / "plan.json").read_text())
+    assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in told
+    assert all(p.programme.hours <= 0.5 and 0.0 <= p.removed_share < 1.0 for p in found.proposals)
+    assert (tmp_path / "next" / "programme.csv").read_text().startswith("time_min,set_point_c")
+    run(
+        "plan", scenario, "--unit", unit, "--lot", world / "lot.json", *price, "--json", tmp_path / "lot.json"
+    )
+    with_lot = NextRun.model_validate_json((tmp_path / "lot.json").read_text())
+    assert with_lot.before_dph != found.before_dph
+    with pytest.raises(InputError, match="--unit"):
+        run("plan", scenario, "--unit", world, *price)
+    with pytest.raises(InputError, match="--require"):
+        run("plan", scenario, "--unit", unit, "--require", "accuracy=1e-4")
 
 
 def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:

@@ -43,7 +43,6 @@ from .results import (
     ladder_lines,
     limit_lines,
     lot_lines,
-    prior_lines,
     span_lines,
     summary,
     verify_table,
@@ -140,7 +139,6 @@ def _print_built(result: Built) -> None:
         *ladder_lines(result.training),
         *channel_lines(result.training),
         *lot_lines(result.training),
-        *prior_lines(result.training),
     ):
         tell(line)
     for name, reason in result.refused.items():

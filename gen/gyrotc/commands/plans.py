@@ -40,6 +40,22 @@ def plan(
         bool, typer.Option("--add-thermometer", help="Where a further thermometer would tell most.")
     ] = False,
     lot: LotOption = None,
+    unit: Annotated[
+        Path | None,
+        typer.Option(
+            "--unit", help="A result of a unit: which run to record next, by what it is known to lack."
+        ),
+    ] = None,
+    hours: Annotated[
+        float, typer.Option("--hours", help="With --unit: no run is proposed that is longer, h.")
+    ] = 8.0,
+    price_per_hour: Annotated[
+        float, typer.Option("--price-per-hour", help="With --unit: of the chamber, in any currency.")
+    ] = 1.0,
+    price_per_run: Annotated[
+        float,
+        typer.Option("--price-per-run", help="With --unit: of mounting and settling once, in the same."),
+    ] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -47,7 +63,13 @@ def plan(
 
     Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
     Example: gyrotc plan paper --lot lot.json --require accuracy=2e-4 --out programme
+    Example: gyrotc plan paper --unit build/RLG-0042 --price-per-hour 90 --price-per-run 150
     """
+    if unit is not None:
+        if require:
+            raise InputError("--require", ", ".join(require), "with --unit: a price; it proposes one run")
+        _next_run(profile, unit, lot, (price_per_hour, price_per_run, hours), out, json_file)
+        return
     if lot is not None:
         _plan_with_lot(profile, lot, require or (), out, json_file)
         return
@@ -74,6 +96,41 @@ def plan(
             show(part)
     if out is not None:
         tell(f"report: {out / 'report.html'}")
+
+
+def _next_run(
+    scenario: str,
+    unit: Path,
+    lot: Path | None,
+    price: tuple[float, float, float],
+    out: Path | None,
+    json_file: Path | None,
+) -> None:
+    """`gyrotc plan --unit`: the run that tells most of a unit for its price, as a file and in words."""
+    from ..jobs.lot import load_lot
+    from ..jobs.recalibration import unit_in
+    from ..plan.next_run import Price, next_run
+    from ..plan.with_lot import programme_csv, programme_text
+
+    with result_folder(out, "plan") if out else nullcontext() as stage:
+        model, known, means = unit_in(unit, load_lot(lot) if lot else None)
+        result = next_run(model, known, means.sigma_dph, means.mean_s, scenario, Price(*price))
+        best = result.proposals[result.best].programme
+        if stage:
+            write_atomically(stage.folder / "plan.json", json_text(result.content()))
+            write_atomically(stage.folder / "programme.csv", programme_csv(best))
+            write_atomically(stage.folder / "programme.txt", programme_text(best))
+    write_json(json_file, result.content())
+    tell(f"{result.serial} as it is known now: {result.before_dph:.3g} deg/h (1 sigma over the envelope)")
+    for k, one in enumerate(result.proposals):
+        tell(
+            f"{one.programme.hours:.1f} h, price {one.price:.4g}: {one.programme.sigma_dph:.3g} deg/h, "
+            f"{one.removed_share:.0%} of the variance removed{', most for its price' if k == result.best else ''}"
+        )
+    for line in programme_text(best).splitlines():
+        tell(line)
+    if out is not None:
+        tell(f"{out / 'programme.csv'}: set points over time")
 
 
 def _plan_with_lot(

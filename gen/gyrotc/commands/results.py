@@ -52,13 +52,9 @@ def span_lines(training: Training) -> Iterator[str]:
 
 
 def lot_lines(training: Training) -> Iterator[str]:
-    """What came from the lot and what from the unit's own runs."""
+    """What came from the lot or an earlier model, and what from the unit's own runs."""
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
-
-
-def prior_lines(training: Training) -> Iterator[str]:
-    """Whether the earlier model still holds, and where not."""
     if training.prior is not None:
         yield f"earlier model: {training.prior.text}"
         for cell in training.prior.cells:

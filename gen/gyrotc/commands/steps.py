@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -46,7 +45,6 @@ from .results import (
     ladder_lines,
     lot_lines,
     prediction_line,
-    prior_lines,
     span_lines,
     verify_notes,
     verify_table,
@@ -80,20 +78,18 @@ def fit(
     """
     from ..dataset import load
     from ..jobs.lot import load_lot
-    from ..jobs.recalibration import prior_from, refuse_together
+    from ..jobs.recalibration import with_prior
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
     options = FitOptions(
         method, seed, centers, rho, block_s, average_s, channels, load_lot(lot) if lot else None
     )
-    refuse_together(options, prior, ageing)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
-        if prior is not None:
-            options = replace(options, prior=prior_from(prior, recordings, ageing_dph=ageing))
+        options = with_prior(options, recordings, prior, ageing)
         fitted = fit_dataset(recordings, options, progress=say)
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
@@ -103,7 +99,6 @@ def fit(
         *ladder_lines(fitted.training),
         *channel_lines(fitted.training),
         *lot_lines(fitted.training),
-        *prior_lines(fitted.training),
     ):
         tell(line)
     for finding in fitted.training.findings:

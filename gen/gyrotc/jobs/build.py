@@ -32,7 +32,7 @@ from ..results.verification import Verification
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify import verify
 from .axes import join_axes
-from .recalibration import prior_from, refuse_together
+from .recalibration import refuse_together, with_prior
 
 __all__ = ["Built", "build", "build_into"]
 
@@ -175,9 +175,7 @@ def build_into(
 def _build_axis(
     dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress
 ) -> Built:  # long: the stages in their order
-    if order.prior:
-        told = prior_from(order.prior, dataset, ageing_dph=order.ageing_dph, limits=order.limits)
-        options = replace(options, prior=told)
+    options = with_prior(options, dataset, order.prior, order.ageing_dph, order.limits)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)

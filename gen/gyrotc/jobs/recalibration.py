@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -13,15 +14,17 @@ from ..errors import InputError
 from ..judge.changes import Earlier, load_earlier, started_on
 from ..judge.limits import Limits
 from ..judge.stated import DAYS_A_YEAR, yearly_drifts
-from ..model import Model
+from ..model import Model, load_model
 from ..results.base import read_result
+from ..results.lot import Lot
 from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
-from ..train.lot import UnitMeans
+from ..train.lot import UnitMeans, prior_of
 from ..train.lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, widened
 from ..train.lot.prior import MapPosterior
+from ..train.lot.surprise import FALSE_ALARM
 
-__all__ = ["between_of", "means_of", "posterior_in", "prior_from", "refuse_together"]
+__all__ = ["between_of", "means_of", "posterior_in", "prior_from", "refuse_together", "unit_in", "with_prior"]
 
 
 def prior_from(
@@ -62,6 +65,24 @@ def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float |
         raise InputError("--ageing", "without --prior", "an earlier model that may have aged")
 
 
+def with_prior(
+    options: FitOptions,
+    dataset: Dataset,
+    folder: Path | None,
+    ageing_dph: float | None,
+    limits: Limits | None = None,
+) -> FitOptions:
+    """Options of a fit with what an earlier result says; as they are where none is named.
+
+    Raises:
+        InputError: As `refuse_together` and `prior_from`.
+    """
+    refuse_together(options, folder, ageing_dph)
+    if folder is None:
+        return options
+    return replace(options, prior=prior_from(folder, dataset, ageing_dph=ageing_dph, limits=limits))
+
+
 def posterior_in(folder: Path, model: Model) -> MapPosterior:
     """What is known of a unit's map by its result.
 
@@ -75,6 +96,34 @@ def posterior_in(folder: Path, model: Model) -> MapPosterior:
     means = means_of(training.means, where)
     envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
     return posterior_of_means(means, envelope, between_of(model))
+
+
+def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, MapMeans]:
+    """A unit's model, what is known of its map, and the means of its own runs.
+
+    Args:
+        folder: Its result.
+        lot: What units of its type share, for one that was calibrated without; else its result says all.
+
+    Raises:
+        InputError: The result does not say enough, or the unit does not fit the lot.
+    """
+    if not (folder / "model.json").is_file():
+        raise InputError(f"--unit {folder}", "has no model.json", "a folder that gyrotc build or fit wrote")
+    model, where = load_model(folder / "model.json"), folder / "training.json"
+    training = read_result(where, Training)
+    means = means_of(training.means, where)
+    assert training.means is not None
+    if lot is None or training.known is not None:
+        return model, posterior_in(folder, model), training.means
+    if lot.axis != model.axis:
+        raise InputError("--lot", f"of axis {lot.axis}", f"a lot of axis {model.axis}, as the unit")
+    known = prior_of(lot).with_runs(means)
+    if known.p_value < FALSE_ALARM:
+        raise InputError(
+            "--lot", f"the unit does not fit it (p = {known.p_value:.2g})", "its own lot, or none"
+        )
+    return model, known, training.means
 
 
 def means_of(means: MapMeans | None, where: Path) -> UnitMeans:

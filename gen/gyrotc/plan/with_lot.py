@@ -25,20 +25,23 @@ from ..simulate.scenario import Scenario, read
 from ..train.lot import LotPrior, prior_of
 from ..train.lot.basis import CONSTANT, PRIOR_LOG, LotBasis
 
-__all__ = ["plan_with_lot", "programme_csv", "programme_text"]
+__all__ = [
+    "AVERAGE_S", "HOLDS", "RATES", "MapQuestion", "extremes_of", "hours_of", "inputs_of", "plan_with_lot", "programme_csv",
+    "programme_text",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end
-_AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
+AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
 _MOST_H = 24.0  # what a laboratory calls a day
-_RATES = (1.0, 3.0, 5.0)  # C/min, the paper's
-_HOLDS = (0.0, 20.0, 60.0)  # min: pass through, settle (the slowest mode has 23 min), rest
+RATES = (1.0, 3.0, 5.0)  # C/min, the paper's
+HOLDS = (0.0, 20.0, 60.0)  # min: pass through, settle (the slowest mode has 23 min), rest
 
 
 @dataclass(frozen=True)
-class _Question:
+class MapQuestion:
     """What a programme is judged by: covariance before it, functions, noise of a mean, and where corrections count."""
 
     basis: LotBasis
@@ -74,8 +77,8 @@ def plan_with_lot(lot: Lot, scenario: str | Path, accuracy_dph: float) -> LotPla
         raise InputError("--require accuracy", f"{accuracy_dph:g}", "deg/h above 0")
     name, plan = read(scenario)
     prior = prior_of(lot)
-    floor = lot.noise_dph * float(np.sqrt(lot.mean_s / _AVERAGE_S))
-    ends = _extremes(plan)
+    floor = lot.noise_dph * float(np.sqrt(lot.mean_s / AVERAGE_S))
+    ends = extremes_of(plan)
     return LotPlan(
         gyrotc_version=__version__,
         lot=lot.checksum,
@@ -87,17 +90,17 @@ def plan_with_lot(lot: Lot, scenario: str | Path, accuracy_dph: float) -> LotPla
     )
 
 
-def _with(prior: LotPrior) -> _Question:
+def _with(prior: LotPrior) -> MapQuestion:
     lot, asked = prior.lot, prior.asked
     largest = int(np.argmax(prior.share))
     values = prior.basis.values(asked.temperature_c, asked.slope_c_per_min)
     sigma = lot.noise_dph / lot.unit_dph
-    return _Question(
+    return MapQuestion(
         prior.basis, prior.covariances[largest], sigma, lot.mean_s, values, asked.share, lot.unit_dph
     )
 
 
-def _without(prior: LotPrior) -> _Question:
+def _without(prior: LotPrior) -> MapQuestion:
     """The process that a unit alone is fitted by, before it has seen anything."""
     lot, asked = prior.lot, prior.asked
     basis = LotBasis.over(lot.temperature_c, lot.slope_c_per_min)
@@ -105,13 +108,13 @@ def _without(prior: LotPrior) -> _Question:
     wide[0] = CONSTANT
     values = basis.values(asked.temperature_c, asked.slope_c_per_min)
     sigma = lot.noise_dph / lot.unit_dph
-    return _Question(
+    return MapQuestion(
         basis, np.diag(basis.variance(wide)), sigma, lot.mean_s, values, asked.share, lot.unit_dph
     )
 
 
 def _searched(
-    plan: Scenario, ends: tuple[float, float], question: _Question, accuracy_dph: float, floor: float
+    plan: Scenario, ends: tuple[float, float], question: MapQuestion, accuracy_dph: float, floor: float
 ) -> LotProgramme:
     start = 0.5 * (ends[0] + ends[1])
     steps: list[ChamberStep] = []
@@ -120,12 +123,12 @@ def _searched(
         tried = [
             [*steps, ChamberStep(to_c=to, c_per_min=rate, hold_min=hold)]
             for to in (*ends, start)
-            for rate in _RATES
-            for hold in _HOLDS
+            for rate in RATES
+            for hold in HOLDS
             if (steps and to != steps[-1].to_c) or (not steps and (to != start or hold))
         ]
         found = [
-            (_hours(start, one), question.sigma_dph(*_inputs(plan, start, one, question.mean_s)))
+            (hours_of(start, one), question.sigma_dph(*inputs_of(plan, start, one, question.mean_s)))
             for one in tried
         ]
         best = max(
@@ -150,7 +153,8 @@ def _gain(before: float, after: float, required: float) -> float:
     return float(np.log(start / max(after, required)))
 
 
-def _hours(start_c: float, steps: Sequence[ChamberStep]) -> float:
+def hours_of(start_c: float, steps: Sequence[ChamberStep]) -> float:
+    """Length of a programme, h."""
     return _corners(start_c, steps)[0][-1] / 60.0
 
 
@@ -166,7 +170,7 @@ def _corners(start_c: float, steps: Sequence[ChamberStep]) -> tuple[list[float],
     return minutes, degrees
 
 
-def _inputs(
+def inputs_of(
     plan: Scenario, start_c: float, steps: Sequence[ChamberStep], mean_s: float
 ) -> tuple[Floats, Floats]:
     """What the sensor will show in means: T in C and dT/dt in C/min."""
@@ -188,7 +192,7 @@ def _inputs(
     )
 
 
-def _extremes(plan: Scenario) -> tuple[float, float]:
+def extremes_of(plan: Scenario) -> tuple[float, float]:
     """Lowest and highest set point of a scenario's programmes."""
     ends = [
         corners(p.steps, p.start_c, 60.0 * (p.record_from_min + p.record_min), plan.chamber.max_c_per_min)[1]

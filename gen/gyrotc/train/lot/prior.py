@@ -128,16 +128,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
     freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
     scale = lot.cross_validation.spread_scale * freedom / (freedom - 2.0)  # variance of Student's t
-    means, covariances = [], []
-    for number, cluster in enumerate(lot.clusters):
-        at = f"{where}, clusters, {number}"
-        lower = triangle(cluster.covariance, len(kept), at)
-        if len(cluster.mean) != len(kept):
-            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{len(kept)}, one a function")
-        covariance = scale * (rest + lower + np.tril(lower, -1).T)
-        check_positive(covariance, at)
-        means.append(np.array(cluster.mean))
-        covariances.append(covariance)
+    means, covariances = _of_clusters(lot, scale, rest, where)
     sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
     if not (sizes > 0.0).all():
         raise InputError(f"{where}, clusters", "one without units", "units in each")
@@ -148,14 +139,30 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
         unit_dph=lot.unit_dph,
         temperature_c=lot.temperature_c,
         slope_c_per_min=lot.slope_c_per_min,
-        means=np.array(means),
-        covariances=np.array(covariances),
+        means=means,
+        covariances=covariances,
         share=shares,
         rest=processed(lot.rest),
         asked=_asked(lot, where),
         freedom=freedom,
         lot=lot,
     )
+
+
+def _of_clusters(lot: Lot, scale: float, rest: Floats, where: str) -> tuple[Floats, Floats]:
+    """Means and covariances of a new unit's coefficients, one for each cluster."""
+    n = len(lot.functions.kept)
+    means, covariances = [], []
+    for number, cluster in enumerate(lot.clusters):
+        at = f"{where}, clusters, {number}"
+        lower = triangle(cluster.covariance, n, at)
+        if len(cluster.mean) != n:
+            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{n}, one a function")
+        covariance = scale * (rest + lower + np.tril(lower, -1).T)
+        check_positive(covariance, at)
+        means.append(np.array(cluster.mean))
+        covariances.append(covariance)
+    return np.array(means), np.array(covariances)
 
 
 def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, Floats]:
