@@ -34,9 +34,10 @@ from gyrotc.train.lot import LotPrior, UnitMeans, learn
 from gyrotc.train.lot.means import unit_means
 from numpy.typing import NDArray
 
+from .lot_checks import best_power, recalibrated, seen
 from .lot_peers import peers
 
-__all__ = ["CASES", "Case", "measured"]
+__all__ = ["CASES", "Case", "learnt", "measured", "recorded"]
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -98,19 +99,21 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     own = [u for u in units if u.lot and not u.lot.stranger]
     strange = [u for u in units if u.lot and u.lot.stranger]
     taught = [
-        unit_means(cleaned(data), scaling_of(data), None)[0]
-        for data, _ in _recorded(own[:_UNITS], exam=False)
+        unit_means(cleaned(data), scaling_of(data), None)[0] for data, _ in recorded(own[:_UNITS], exam=False)
     ]
     before = time.process_time()
-    prior = _prior(taught)
+    prior = learnt(taught)
     learnt_s = time.process_time() - before
-    rows = []
-    for k, (data, exam) in enumerate(_recorded(own[_UNITS:], exam=True)):
+    rows, checks = [], []
+    for k, (data, exam) in enumerate(recorded(own[_UNITS:], exam=True)):
         assert exam is not None
         rows.append(_unit(data, exam, prior, taught, longer=k < _LONGER))
+        checks.append((data, _programmes(data)[0][1]))
         print(f"{case.name}: unit {k + 1} of {_UNSEEN}, {time.process_time() - started:.0f} s", flush=True)
     refused: dict[str, list[bool]] = {"2.5 h": [], "8 h": [], "six runs": []}
-    for data, _ in _recorded(strange, exam=False):
+    powers = []
+    for data, _ in recorded(strange, exam=False):
+        powers.append(best_power(prior, seen(_programmes(data)[0][1]), seen(data)))
         for name, part in _programmes(data):
             use = fit(part, method="auto", lot=prior).lot if name != "six runs" else None
             p = (
@@ -127,6 +130,8 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
         "learnt_s": learnt_s,
         "units": rows,
         "strangers_refused": {name: float(np.mean(r)) for name, r in refused.items() if r},
+        "best_power": float(np.mean(powers)) if powers else None,
+        "recalibration": recalibrated(checks) if case.strangers else None,
         "cpu_s": time.process_time() - started,
     }
 
@@ -135,7 +140,7 @@ def _order(case: Case) -> LotOrder:
     return LotOrder(_UNITS + _UNSEEN + case.strangers, case.family, case.clusters, case.strangers)
 
 
-def _prior(units: list[UnitMeans]) -> LotPrior:
+def learnt(units: list[UnitMeans]) -> LotPrior:
     """A lot as `gyrotc lot` makes it, without the way over files."""
     from gyrotc.jobs.lot import lot_from
     from gyrotc.train.lot import prior_of
@@ -148,7 +153,7 @@ def _prior(units: list[UnitMeans]) -> LotPrior:
     return prior_of(lot)
 
 
-def _recorded(units: list[SimulatedGyro], *, exam: bool) -> Iterator[tuple[TrainingData, Exam | None]]:
+def recorded(units: list[SimulatedGyro], *, exam: bool) -> Iterator[tuple[TrainingData, Exam | None]]:
     """Training samples and the exam of each unit, through data sets and the front end."""
     for drawn in units:
         kept = [s for s in drawn.plan.set if exam or s.role == "train"]

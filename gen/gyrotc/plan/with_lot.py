@@ -26,8 +26,8 @@ from ..train.lot import LotPrior, prior_of
 from ..train.lot.basis import CONSTANT, PRIOR_LOG, LotBasis
 
 __all__ = [
-    "AVERAGE_S", "HOLDS", "RATES", "MapQuestion", "extremes_of", "hours_of", "inputs_of", "plan_with_lot", "programme_csv",
-    "programme_text",
+    "AVERAGE_S", "HOLDS", "RATES", "MapQuestion", "extremes_of", "hours_of", "inputs_of", "plan_with_lot",
+    "programme_csv", "programme_text",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]

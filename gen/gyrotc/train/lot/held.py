@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfc, ndtri
 
+from ...errors import InputError
 from ...results.earlier import CheckedCell, MapChange
 from .learn import UnitMeans
-from .prior import MapPosterior
+from .prior import MapPosterior, MapPrior
 from .surprise import FALSE_ALARM
 
 __all__ = ["Held", "held"]
@@ -67,8 +68,12 @@ def held(expected: MapPosterior, run: UnitMeans) -> Held:
 
     Args:
         expected: The earlier model with its ageing.
-        run: Means of the check run.
+        run: Means of the check run; those beyond the earlier model's envelope say nothing of it and do not count.
+
+    Raises:
+        InputError: None is within.
     """
+    run = _within(expected.prior, run)
     left = run.bias_dph - expected.mean_dph(run.temperature_c, run.slope_c_per_min)
     values = expected.prior.basis.values(run.temperature_c, run.slope_c_per_min) * expected.prior.unit_dph
     covariance = values @ expected.covariance @ values.T + np.diag(run.sigma_dph**2 / run.count)
@@ -84,6 +89,16 @@ def held(expected: MapPosterior, run: UnitMeans) -> Held:
     shape = shapes[best]
     change = _change(shape, float(size[best] / length[best]), float(1.0 / length[best]))
     return Held(p, change if p < FALSE_ALARM else None, tuple(_cells(run, left, covariance)))
+
+
+def _within(prior: MapPrior, run: UnitMeans) -> UnitMeans:
+    (t0, t1), (r0, r1) = prior.temperature_c, prior.slope_c_per_min
+    t, r = run.temperature_c, run.slope_c_per_min
+    inside = (t >= t0) & (t <= t1) & (r >= r0) & (r <= r1)
+    if not inside.any():
+        found = f"is nowhere within {t0:.1f} ... {t1:.1f} C and {r0:.2f} ... {r1:.2f} C/min"
+        raise InputError("--prior", f"the check run {found}", "a run where the earlier model holds")
+    return UnitMeans(t[inside], r[inside], run.bias_dph[inside], run.count[inside], run.sigma_dph)
 
 
 def _shapes(run: UnitMeans) -> Iterator[_Shape]:

@@ -13,7 +13,7 @@ from ..process import Asked
 from .basis import PARAMETERS, LotBasis
 from .learn import UnitMeans, sums_of
 from .model import evidence
-from .surprise import freedom_of, p_value, scores
+from .surprise import freedom_of, of_few, p_value, scores
 
 __all__ = ["LotPrior", "MapPosterior", "MapPrior", "check_positive", "prior_of", "processed", "triangle"]
 
@@ -56,7 +56,8 @@ class MapPrior:
             shrunk = np.linalg.inv(np.linalg.inv(covariance) + precision)
             found.append((mean + shrunk @ (moment - precision @ mean), shrunk))
             likely.append(float(evidence(sums, mean, covariance)[0]) + float(np.log(share)))
-            p.append(p_value(*scores(precision, moment, mean, covariance), self.freedom))
+            spread = covariance / of_few(self.freedom)  # the test counts the few by itself
+            p.append(p_value(*scores(precision, moment, mean, spread), self.freedom))
         weight = np.exp(np.array(likely) - max(likely))
         weight /= weight.sum()
         mean, covariance = _mixed(found, weight)
@@ -127,7 +128,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     )
     rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
     freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
-    scale = lot.cross_validation.spread_scale * freedom / (freedom - 2.0)  # variance of Student's t
+    scale = lot.cross_validation.spread_scale * of_few(freedom)
     means, covariances = _of_clusters(lot, scale, rest, where)
     sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
     if not (sizes > 0.0).all():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
 
-__all__ = ["FALSE_ALARM", "freedom_of", "inflation", "p_value", "scores"]
+__all__ = ["FALSE_ALARM", "freedom_of", "inflation", "of_few", "p_value", "scores"]
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,11 @@ _TELLING = 1.0  # variance by the lot over variance by noise, from which on a sc
 def freedom_of(units: int, clusters: int, directions: int) -> float:
     """Degrees of freedom of a lot's spread: units less what was fitted to them; 3 at least."""
     return float(max(units - clusters - directions, _LEAST_FREEDOM))
+
+
+def of_few(freedom: float) -> float:
+    """Variance of Student's t, by which a spread that is known from few units is widened."""
+    return freedom / (freedom - 2.0) if np.isfinite(freedom) else 1.0
 
 
 def scores(precision: Floats, moment: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
