@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gyrotc.train import TrainingData
+from gyrotc.train import TrainingData, fit, uncertainty
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.lot import LotPrior, UnitMeans
-from gyrotc.train.lot.earlier import posterior_of_means, widened
+from gyrotc.train.lot.earlier import posterior_of_means, stated_sigma_dph, widened
 from gyrotc.train.lot.held import held
 from gyrotc.train.lot.learn import sums_of
 from gyrotc.train.lot.means import unit_means
@@ -63,7 +63,11 @@ def recalibrated(units: Sequence[tuple[TrainingData, TrainingData]]) -> dict[str
         early = cleaned(whole.select(whole.run < _EARLIER))
         scaling = scaling_of(early)
         means = unit_means(early, scaling, fit_process(early, scaling))[0]
-        known = posterior_of_means(means, (scaling.temperature_c, scaling.slope_c_per_min), 0.0)
+        fitted = fit(early, method="auto")
+        table = uncertainty(early, fitted)
+        envelope, between = (scaling.temperature_c, scaling.slope_c_per_min), table["rules"]["between_dph"]
+        stated = stated_sigma_dph(np.array(table["rows"]), envelope, between, means)
+        known = posterior_of_means(means, envelope, between, stated)
         prior = widened(known, 0.0, "none", "", None).alone()
         run = seen(short)
         found["unchanged"].append(held(prior, run).p_value)

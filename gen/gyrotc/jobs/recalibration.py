@@ -20,7 +20,13 @@ from ..results.lot import Lot
 from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
 from ..train.lot import UnitMeans, prior_of
-from ..train.lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, widened
+from ..train.lot.earlier import (
+    EarlierPrior,
+    posterior_of_known,
+    posterior_of_means,
+    stated_sigma_dph,
+    widened,
+)
 from ..train.lot.prior import MapPosterior
 from ..train.lot.surprise import FALSE_ALARM
 
@@ -95,7 +101,9 @@ def posterior_in(folder: Path, model: Model) -> MapPosterior:
         return posterior_of_known(training.known, str(where))
     means = means_of(training.means, where)
     envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    return posterior_of_means(means, envelope, between_of(model))
+    between, table = between_of(model), model.uncertainty_dph
+    stated = stated_sigma_dph(np.array(table.rows), envelope, between, means) if table else 0.0
+    return posterior_of_means(means, envelope, between, stated)
 
 
 def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, MapMeans]:

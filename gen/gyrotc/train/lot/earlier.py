@@ -7,7 +7,7 @@ depends on temperature smoothly by half of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ __all__ = [
     "known_map",
     "posterior_of_known",
     "posterior_of_means",
+    "stated_sigma_dph",
     "widened",
 ]
 
@@ -59,13 +60,35 @@ class EarlierPrior(MapPrior):
     ageing_from: str
 
 
-def posterior_of_means(means: UnitMeans, envelope: Envelope, between_dph: float) -> MapPosterior:
+def stated_sigma_dph(rows: Floats, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
+    """1 sigma of a map as its table states it, RMS over the means of its calibration, deg/h.
+
+    Args:
+        rows: 1 sigma in cells of the envelope, a row for each of dT/dt, T ascending, with the scatter of power-ons.
+        envelope: Ranges of T (C) and dT/dt (C/min).
+        between_dph: Standard deviation of the constant from power-on to power-on, deg/h, which is taken off.
+        means: Of its calibration.
+    """
+    inputs = (means.temperature_c, means.slope_c_per_min)
+    i, j = (
+        np.clip(((x - low) / max(high - low, 1e-9) * n).astype(int), 0, n - 1)
+        for x, (low, high), n in zip(inputs, envelope, rows.shape[::-1], strict=True)
+    )
+    variance = float(np.average(rows[j, i] ** 2, weights=means.count)) - between_dph**2
+    return float(np.sqrt(max(variance, 0.0)))
+
+
+def posterior_of_means(
+    means: UnitMeans, envelope: Envelope, between_dph: float, stated_dph: float = 0.0
+) -> MapPosterior:
     """What recordings of a unit say of its map, the smoothness of which they tell themselves.
 
     Args:
         means: Of its calibration.
         envelope: Ranges of T (C) and dT/dt (C/min).
         between_dph: Standard deviation of its constant from power-on to power-on, deg/h.
+        stated_dph: 1 sigma of the map as its table states it (`stated_sigma_dph`), which runs left out have calibrated:
+            a posterior that claims less is widened to it.
     """
     center = float(np.average(means.bias_dph, weights=means.count))
     unit = float(np.sqrt(np.average((means.bias_dph - center) ** 2, weights=means.count))) or 1.0
@@ -85,7 +108,9 @@ def posterior_of_means(means: UnitMeans, envelope: Envelope, between_dph: float)
     prior = MapPrior(
         basis, center, unit, *envelope, mean[None], covariance[None], np.ones(1), rest, asked, np.inf
     )
-    return prior.alone()
+    known = prior.alone()
+    wider = max(1.0, (stated_dph / known.rms_sigma_dph()) ** 2)
+    return replace(known, covariance=wider * covariance)
 
 
 def widened(
