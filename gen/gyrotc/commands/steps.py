@@ -82,9 +82,8 @@ def fit(
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
-    options = FitOptions(
-        method, seed, centers, rho, block_s, average_s, channels, load_lot(lot) if lot else None
-    )
+    shared = load_lot(lot) if lot else None
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
