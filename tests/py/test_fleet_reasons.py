@@ -84,6 +84,21 @@ def test_words_with_run_and_time() -> None:
     assert told["copy_of_other"].text.endswith(told["copy_of_other"].name[-2:]), "the other's same axis"
 
 
+def test_the_picture_of_a_noisy_gyro_shows_the_run_that_is_named() -> None:
+    """Before: the words named one run, and the picture was of another."""
+    lot = Lot(5, 12)
+    lot.plant("noise", lot.units[3])
+    [name] = lot.planted["noise"]
+    one_run = f"{lot.units[7]}-x"
+    run = lot.runs[lot.units[7]][4]
+    run["rate_x_dph"] = run["rate_x_dph"] + 8e-3 * lot.draw.normal(size=run["time_s"].size)
+    made = list(entries(lot))
+    found = {reason.name: reason for reason in reasons(made, [])}
+    series = {entry.name: entry.facts.series.file for entry in made if entry.facts and entry.facts.series}
+    assert found[name].file == series[name] and f"such as {series[name]}" in found[name].text
+    assert found[one_run].file == series[one_run] == "run-05.csv" and "in run-05.csv" in found[one_run].text
+
+
 def test_exchanged_axes_stand_apart_in_what_the_fleet_says() -> None:
     """Two columns of one unit changed places: both axes are named with what they show, and both have the finding."""
     lot = Lot(6, 12)

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from ...metrics import MAD_TO_SIGMA, Averages
 from ...results.fleet import ComparedRun, Facts, LikelyStep, ResidualSeries
 
-__all__ = ["BINS", "BIN_C", "FIRST_C", "facts_of", "step_in"]
+__all__ = ["BINS", "BIN_C", "FIRST_C", "NOISY_RUN", "facts_of", "step_in"]
 
 Array = NDArray[np.float64]
 
 FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
+NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at
 _LEAST_IN_BIN = 3  # means, for a mean of them
 _LEAST_MEANS = 16  # a shorter run does not show a step
 _EDGE = 0.1  # of a run, on either side of which a step is not sought
@@ -25,12 +26,20 @@ def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
     """Facts of a gyro from the means of its runs, each with its file."""
     told = [(file, a) for file, a in runs if a.time_s.size]
     steps = [step_in(a.after_dph) for _, a in told]
-    worst = int(np.argmax([score for _, _, score in steps])) if told else 0
+    compared = [_compared(file, a, step) for (file, a), step in zip(told, steps, strict=True)]
     return Facts(
         curve=_curve([a for _, a in told]),
-        runs=tuple(_compared(file, a, step) for (file, a), step in zip(told, steps, strict=True)),
-        series=_series(*told[worst]) if told else None,
+        runs=tuple(compared),
+        series=_series(*told[_shown(compared)]) if told else None,
     )
+
+
+def _shown(runs: Sequence[ComparedRun]) -> int:
+    """The run that is drawn if the gyro stands apart: one much noisier than its others, else the likeliest step."""
+    noise = np.array([run.noise_dph for run in runs])
+    if noise.max() > NOISY_RUN * np.median(noise):
+        return int(np.argmax(noise))
+    return int(np.argmax([run.step.score for run in runs]))
 
 
 def _compared(file: str, a: Averages, step: tuple[int, float, float]) -> ComparedRun:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...metrics import MAD_TO_SIGMA
 from ...results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
+from .facts import NOISY_RUN
 from .turned import turned
 
 __all__ = ["reasons", "with_reasons"]
@@ -27,7 +28,6 @@ _LEAST_BINS = 4  # cells of 5 C: a shift of a shorter curve is not told from an 
 _LEAST_SHIFT_C = 1.0  # thermometers of a kind agree to this
 _LEAST_SCALE = 1.5  # factor: less is the scatter of a lot
 _LEAST_NOISE = 1.5  # times the usual noise: less is the scatter of a lot
-_LEAST_NOISY_RUN = 3.0  # times the noise of the other runs of the gyro
 _LEAST_STEP = 1.6  # times the usual score
 _FAR_LOG = 4.0  # for logarithms of scores and factors, beside a least ratio
 _LEAST_SPIKES = 5  # rows
@@ -190,9 +190,11 @@ def _noise(kind: _Kind) -> Iterator[Reason]:
     for entry, facts, level, of_runs in zip(kind.entries, kind.facts, levels, ratios, strict=True):
         file = facts.runs[int(np.nanargmax(of_runs))].file
         if level - usual > max(_FAR * scatter, np.log(_LEAST_NOISE)):
-            text = f"noise: {np.exp(level - usual):.1f} times that of the others, most in {file}"
-            yield _reason(entry, "noise", text, file)
-        elif np.nanmax(of_runs) > _LEAST_NOISY_RUN:
+            where = "every run" if np.nanmin(of_runs) > _LEAST_NOISE else "most runs"
+            shown = facts.series.file if facts.series else file
+            text = f"noise: {np.exp(level - usual):.1f} times that of the others in {where}, such as {shown}"
+            yield _reason(entry, "noise", text, shown)
+        elif np.nanmax(of_runs) > NOISY_RUN:
             text = f"noise: in {file} {np.nanmax(of_runs):.1f} times that of the others"
             yield _reason(entry, "noise", text, file)
 
