@@ -16,7 +16,7 @@ import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from .record import draw_recording, told, write
 
 __all__ = ["orders", "run", "write_page"]
 
+_TELLS = 10  # recordings between two writings of the page
 _SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
 _MARKS = re.compile(r"(<!-- blind-other -->\n).*?(<!-- /blind-other -->)", re.DOTALL)
 _HEAD = """## Hidden effects in a world that is no sibling (`make blind-other`)
@@ -55,8 +56,19 @@ def orders(records: int) -> list[tuple[str, str]]:
     return out
 
 
-def run(seed: int, records: int, folder: Path, *, hours: float = 5.0) -> list[Row]:
-    """Recordings of a run, one after the other; rows that `folder` holds already are not made again."""
+def run(
+    seed: int,
+    records: int,
+    folder: Path,
+    *,
+    hours: float = 5.0,
+    after: Callable[[list[Row]], None] = lambda _: None,
+) -> list[Row]:
+    """Recordings of a run, one after the other; rows that `folder` holds already are not made again.
+
+    Args:
+        after: Called with the rows so far after every tenth recording, so that a run that is stopped has its page.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{seed}-{records}.jsonl"
     done = {row["number"]: row for row in rows_of(path)}
@@ -76,11 +88,19 @@ def run(seed: int, records: int, folder: Path, *, hours: float = 5.0) -> list[Ro
             stream.write(json.dumps(row) + "\n")
             stream.flush()
             print(_line(row), flush=True)
-            for left in Path(
-                name
-            ).iterdir():  # recordings, and the cached bank of temperatures that do not come again
-                shutil.rmtree(left) if left.is_dir() else left.unlink()
+            if len(done) % _TELLS == 0:
+                after([done[k] for k in sorted(done)])
+            _sweep(Path(name))
     return [done[k] for k in sorted(done)]
+
+
+def _sweep(folder: Path) -> None:
+    """Removes recordings, and what was cached of temperatures that do not come again."""
+    for left in folder.iterdir():
+        if left.is_dir():
+            shutil.rmtree(left)
+        else:
+            left.unlink()
 
 
 def _line(row: Row) -> str:
@@ -177,9 +197,13 @@ def main() -> None:
         "commit": commit(),
         "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
     }
-    rows = run(seed, arguments.records, arguments.folder)
-    if arguments.docs is not None:
-        write_page(arguments.docs, head, rows)
+
+    def after(rows: list[Row]) -> None:
+        if arguments.docs is not None:
+            write_page(arguments.docs, head, rows)
+
+    rows = run(seed, arguments.records, arguments.folder, after=after)
+    after(rows)
     print(markdown(table(rows)))
 
 
