@@ -8,7 +8,8 @@ import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose.advice import VERDICTS, next_steps
 from gyrotc.diagnose.summary import not_testable
-from gyrotc.results.diagnosed import DiagnosisVerdict
+from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
+from gyrotc.terms import CATALOGUE
 from gyrotc.train.fitting import FitOptions
 from recordings import ACCEPTED
 
@@ -26,3 +27,25 @@ def test_where_temperature_hardly_changes_nothing_is_decided(tmp_path) -> None: 
     assert result.verdict == "not_testable"
     assert "0.25 C" in result.text
     assert not result.causes and result.extended is None
+
+
+@pytest.mark.parametrize("id", ["thermal_gradient", "turn_on_offset"])
+def test_a_cause_that_the_fixture_can_imitate_says_so_and_what_tells(id: str) -> None:
+    """Tilt and scale factor times Earth's rate: no recording on one axis tells them, another mounting does."""
+    words = CATALOGUE[id].words
+    cause = NamedCause(
+        id=id,
+        family=CATALOGUE[id].family,
+        name=words.name,
+        p_value=1e-4,
+        parameters={},
+        equivalent=(),
+        separate_by=None,
+        gain=None,
+        signature=words.signature,
+        remedy=words.remedy,
+    )
+    told = [step for step in next_steps("explained", [cause], [], shipped=True) if "Earth's rate" in step]
+    assert len(told) == 1 and (
+        "turned by 180 degrees" in told[0] or "without touching the fixture" in told[0]
+    )

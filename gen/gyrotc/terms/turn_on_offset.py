@@ -46,6 +46,8 @@ CAUSE = Cause(
         telling=Telling.REPEATS,
         beside={"ageing": "the same hold on at least five dates, several power cycles on each"},
         recording="record three runs or more, each with its own power-on",
+        advice="Runs that were mounted anew differ as well, by tilt and scale factor times Earth's rate (5e-5 deg/h "
+        "for each arcsec at 45 degrees): repeat power-ons without touching the fixture.",
     ),
     search=SearchRule(price=1, grid=anywhere, needed_d=10.0, imitates=True),
     needs=Needs(runs=3),
