@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from conftest import ROOT
 from gyrotc.errors import CheckFailed
+from gyrotc.results.verification import FunctionCost
+from gyrotc.verify import board
 from gyrotc.verify.flow import parse_flows
 from gyrotc.verify.functions import PUBLIC
 from gyrotc.verify.loops import Counts, LoopText
@@ -112,3 +116,18 @@ def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None
     assert max(quotients.values()) <= 1.35
     page = section({"rows": [r | {"model": "filter", "core": "cortex-m4f"} for r in rows]})
     assert "No count exceeds its bound" in page
+
+
+def test_a_target_whose_code_has_no_bound_is_verified_without_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Bits that agree were told as a fail: code at -O3 has loops that no line of the text bounds."""
+    cost = FunctionCost(code_bytes=10, stack_bytes=4, helpers=())
+
+    def refuse(*_: object) -> dict[str, dict[str, int]]:
+        raise CheckFailed("no bound")
+
+    monkeypatch.setattr(board, "function_costs", lambda *_: {"f32": {"map": cost}})
+    monkeypatch.setattr(board, "instruction_bounds", refuse)
+    job = SimpleNamespace(tables={}, model=SimpleNamespace(symbol="a"))
+    assert board._functions(job, all_targets()["cortex-m4f"], tmp_path, tmp_path) == {"f32": {"map": cost}}
