@@ -16,11 +16,13 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "targets"), str(ROOT / "tests" / "prove")]
 
 import prove_page  # noqa: E402
+import self_test_page  # noqa: E402
 import targets_page  # noqa: E402
 
 SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "targets": targets_page.section,
     "prove": prove_page.section,
+    "self-test": self_test_page.section,
 }
 
 
@@ -54,6 +56,13 @@ def test_a_new_page_gets_the_section_and_other_sections_stay() -> None:
     assert "kept" in once and "one" in once
     assert "two" in filled(once, "prove", "two\n") and "one" not in filled(once, "prove", "two\n")
     assert filled(None, "prove", "one\n").startswith("# Results")
+
+
+def test_no_build_whose_results_differ_passes_the_self_test() -> None:
+    result = _result("self-test")
+    differing = [b for b in result["builds"] if b["differ"]]
+    assert result["tables"] == 40 and len(differing) >= 30, "the flags break something"
+    assert all(b["refused"] == b["differ"] for b in differing)
 
 
 def test_every_target_agreed_in_every_bit() -> None:

@@ -1,6 +1,6 @@
 """The tests of `make targets`: every cross compiler and emulator is required.
 
-`--results docs` writes what they found into the documentation.
+`--results docs` writes what they found into the documentation; those of the self-test may run alone.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import pytest
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "py")]
 
+import self_test_page  # noqa: E402
+import targets_page  # noqa: E402
 from emitted import CAUGHT  # noqa: E402
 from results import Results, machine, write  # noqa: E402
-from targets_page import section  # noqa: E402
+from self_tests import TABLES  # noqa: E402
 
 _FOUND = Results()
 
@@ -36,10 +38,15 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     docs = session.config.getoption("--results")
     if docs is None or exitstatus != 0:
         return
-    result = {
-        "schema": "gyrotc.targets/1",
-        "machine": machine(),
-        **_FOUND.lists,
-        "controls": sorted(CAUGHT, key=lambda c: (c["control"], c["name"], c["numeric"])),
-    }
-    write(docs, "targets", result, section)
+    lists = dict(_FOUND.lists)
+    if builds := lists.pop("self_test", None):
+        told = {"schema": "gyrotc.self-test/1", "machine": machine(), "tables": TABLES, "builds": builds}
+        write(docs, "self-test", told, self_test_page.section)
+    if lists:
+        result = {
+            "schema": "gyrotc.targets/1",
+            "machine": machine(),
+            **lists,
+            "controls": sorted(CAUGHT, key=lambda c: (c["control"], c["name"], c["numeric"])),
+        }
+        write(docs, "targets", result, targets_page.section)
