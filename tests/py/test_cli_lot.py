@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from gyrotc.commands import app
+from gyrotc.dataset import load
+from gyrotc.diagnose.extend.refitting import Refitting
+from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.errors import InputError
 from gyrotc.jobs.lot import load_lot, lot_of
 from gyrotc.model import load_model
@@ -14,6 +18,9 @@ from gyrotc.outputs import json_text
 from gyrotc.plan.with_lot import plan_with_lot
 from gyrotc.results.lot_plan import LotPlan
 from gyrotc.results.next_run import NextRun
+from gyrotc.train import predict
+from gyrotc.train.data import joined
+from gyrotc.train.fitting import FitOptions
 from gyrotc.train.lot import prior_of
 from typer.testing import CliRunner
 
@@ -143,6 +150,35 @@ def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Pa
         run("plan", scenario, "--unit", world, *price)
     with pytest.raises(InputError, match="--require"):
         run("plan", scenario, "--unit", unit, "--require", "accuracy=1e-4")
+
+
+def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> None:
+    """The map beside the causes, from one of three runs, has less error on the others; a single cycle goes without."""
+    (tmp_path / "fast.toml").write_text(RUNS.replace("PROFILES", '"fast", "slow", "fast"'), "utf-8")
+    made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "6")
+    run(*made, "--base", tmp_path / "fast.toml", "--out", tmp_path / "units")
+    dataset, lot = load(tmp_path / "units" / "LOT-0005-006"), load_lot(world / "lot.json")
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    left = []
+    for options in (FitOptions(lot=lot), FitOptions()):
+        refitting = Refitting(dataset, records, options, single_cycle=False)
+        first = [np.full(len(m), k == 0) for k, m in enumerate(refitting.everything())]
+        fitted = refitting.fit([], first)
+        others = joined([played.data for played in refitting.train[1:]])
+        away = others.bias_dph - predict(fitted, others.temperature_c, others.slope_c_per_min)
+        left.append(float(np.mean(away**2)))
+        assert (fitted.lot is not None and fitted.lot.accepted) == (options.lot is not None)
+    assert left[0] < left[1]
+    told = run(
+        *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),
+        *("--json", tmp_path / "found.json"),
+    )
+    assert (
+        "lot: not used: " in told
+        and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
+    )
+    with pytest.raises(InputError, match="--lot"):
+        run("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--model", world)
 
 
 def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:

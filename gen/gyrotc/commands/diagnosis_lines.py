@@ -14,6 +14,8 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     axis = f" {result.axis}" if result.axis else ""
     yield f"{result.serial}{axis}: {result.verdict.replace('_', ' ')}. {result.text}"
     yield result.meaning
+    if result.lot is not None:
+        yield f"lot: {result.lot}"
     for event in result.events:
         yield f"event: {event.text}"
         if event.exclude and not result.events_accepted:

@@ -217,6 +217,7 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     average_s: AverageOption = 100.0,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
+    lot: LotOption = None,
     accept_events: Annotated[
         bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
     ] = False,
@@ -229,12 +230,18 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     from ..dataset import Dataset, axes_of, load
     from ..diagnose import diagnose as run
     from ..jobs.diagnosis import diagnose_into
+    from ..jobs.lot import load_lot
     from ..model import load_model
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions
 
+    if lot is not None and model is not None:
+        raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
-    options = FitOptions(method, seed, centers, rho, block_s, average_s) if known is None else None
+    shared = load_lot(lot) if lot else None
+    options = (
+        FitOptions(method, seed, centers, rho, block_s, average_s, lot=shared) if known is None else None
+    )
     subtracted = applied_of(applied) if applied else None
     axes = axes_of(dataset) if axis == "all" else (axis,)
     if not axes:

@@ -120,8 +120,19 @@ def result_of(  # long: one line for each field of the result
         unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
         text=sentence_of(verdict, listed, extended, cycle.not_testable if cycle is not None else ""),
         meaning=VERDICTS[verdict],
+        lot=_of_lot(extension, options, single_cycle=cycle is not None),
         next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
     )
+
+
+def _of_lot(extension: Extension, options: FitOptions, *, single_cycle: bool) -> str | None:
+    """What became of the lot, in words."""
+    if options.lot is None:
+        return None
+    if single_cycle or extension.lot is None:
+        return "not used: beside an effect the map of a single cycle is one of T alone, which a lot does not know"
+    text = extension.lot.text
+    return f"the map beside the causes was fitted with {text}" if extension.lot.accepted else text
 
 
 def _untestable(analysis: Analysis, cycle: Cycle | None) -> dict[str, str]:

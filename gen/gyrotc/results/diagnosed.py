@@ -256,6 +256,7 @@ class Diagnosed(Result):
     events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")
     scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
+    lot: str | None = Field(default=None, description="with `--lot`: what was done with it; null without")
 
     @property
     def physical(self) -> tuple[NamedCause, ...]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...dataset import Dataset
 from ...metrics import Averages
+from ...results.lot import LotUse
 from ...train import Fit, TrainingData
 from ...train.bumps import Bumps
 from ...train.data import joined
@@ -50,6 +51,7 @@ class Extension:
         samples: Training samples as the extended map sees them.
         added: What the effects add to the map at each of them, deg/h.
         floor: Noise floor of the scored samples, deg/h.
+        lot: What a lot did for the map that is left; None without one.
         baseline_rms, baseline_centers: RMS (deg/h) and number of centers of the model without causes.
         measured_on: "exam" or "left out".
         before, after: Residuals of the scored runs without and with all causes.
@@ -65,6 +67,7 @@ class Extension:
     samples: TrainingData
     added: NDArray[np.float64]
     floor: float
+    lot: LotUse | None
     baseline_rms: float
     baseline_centers: int
     measured_on: Literal["exam", "left out"]
@@ -116,6 +119,7 @@ def extend(
         samples=_seen(refitting, shipped),
         added=_seen(refitting, []).bias_dph - _seen(refitting, shipped).bias_dph,
         floor=floor,
+        lot=refitting.fit(shipped).lot,
         baseline_rms=_rms(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,
         measured_on="exam" if refitting.exam else "left out",
