@@ -7,7 +7,7 @@ override GYROTC := .venv/bin/gyrotc
 override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.
-unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA SETS MEGABYTES
+unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA SETS MEGABYTES TAG
 override export SET_DATA := $(value DATA)
 override export SET_AXIS := $(value AXIS)
 override export SET_SECONDS := $(or $(value SECONDS),20)
@@ -15,6 +15,7 @@ override export SET_STORM := $(or $(value STORM),1000000)
 override export SET_SEED := $(value SEED)
 override export SET_SETS := $(or $(value SETS),2000)
 override export SET_MEGABYTES := $(value MEGABYTES)
+override export SET_TAG := $(value TAG)
 override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -179,6 +180,10 @@ cycles: setup
 dist: setup
 	@$(PYTHON) tools/archives.py build/dist
 
+## a release: archives and packages of what a tag holds (TAG=v0.2.0), in build/release
+release: setup
+	@tools/release.sh archive "$$SET_TAG"
+
 ## the lock file of the developers' environment, with hashes: gen/requirements.lock
 lock:
 	@tools/lock.sh
@@ -201,4 +206,4 @@ packages: setup
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist lock offline site clean
+.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist release lock offline site clean

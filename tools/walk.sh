@@ -39,4 +39,4 @@ echo "Commands of the tutorial that took a second or more:"
 echo
 echo "| command | s |"
 echo "| --- | ---: |"
-awk '$1 >= 1 {s = $1; $1 = $2 = ""; sub(/^ +/, ""); gsub(/\|/, "\\|"); printf "| `%s` | %.0f |\n", $0, s}' build/walk-tutorial.txt
+awk '$1 >= 1 && $2 == "s" {s = $1; $1 = $2 = ""; sub(/^ +/, ""); gsub(/\|/, "\\|"); printf "| `%s` | %.0f |\n", $0, s}' build/walk-tutorial.txt
