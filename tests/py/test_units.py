@@ -52,6 +52,7 @@ def fahrenheit(c: Columns) -> Columns:
         ("deg/s", "rate", 3600.0, 0.0),
         ("°/s", "rate", 3600.0, 0.0),
         ("dps", "rate", 3600.0, 0.0),
+        ("deg.s^-1", "rate", 3600.0, 0.0),
         ("mdps", "rate", 3.6, 0.0),
         ("rad/s", "rate", 648000.0 / np.pi, 0.0),
         ("deg/s / 131", "rate", 3600.0 / 131.0, 0.0),

@@ -187,6 +187,7 @@ def _spelt(text: str) -> str:
         return _SPELT[plain.lower()]
     if not _ALLOWED.fullmatch(plain) or _LARGE_POWER.search(plain):
         raise UnitError(f"{text!r} is not known as a unit")
+    plain = re.sub(r"(?<=[A-Za-zµ°])\.(?=[A-Za-zµ°])", "*", plain)  # pint reads deg.s^-1 until 0.25 only
     plain = re.sub(r"\bdps\b", "deg/s", plain)
     plain = re.sub(r"\bdeg(rees?)? ?/ ?", "deg/", plain)
     plain = re.sub(r"(?<=[A-Za-z°]) s\^?-1\b", "/s", plain)
