@@ -78,7 +78,8 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
         assert all(cost.code_bytes > 0 for cost in found.values())
         assert all("gtc_" not in helper for cost in found.values() for helper in cost.helpers)
         for name, (code, stack) in _said_by_the_header(numeric).items():
-            assert found[name].code_bytes == pytest.approx(code, rel=0.1, abs=16), name  # GCC 14 against 12: 14
+            # the header tells what GCC 12 made; GCC 14 makes up to 14 bytes less
+            assert found[name].code_bytes == pytest.approx(code, rel=0.1, abs=16), name
             assert found[name].stack_bytes == pytest.approx(stack, rel=0.1, abs=16), name
 
 
