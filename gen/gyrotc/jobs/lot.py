@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model import Model, load_model
 from ..outputs import digest_of
 from ..results.base import read_result
-from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotFunctions, LotProcess, LotUnit
+from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotProcess, LotUnit
 from ..results.training import Training
 from ..train.lot import LEAST_UNITS, Learned, UnitMeans, learn, prior_of
 from ..train.lot.basis import PARAMETERS
@@ -151,7 +151,6 @@ def lot_from(  # long: one line for each field of lot.json
         between_dph: Standard deviation of the constant from power-on to power-on, deg/h.
     """
     state = found.state
-    basis = state.basis
     inside = [u for u, kept in zip(units, found.inside, strict=True) if kept]
     lot = Lot(
         gyrotc_version=__version__,
@@ -163,12 +162,7 @@ def lot_from(  # long: one line for each field of lot.json
         occupancy=tuple(_rounded(row) for row in _occupancy(inside, envelope)),
         center_dph=found.center_dph,
         unit_dph=found.unit_dph,
-        functions=LotFunctions(
-            center_c=basis.center_c,
-            half_range_c=basis.half_range_c,
-            half_range_c_per_min=basis.half_range_c_per_min,
-            kept=tuple(int(k) for k in basis.kept),
-        ),
+        functions=state.basis.told(),
         clusters=_clusters(state),
         directions=tuple(_rounded(d) for d in state.directions.T),
         rest=_process(state.rest),

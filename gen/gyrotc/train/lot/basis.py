@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...results.lot import LotFunctions
+
 __all__ = ["CONSTANT", "PARAMETERS", "PRIOR_LOG", "LotBasis", "fitted_parameters"]
 
 Floats = NDArray[np.float64]
@@ -72,6 +74,21 @@ class LotBasis:
         largest = max(-slope_c_per_min[0], slope_c_per_min[1], 0.05)  # C/min: as the floor of a model's scale
         every = np.arange(1 + _OF_T + _COUPLED[0] * _COUPLED[1])
         return LotBasis(0.5 * (low + high), max(0.5 * (high - low), 1.0), largest, every)
+
+    @staticmethod
+    def read(functions: LotFunctions) -> LotBasis:
+        """The functions that a file tells."""
+        kept = np.array(functions.kept, dtype=np.int64)
+        return LotBasis(functions.center_c, functions.half_range_c, functions.half_range_c_per_min, kept)
+
+    def told(self) -> LotFunctions:
+        """The functions as a file tells them."""
+        return LotFunctions(
+            center_c=self.center_c,
+            half_range_c=self.half_range_c,
+            half_range_c_per_min=self.half_range_c_per_min,
+            kept=tuple(int(k) for k in self.kept),
+        )
 
     def only(self, used: NDArray[np.bool_]) -> LotBasis:
         """Some of these functions."""

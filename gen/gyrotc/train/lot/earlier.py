@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...results.earlier import EarlierUse
-from ...results.lot import KnownMap, LotFunctions, LotProcess
+from ...results.lot import KnownMap, LotProcess
 from ..data import Scaling, TrainingData
 from ..process import Asked
 from .basis import CONSTANT, PARAMETERS, PRIOR_LOG, LotBasis, fitted_parameters
@@ -179,12 +179,7 @@ def known_map(posterior: MapPosterior) -> KnownMap:
         slope_c_per_min=prior.slope_c_per_min,
         center_dph=prior.center_dph,
         unit_dph=prior.unit_dph,
-        functions=LotFunctions(
-            center_c=basis.center_c,
-            half_range_c=basis.half_range_c,
-            half_range_c_per_min=basis.half_range_c_per_min,
-            kept=tuple(int(k) for k in basis.kept),
-        ),
+        functions=basis.told(),
         mean=_rounded(posterior.mean),
         covariance=tuple(_rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
         rest=LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(prior.rest), strict=True)}),
@@ -201,22 +196,21 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
     Raises:
         InputError: The file contradicts itself.
     """
-    f = known.functions
-    kept = np.array(f.kept, dtype=np.int64)
-    lower = triangle(known.covariance, len(kept), f"{where}, known")
+    basis = LotBasis.read(known.functions)
+    lower = triangle(known.covariance, len(basis.kept), f"{where}, known")
     covariance = lower + np.tril(lower, -1).T
     asked = [np.array(x) for x in (known.asked_temperature_c, known.asked_slope_c_per_min, known.asked_share)]
     if len({len(x) for x in asked}) != 1 or not (asked[2].size and asked[2].min() >= 0.0 < asked[2].sum()):
         raise InputError(
             f"{where}, known, asked_share", "lists that do not go together", "a share for each place"
         )
-    if len(known.mean) != len(kept):
+    if len(known.mean) != len(basis.kept):
         raise InputError(
-            f"{where}, known, mean", f"{len(known.mean)} numbers", f"{len(kept)}, one a function"
+            f"{where}, known, mean", f"{len(known.mean)} numbers", f"{len(basis.kept)}, one a function"
         )
     check_positive(covariance, f"{where}, known")
     prior = MapPrior(
-        basis=LotBasis(f.center_c, f.half_range_c, f.half_range_c_per_min, kept),
+        basis=basis,
         center_dph=known.center_dph,
         unit_dph=known.unit_dph,
         temperature_c=known.temperature_c,

@@ -120,9 +120,8 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     Raises:
         InputError: The file contradicts itself: lengths that differ, a covariance that is none.
     """
-    f = lot.functions
-    kept = np.array(f.kept, dtype=np.int64)
-    basis = LotBasis(f.center_c, f.half_range_c, f.half_range_c_per_min, kept)
+    basis = LotBasis.read(lot.functions)
+    kept = basis.kept
     directions = (
         np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
     )
