@@ -320,7 +320,7 @@ def _report(result: Path, folder: Path, name: str) -> Callable[[bytes], None]:
         (work / f"{name}.json").write_bytes(data)
         pictures = pages._pictures
         if number % PICTURES_EVERY:
-            pages._pictures = lambda *_: dict.fromkeys(("bias", "map", "curve", "allan"))
+            pages._pictures = lambda *_: dict.fromkeys(("bias", "map", "curve", "allan", "trend"))
         try:
             pages.write_report(work)
         finally:

@@ -16,7 +16,7 @@ from ..errors import CheckFailed
 from ..results.verification import FunctionCost
 from .toolchain import Target, compile_objects, symbols
 
-__all__ = ["PUBLIC", "Graph", "function_costs", "parse_graph"]
+__all__ = ["PUBLIC", "TERM_CODES", "Graph", "function_costs", "parse_graph"]
 
 PUBLIC = (
     "check", "open", "map", "init", "sample", "sample_at", "missed", "bias", "snapshot", "rezero", "unzero",
@@ -30,9 +30,14 @@ _EDGE = re.compile(
     r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
 )
 _INDIRECT = "__indirect_call"
-_HOOK = re.compile(
-    r"gtc_(?:f32|q31)_(?:nothing|(?:memory|play|warm_up|harmonic|auxiliary)_(?:begin|take|step|apply))$"
-)
+TERM_CODES = [
+    "memory",
+    "play",
+    "warm_up",
+    "harmonic",
+    "auxiliary",
+]  # names in gtc_terms.inl, by kind from 1 on
+_HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{'|'.join(TERM_CODES)})_(?:begin|take|step|apply))$")
 
 
 @dataclass(slots=True)

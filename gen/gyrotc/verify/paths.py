@@ -12,11 +12,11 @@ import numpy as np
 
 from ..errors import CheckFailed
 from .flow import Block, Flow, Loop
+from .functions import TERM_CODES
 from .loops import LoopText
 
 __all__ = ["Paths", "Program"]
 
-_HOOKS = ("nothing", "memory", "play", "warm_up", "harmonic", "auxiliary")  # by the kind of a term, from 1 on
 _ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
 
 
@@ -55,7 +55,7 @@ class Program:
         for kind in self.text.counts.kinds:
             names = [
                 f"gtc_{n}_{what}"
-                for what in (f"{_HOOKS[kind]}_{slot}", "nothing")
+                for what in (f"{TERM_CODES[kind - 1]}_{slot}", "nothing")
                 for n in (numeric, _twin(numeric))
             ]
             address = next(self.addresses[n] for n in names if n in self.addresses)
