@@ -30,14 +30,9 @@ _EDGE = re.compile(
     r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
 )
 _INDIRECT = "__indirect_call"
-TERM_CODES = [
-    "memory",
-    "play",
-    "warm_up",
-    "harmonic",
-    "auxiliary",
-]  # names in gtc_terms.inl, by kind from 1 on
-_HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{'|'.join(TERM_CODES)})_(?:begin|take|step|apply))$")
+_CODES = "memory|play|warm_up|harmonic|auxiliary"  # of terms in gtc_terms.inl
+TERM_CODES = tuple(_CODES.split("|"))  # by the kind of a term, from 1 on
+_HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{_CODES})_(?:begin|take|step|apply))$")
 
 
 @dataclass(slots=True)
