@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.diagnose.orthonormal import TOLERANCE, main_directions, orthonormal
-from gyrotc.diagnose.quantiles import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95
 from gyrotc.metrics import MAD_TO_SIGMA
+from gyrotc.quantiles import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95
 from scipy import stats
 from scipy.linalg import subspace_angles
 

@@ -12,7 +12,6 @@ DIAGNOSE = TESTS.parents[1] / "gen" / "gyrotc" / "diagnose"
 
 # From left to right; a name is a folder or a module of diagnose.
 ORDER = [
-    "quantiles",
     "orthonormal",
     "screen",
     "noise_colour",

@@ -23,6 +23,7 @@ ORDER = [
     "results",
     "outputs",
     "texts",
+    "quantiles",
     "metrics",
     "_core",
     "terms",

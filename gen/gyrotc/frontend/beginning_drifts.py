@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.special import chdtri, ndtri, stdtrit
+from scipy.special import stdtrit
 
-from ..metrics import MAD_TO_SIGMA
+from ..quantiles import CHI2_95_ONE, NORMAL_95
+from .cells import cell_means, noise_of
 
 __all__ = ["Drift", "drifts_of"]
 
@@ -30,8 +31,6 @@ _BEFORE = 0.25  # of the slope behind, what may be there before: a relaxation ha
 _PLACES = 15.0  # independent places in a window, as for steps
 _KNOWN = 0.4  # degrees of freedom of a scale from a median, for each independent place, as for steps
 _LEAST_WINDOWS = 2.0  # still ones that show what noise makes
-_CHI2_95 = float(chdtri(1, 0.05))  # 95 % of one degree of freedom
-_NORMAL_95 = float(ndtri(0.975))  # 95 % on two sides
 _HOUR_S = 3600.0  # by definition
 
 
@@ -67,15 +66,11 @@ def drifts_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Drift]:
         windows = sum(k.places for k in alike) / _PLACES
         if windows < _LEAST_WINDOWS:
             continue
-        noise = _noise(np.concatenate([k.z for k in alike]))
+        noise = noise_of(np.concatenate([k.z for k in alike]))
         limit = -float(stdtrit(_KNOWN * _PLACES * windows, FALSE_ALARMS / 2.0 / places))
         for k in alike:
             found += k.beyond(limit, noise)
     return _clearest(found)
-
-
-def _noise(z: Floats) -> float:
-    return MAD_TO_SIGMA * float(np.median(np.abs(z)))
 
 
 def _clearest(found: Sequence[Drift]) -> list[Drift]:
@@ -118,10 +113,7 @@ class _Kinks:
             return None
         cell = max(float(np.median(np.diff(time))), half_s / _CELLS)
         width = round(half_s / cell)
-        index = np.floor((time - time[0]) / cell + 1e-9).astype(np.int64)
-        first = np.flatnonzero(np.r_[True, np.diff(index) > 0])
-        count = np.diff(np.r_[first, len(time)])
-        t, x, y = (np.add.reduceat(v, first) / count for v in (time, temperature, rate))
+        t, x, y = cell_means(cell, time, temperature, rate)
         if len(t) < 2 * width or width < 4:
             return None
         t_, x_, y_ = (sliding_window_view(v, 2 * width) for v in (t, x, y))
@@ -144,7 +136,7 @@ class _Kinks:
         while far.max(initial=0.0) > limit:
             k = int(np.argmax(far))
             middle = self.t[:, self.t.shape[1] // 2]
-            error = _NORMAL_95 * noise * self.spread * _HOUR_S
+            error = NORMAL_95 * noise * self.spread * _HOUR_S
             slope = float(self.after[k] - self.before[k]) * _HOUR_S
             time = _begins(self.t[k], self.y[k])
             yield Drift(self.run, time, (slope, slope - error, slope + error), float(far[k]))
@@ -167,5 +159,5 @@ def _begins(t: Floats, y: Floats) -> tuple[float, float, float]:
         rest = y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0]
         left[k] = rest @ rest
     best = int(np.argmin(left))
-    likely = inside[left <= left[best] * (1.0 + _CHI2_95 / max(len(u) - 4, 1))]
+    likely = inside[left <= left[best] * (1.0 + CHI2_95_ONE / max(len(u) - 4, 1))]
     return float(t[inside[best]]), float(t[max(likely[0] - 1, 0)]), float(t[min(likely[-1] + 1, len(t) - 1)])

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.special import chdtri, ndtri, stdtrit
+from scipy.special import stdtrit
 
-from ..metrics import MAD_TO_SIGMA
+from ..quantiles import CHI2_95_ONE, NORMAL_95
+from .cells import cell_means, noise_of
 
 __all__ = ["Step", "steps_of"]
 
@@ -30,8 +31,6 @@ _LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what 
 _PLACES = 15.0  # independent places in a window: in 250 records of white noise 1 % were then beyond the limit
 _KNOWN = 0.4  # degrees of freedom of a scale from a median, for each independent place: its efficiency
 _EDGE = 2  # cells on either side of a place that its time may lie in
-_CHI2_95 = float(chdtri(1, 0.05))  # 95 % of one degree of freedom
-_NORMAL_95 = float(ndtri(0.975))  # 95 % on two sides
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +66,12 @@ def steps_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Step]:
         alike = [w for w in windows if w.half_s == half]
         if not alike:
             continue
-        noise = _noise(np.concatenate([w.z for w in alike]))
+        noise = noise_of(np.concatenate([w.z for w in alike]))
         known = _KNOWN * sum(w.places for w in alike)
         limit = -float(stdtrit(known, FALSE_ALARMS / 2.0 / places))
         for w in alike:
             found.setdefault(w.run, []).extend((step, half) for step in w.beyond(limit, noise))
     return [step for run in sorted(found) for step in _largest(found[run])]
-
-
-def _noise(z: Floats) -> float:
-    return MAD_TO_SIGMA * float(np.median(np.abs(z)))
 
 
 def _largest(steps: list[tuple[Step, float]]) -> list[Step]:
@@ -120,10 +115,7 @@ class _Windows:
             return None
         windows = float(time[-1] - time[0]) / (2.0 * half_s)
         cell = max(float(np.median(np.diff(time))), half_s / _CELLS)
-        index = np.floor((time - time[0]) / cell + 1e-9).astype(np.int64)
-        first = np.flatnonzero(np.r_[True, np.diff(index) > 0])
-        count = np.diff(np.r_[first, len(time)])
-        t, x, y = (np.add.reduceat(v, first) / count for v in (time, temperature, rate))
+        t, x, y = cell_means(cell, time, temperature, rate)
         width = max(round(half_s / cell), 4)
         if min(windows, len(t) / (2 * width)) < _LEAST_WINDOWS:
             return None
@@ -133,7 +125,7 @@ class _Windows:
 
     def beyond(self, limit: float, noise: float) -> Iterator[Step]:
         """Steps of more than `limit` times what noise makes, of all such runs or of this one, the clearest first."""
-        scale = max(noise, _noise(self.z))
+        scale = max(noise, noise_of(self.z))
         if scale == 0.0:
             return
         far = np.abs(self.z) / scale
@@ -143,7 +135,7 @@ class _Windows:
             k = int(np.argmax(np.where(open_, far, 0.0)))
             open_[max(k - self.width, 0) : k + self.width + 1] = False
             at = k + self.width  # the first cell behind the step
-            size, error = float(self.size[k]), _NORMAL_95 * scale * float(self.spread[k])
+            size, error = float(self.size[k]), NORMAL_95 * scale * float(self.spread[k])
             placed = self._behind_gap if over_gap[k] else self._placed
             yield placed(at, size, error, float(far[k]))
 
@@ -183,7 +175,7 @@ class _Windows:
         )
         best = int(np.argmin(left))
         noise = max(float(left[best]) / max(n - 2, 1), 1e-300)
-        likely = inside[left <= left[best] + _CHI2_95 * noise]
+        likely = inside[left <= left[best] + CHI2_95_ONE * noise]
         between = float(time[near[max(likely[0] - 1, 0)]]), float(time[near[likely[-1]]])
         return Step(self.run, (float(time[near[inside[best]]]), *between), sizes, sigmas)
 

@@ -14,12 +14,12 @@ from ..errors import InputError
 from ..model import Model, load_model
 from ..outputs import digest_of
 from ..results.base import read_result
-from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotProcess, LotUnit
+from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
 from ..results.training import Training
 from ..train.lot import LEAST_UNITS, Learned, UnitMeans, learn, prior_of
-from ..train.lot.basis import PARAMETERS
 from ..train.lot.learn import Envelope, folds_of
 from ..train.lot.model import LotState
+from ..train.lot.prior import process_told, rounded
 from ..train.process import MEAN_S
 from .recalibration import between_of, means_of
 
@@ -33,7 +33,6 @@ _CELLS = (
     13,
 )  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read
-_DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,14 +158,14 @@ def lot_from(  # long: one line for each field of lot.json
         told=_told(names, found),
         temperature_c=envelope[0],
         slope_c_per_min=envelope[1],
-        occupancy=tuple(_rounded(row) for row in _occupancy(inside, envelope)),
+        occupancy=tuple(rounded(row) for row in _occupancy(inside, envelope)),
         center_dph=found.center_dph,
         unit_dph=found.unit_dph,
         functions=state.basis.told(),
         clusters=_clusters(state),
-        directions=tuple(_rounded(d) for d in state.directions.T),
-        rest=_process(state.rest),
-        of_mean=_process(state.of_mean),
+        directions=tuple(rounded(d) for d in state.directions.T),
+        rest=process_told(state.rest),
+        of_mean=process_told(state.of_mean),
         noise_dph=float(np.median([u.sigma_dph for u in inside])),
         mean_s=mean_s,
         between_dph=between_dph,
@@ -187,19 +186,11 @@ def _clusters(state: LotState) -> tuple[LotCluster, ...]:
     return tuple(
         LotCluster(
             units=int(n),
-            mean=_rounded(m),
-            covariance=tuple(_rounded(row[: k + 1]) for k, row in enumerate(c)),
+            mean=rounded(m),
+            covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(c)),
         )
         for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
     )
-
-
-def _rounded(values: Floats) -> tuple[float, ...]:
-    return tuple(float(f"{v:.{_DIGITS}g}") for v in values)
-
-
-def _process(log_parameters: Floats) -> LotProcess:
-    return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
 
 
 def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, ...]:
@@ -237,9 +228,9 @@ def _at_rest(lot: Lot) -> AtRest:
     values = prior.basis.values(t, np.zeros(_CURVE))
     spread = np.sqrt(np.sum((values @ prior.covariances[0]) * values, axis=1))
     return AtRest(
-        temperature_c=_rounded(t),
-        mean_dph=_rounded(lot.center_dph + lot.unit_dph * (values @ prior.means[0])),
-        spread_dph=_rounded(lot.unit_dph * spread),
+        temperature_c=rounded(t),
+        mean_dph=rounded(lot.center_dph + lot.unit_dph * (values @ prior.means[0])),
+        spread_dph=rounded(lot.unit_dph * spread),
     )
 
 

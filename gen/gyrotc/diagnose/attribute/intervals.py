@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from ..quantiles import CHI2_95_ONE
+from ...quantiles import CHI2_95_ONE
 
 __all__ = ["Interval", "parabola_top", "profile_interval", "random_size"]
 

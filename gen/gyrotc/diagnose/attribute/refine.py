@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import terms
+from ...quantiles import CHI2_95_ONE, NORMAL_95
 from ..detect.search import Search
 from ..orthonormal import orthonormal
-from ..quantiles import CHI2_95_ONE, NORMAL_95
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, columns_of, reach_of, searched, shape_parameter
 from ..signatures.changed_input import replaced_map

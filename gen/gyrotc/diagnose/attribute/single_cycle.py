@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from ... import terms
+from ...quantiles import CHI2_95_ONE, NORMAL_95
 from ...train.spans import turning_points
-from ..quantiles import CHI2_95_ONE, NORMAL_95
 from ..screen.blocks import Record, Records
 from ..signatures.candidates import Candidate, columns_of
 from .attribution import Attribution

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from ..quantiles import CHI2_95_TWO
+from ...quantiles import CHI2_95_TWO
 from ..signatures.candidates import Candidate
 from .joined import Held
 from .project import project

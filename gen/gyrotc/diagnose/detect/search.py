@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...quantiles import CHI2_95_TWO
 from ..noise_colour.colours import COLOURS, Colour
-from ..quantiles import CHI2_95_TWO
 from ..screen.blocks import Records
 from ..signatures.signature_bank import SignatureBank
 from .joined import Channels, Joined, join

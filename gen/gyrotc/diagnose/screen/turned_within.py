@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from ...dataset import Dataset, Run
+from ...frontend.cells import cell_means
+from ...quantiles import CHI2_95_ONE
 from .events import Event
 
 __all__ = ["gain_changes"]
@@ -35,7 +36,6 @@ _MOST_ALIKE = (
     0.95  # correlation of neighbours that is counted: beyond it a side has hardly two independent means
 )
 _PLACE_C = 1.0  # what counts as the same temperature, as for curves of runs
-_CHI2_95 = float(chdtri(1, 0.05))  # 95 % of one degree of freedom
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +101,7 @@ def _means(run: Run) -> _Means:
     time = rows.time_s[good]
     if len(time) == 0:
         return (np.zeros(0),) * 3
-    index = np.floor((time - time[0]) / _BLOCK_S).astype(np.int64)
-    first = np.flatnonzero(np.r_[True, np.diff(index) > 0])
-    count = np.diff(np.r_[first, len(time)])
-    t, x, y = (
-        np.add.reduceat(v, first) / count for v in (time, rows.temperature_c[good], rows.rate_dph[good])
-    )
+    t, x, y = cell_means(_BLOCK_S, time, rows.temperature_c[good], rows.rate_dph[good])
     return t, x, y
 
 
@@ -143,7 +138,7 @@ def _change(own: _Means, usual: tuple[Floats, Floats]) -> _Change | None:
     error = (
         2.0 * abs(factor) * float(np.hypot(before[1] / before[0], behind[1] / behind[0])) if factor else 0.0
     )
-    likely = [s[0] for s in tried if s[1] <= left * (1.0 + _CHI2_95 / max(len(t) - 5, 1))]
+    likely = [s[0] for s in tried if s[1] <= left * (1.0 + CHI2_95_ONE / max(len(t) - 5, 1))]
     times = float(t[at]), float(t[max(min(likely) - 1, 0)]), float(t[min(max(likely) + 1, len(t) - 1)])
     return _Change(factor, max(error, 1e-300), times, factor > 0.0 and swing > _SWING * rms)
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...results.earlier import EarlierUse
-from ...results.lot import KnownMap, LotProcess
+from ...results.lot import KnownMap
 from ..data import Scaling, TrainingData
 from ..process import Asked
-from .basis import CONSTANT, PARAMETERS, PRIOR_LOG, LotBasis, fitted_parameters
+from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .held import Held, held
 from .learn import Envelope, UnitMeans, sums_of, that_count
-from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
+from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
 from .surprise import FALSE_ALARM
 from .use import Given, curve_of, followed, seen_alone
 
@@ -42,7 +42,6 @@ _SHAPE = (
     0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape
 )
 _LEAST = 1e-6  # of the unit of coefficients: a process has sizes above 0
-_DIGITS = 7  # of numbers in a file, as of a lot's
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,12 +179,12 @@ def known_map(posterior: MapPosterior) -> KnownMap:
         center_dph=prior.center_dph,
         unit_dph=prior.unit_dph,
         functions=basis.told(),
-        mean=_rounded(posterior.mean),
-        covariance=tuple(_rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
-        rest=LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(prior.rest), strict=True)}),
-        asked_temperature_c=_rounded(asked.temperature_c),
-        asked_slope_c_per_min=_rounded(asked.slope_c_per_min),
-        asked_share=_rounded(asked.share),
+        mean=rounded(posterior.mean),
+        covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
+        rest=process_told(prior.rest),
+        asked_temperature_c=rounded(asked.temperature_c),
+        asked_slope_c_per_min=rounded(asked.slope_c_per_min),
+        asked_share=rounded(asked.share),
         between_dph=asked.between_dph,
     )
 
@@ -223,10 +222,6 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
         freedom=np.inf,
     )
     return prior.alone()
-
-
-def _rounded(values: Floats) -> tuple[float, ...]:
-    return tuple(float(f"{v:.{_DIGITS}g}") for v in values)
 
 
 def _use(prior: EarlierPrior, posterior: MapPosterior, checked: Held, scaling: Scaling | None) -> EarlierUse:

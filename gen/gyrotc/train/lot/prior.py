@@ -15,9 +15,21 @@ from .learn import UnitMeans, sums_of
 from .model import evidence
 from .surprise import freedom_of, of_few, p_value, scores
 
-__all__ = ["LotPrior", "MapPosterior", "MapPrior", "check_positive", "prior_of", "processed", "triangle"]
+__all__ = [
+    "LotPrior",
+    "MapPosterior",
+    "MapPrior",
+    "check_positive",
+    "prior_of",
+    "process_told",
+    "processed",
+    "rounded",
+    "triangle",
+]
 
 Floats = NDArray[np.float64]
+
+_DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +187,16 @@ def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, 
 def processed(process: LotProcess) -> Floats:
     """Log parameters of a process as a file holds it."""
     return np.asarray(np.log([getattr(process, name) for name in PARAMETERS]))
+
+
+def process_told(log_parameters: Floats) -> LotProcess:
+    """The same the other way round."""
+    return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
+
+
+def rounded(values: Floats) -> tuple[float, ...]:
+    """Numbers as a file tells them."""
+    return tuple(float(f"{v:.{_DIGITS}g}") for v in values)
 
 
 def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:

@@ -1,4 +1,4 @@
-"""Quantiles that more than one stage uses, each from the distribution it belongs to."""
+"""Quantiles that more than one room uses, each from the distribution it belongs to."""
 
 from __future__ import annotations
 
