@@ -66,7 +66,7 @@ class Imported:
         name = self.root.find("CoSimulation").attrib["modelIdentifier"]  # type: ignore[union-attr]
         self.library = ctypes.CDLL(str(folder / "binaries" / HERE / f"{name}.so"))
         self.refs = {
-            v.attrib["name"]: int(v.attrib["valueReference"]) for v in self.root.find("ModelVariables") or ()
+            v.attrib["name"]: int(v.attrib["valueReference"]) for v in self.root.findall("ModelVariables/*")
         }
         self.said: list[str] = []
         self._log = _LOG(lambda _e, _s, _c, text: self.said.append(text.decode()))
