@@ -160,7 +160,7 @@ def commands(root: Path) -> list[Case]:
         case("sign", lambda v: [apart, "--key", keys[v % 2]], apart),
         case("report", lambda _: [out], out),
         case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
-        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v], root / "diagnosed"),
+        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v, "--fresh"], root / "diagnosed"),
         case("plan", lambda v: [scenario, "--out", root / "planned", "--seed", v], root / "planned"),
         case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
              root / "imported"),

@@ -28,6 +28,7 @@ from gyrotc.judge.evaluate import evaluate
 from gyrotc.judge.limits import held_against, load_limits
 from gyrotc.metrics import average
 from gyrotc.model import load_model
+from gyrotc.outputs import kept
 from gyrotc.pages.diagnosis_page import write_diagnosis_page
 from gyrotc.pages.plan_page import write_plan_page
 from gyrotc.plan import plan
@@ -389,23 +390,23 @@ def _log(folder: Path) -> Callable[[bytes], None]:
 
 
 def _bank_bytes(seeds: Path, folder: Path) -> bytes:
-    kept = seeds / "bank"
-    if not kept.exists():
+    path = seeds / "bank"
+    if not path.exists():
         records = records_of(load(seeds / "data"), "train", block_s=600.0, average_s=600.0)
         bank = build(records, 0)
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
         small = {
             k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1
         }
-        cache._keep(kept, replace(bank, **small))
-    return kept.read_bytes()
+        path.write_bytes(kept._packed(cache._content(replace(bank, **small))))
+    return path.read_bytes()
 
 
 def _bank(seeds: Path, folder: Path) -> Callable[[bytes], None]:
     def read(data: bytes) -> None:
         path = folder / "a.bank"
         path.write_bytes(data)
-        bank = cache._kept(path)
+        bank = kept._read(path, cache._bank)
         if data != (seeds / "bank").read_bytes() and bank is not None:
             raise AssertionError("a damaged bank was taken")
         if bank is None:

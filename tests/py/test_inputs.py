@@ -24,6 +24,7 @@ from gyrotc.frontend import run_blocks
 from gyrotc.jobs.fleet import load_manifest
 from gyrotc.judge.limits import load_limits
 from gyrotc.model import load_model
+from gyrotc.outputs import kept
 from gyrotc.pages import report
 from gyrotc.results.base import checked_result, read_result
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation
@@ -279,7 +280,6 @@ class _Runs:
 
 
 def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import hashlib
     import pickle
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -289,8 +289,8 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
     records = records_of(load(tmp_path / "RLG-1"), "train", block_s=10.0, average_s=100.0)
     said: list[str] = []
     bank = cache.bank_of(records, 0, said.append)
-    assert cache.folder().stat().st_mode & 0o777 == 0o700
-    [path] = cache.folder().glob("*.bank")
+    assert kept.folder().stat().st_mode & 0o777 == 0o700
+    [path] = kept.folder().glob("*.bank")
     whole = path.read_bytes()
     assert np.array_equal(cache.bank_of(records, 0, said.append).signatures, bank.signatures)
     assert len(said) == 1, "the second came from disk"
@@ -299,22 +299,22 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         damaged = bytearray(whole)
         damaged[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
         path.write_bytes(damaged)
-        assert cache._kept(path) is None and not path.exists()
+        assert kept.kept(path.name, cache._bank) is None and not path.exists()
     content = pickle.dumps(_Runs())
     for foreign in (
         b"",
         b"x",
         whole[:-1],
         content,
-        cache._MAGIC + hashlib.sha256(content).digest() + content,
+        kept._packed(content),
     ):
         path.write_bytes(foreign)
-        assert cache._kept(path) is None
+        assert kept.kept(path.name, cache._bank) is None
     assert not Path("/tmp/gyrotc-was-here").exists()
     path.write_bytes(whole[:1000])
     assert np.array_equal(cache.bank_of(records, 0, said.append).signatures, bank.signatures)
     assert len(said) == 2
-    cache.folder().chmod(0o777)
+    kept.folder().chmod(0o777)
     cache.bank_of(records, 0, said.append)
     assert len(said) == 3, "others may write there"
 

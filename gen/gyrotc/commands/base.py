@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -19,6 +19,10 @@ from ..inputs import CEILINGS, set_ceilings
 from ..outputs import check_replaceable, json_text, write_result
 from ..texts import terminal_line, terminal_text
 from .stages import StageLine, Stages
+
+if TYPE_CHECKING:
+    from ..dataset import Applied
+    from ..results.lot import Lot
 
 app = typer.Typer(
     name="gyrotc",
@@ -221,3 +225,21 @@ def _main(
     ] = False,
 ) -> None:
     _Loudness.quiet, _Loudness.verbose = quiet, verbose
+
+
+def lot_in(path: Path | None) -> Lot | None:
+    """The lot of `--lot`. Raises as `load_lot`."""
+    if path is None:
+        return None
+    from ..jobs.lot import load_lot  # with what learns one: not for who has none
+
+    return load_lot(path)
+
+
+def applied_in(path: Path | None) -> Applied | None:
+    """The model of `--applied`. Raises as `applied_of`."""
+    if path is None:
+        return None
+    from ..quantise.applied import applied_of  # with the reference: not for who has none
+
+    return applied_of(path)

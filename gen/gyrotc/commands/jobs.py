@@ -29,6 +29,8 @@ from .base import (
     SeedOption,
     TrustUnitsOption,
     app,
+    applied_in,
+    lot_in,
     numerics_of,
     progress,
     show,
@@ -91,10 +93,9 @@ def build(
     Example: gyrotc build recordings --out result
     """
     from ..jobs.build import build as run
-    from ..jobs.lot import load_lot
     from ..train.fitting import FitOptions
 
-    shared = load_lot(lot) if lot else None
+    shared = lot_in(lot)
     options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
     with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
         results = run(
@@ -176,14 +177,13 @@ def compare(
     from ..jobs.compare import CompareOptions
     from ..jobs.compare import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
-    from ..quantise.applied import applied_of
 
     options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
     with (
         result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
         progress(COMPARE) as say,
     ):
-        subtracted = applied_of(applied) if applied else None
+        subtracted = applied_in(applied)
         recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
         if stage:
             stage.of(recordings.serial, axis)
@@ -221,6 +221,10 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     accept_events: Annotated[
         bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
     ] = False,
+    fresh: Annotated[
+        bool,
+        typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings."),
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
@@ -228,21 +232,18 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     Example: gyrotc diagnose recordings --out diagnosis
     """
     from ..dataset import Dataset, axes_of, load
-    from ..diagnose import diagnose as run
-    from ..jobs.diagnosis import diagnose_into
-    from ..jobs.lot import load_lot
+    from ..jobs.kept_diagnosis import diagnosed
     from ..model import load_model
-    from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions
 
     if lot is not None and model is not None:
         raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
-    shared = load_lot(lot) if lot else None
+    shared = lot_in(lot)
     options = (
         FitOptions(method, seed, centers, rho, block_s, average_s, lot=shared) if known is None else None
     )
-    subtracted = applied_of(applied) if applied else None
+    subtracted = applied_in(applied)
     axes = axes_of(dataset) if axis == "all" else (axis,)
     if not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
@@ -251,15 +252,15 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
         with progress(DIAGNOSE) as say:
-            if into is None:
-                found = run(
-                    recordings, model=known, options=options, progress=say, accept_events=accept_events
-                )
-            else:
-                found = diagnose_into(
-                    into, recordings, model=known, options=options, progress=say, accept_events=accept_events
-                )
-        results[name or ""] = found.result
+            results[name or ""] = diagnosed(
+                recordings,
+                into,
+                model=known,
+                options=options,
+                progress=say,
+                accept_events=accept_events,
+                fresh=fresh,
+            )
 
     if axis != "all" or out is None:
         for name in axes:

@@ -39,12 +39,12 @@ def cache(
 
     Example: gyrotc cache --limit 0.5
     """
-    from ..diagnose.signatures import cache as kept
+    from ..outputs import kept
 
     if limit_gb is not None:
         kept.set_limit(round(limit_gb * 1e9))
     if clear:
         kept.clear()
-    count, size = kept.held()
-    limit = kept.limit()
-    tell(f"{kept.folder()}: {count} banks, {size / 1e9:.3f} GB of at most {limit / 1e9:g} GB")
+    (banks, _), (diagnoses, _), (_, size) = kept.held("bank"), kept.held("diagnosis"), kept.held()
+    counted = f"{banks} banks of signatures, {diagnoses} diagnoses"
+    tell(f"{kept.folder()}: {counted}, {size / 1e9:.3f} GB of at most {kept.limit() / 1e9:g} GB")
