@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import secrets
 import shutil
 import tempfile
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ..grade import Row
+from ..page import answer_lines, run_lines, write_section
 from ..run import ROOT, Tool, code_version, commit, rows_of
 from ..table import markdown
 from .grade import answers, graded, table
@@ -31,7 +31,6 @@ __all__ = ["orders", "run", "write_page"]
 
 _TELLS = 10  # recordings between two writings of the page
 _SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
-_MARKS = re.compile(r"(<!-- blind-other -->\n).*?(<!-- /blind-other -->)", re.DOTALL)
 _HEAD = """## Hidden effects in a world that is no sibling (`make blind-other`)
 
 Gyros of another make (tests/blind/other, which imports nothing of gyrotc): heat by finite volumes through case, glass
@@ -113,53 +112,14 @@ def _line(row: Row) -> str:
 
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
     """docs/results/other-blind-SEED.json and the section of docs/results.md made of all of them."""
-    folder = docs / "results"
-    result = {
-        **head,
-        "done": len(rows),
-        "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
-        "table": table(rows),
-        "answers": answers(rows),
-        "foreign": [
-            {
-                "kind": r["kind"],
-                "k": r["k"],
-                "imitated": r["imitated"],
-                "verdict": r["verdict"],
-                "named": r["named"],
-            }
-            for r in rows
-            if r["stratum"] == "foreign"
-        ],
-    }
-    own = folder / f"other-blind-{head['seed']}.json"
-    own.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    runs = [json.loads(p.read_text(encoding="utf-8")) for p in folder.glob("other-blind-*.json")]
-    runs.sort(key=lambda r: str(r["started"]), reverse=True)
-    page = docs / "results.md"
-    text = page.read_text(encoding="utf-8")
-    if not _MARKS.search(text):
-        text += "\n<!-- blind-other -->\n<!-- /blind-other -->\n"
-    section = "\n".join([_HEAD, *map(_section, runs)])
-    page.write_text(_MARKS.sub(lambda m: m[1] + section + m[2], text), encoding="utf-8")
+    kept = ("kind", "k", "imitated", "verdict", "named")
+    foreign = [{name: row[name] for name in kept} for row in rows if row["stratum"] == "foreign"]
+    told = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
+    write_section(docs, ("other-blind", "blind-other"), head | {"done": len(rows)}, told, _HEAD, _section)
 
 
 def _section(run: dict[str, Any]) -> str:
-    ended = "complete" if run["done"] >= run["records"] else f"stopped of {run['records']}"
-    lines = [
-        f"### Other world, seed {run['seed']}: {run['done']} recordings, {ended}",
-        "",
-        f"Started {run['started']}, written {run['written']}, commit {run['commit']}, code {run['code']}.",
-        "",
-        markdown(run["table"]),
-        "",
-        "| hidden | recordings | answers |",
-        "| --- | --- | --- |",
-    ]
-    lines += [
-        f"| {name} | {sum(found.values())} | {', '.join(f'{k} {v}' for k, v in found.items())} |"
-        for name, found in run["answers"].items()
-    ]
+    lines = [*run_lines(run, "Other world"), *answer_lines(run["answers"], "answers")]
     named = [one for one in run["foreign"] if one["named"]]
     if named:
         lines += [
