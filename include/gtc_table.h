@@ -50,7 +50,7 @@ typedef union {
 #define GTC_GUARD_WORDS 8U   /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 #define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
 #define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
-#define GTC_TERM_WORDS 8U    /* kind, channel, then six parameters of the kind */
+#define GTC_TERM_WORDS 8U    /* kind, channel + 65536 * number of the stand-in, then six parameters of the kind */
 #define GTC_SIGMA_RULES 11U  /* words of `sigma` behind its two grids, before one for each term */
 #define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
@@ -74,7 +74,8 @@ typedef struct {
     gtc_word_t rezero;             /* deg/h: largest shift of the constant in the field; 0: none */
     gtc_word_t scale[3];           /* C, 1/C, block/C: center of T, gain of T, gain of slope */
     gtc_word_t envelope[4];        /* C, C, C/block, C/block: T min, max; slope min, max */
-    uint_least32_t n_networks;     /* 1, or more where GTC_WITH_BANK */
+    uint_least32_t n_networks;     /* of the map: 1, or more where GTC_WITH_BANK */
+    uint_least32_t n_stand_ins;    /* networks behind these: what terms add while their channels are lost */
     uint_least32_t n_centers;      /* of all networks together */
     uint_least32_t n_channels;     /* 1 + auxiliary channels */
     uint_least32_t n_terms;        /* 0 ... GTC_MAX_TERMS */
@@ -83,7 +84,7 @@ typedef struct {
     uint_least32_t n_sigma;           /* words of the uncertainty: 0, or 2 grids, GTC_SIGMA_RULES, one a term */
     uint_least32_t n_probes;          /* known answers */
     const gtc_word_t *serial;      /* [GTC_SERIAL_WORDS], as given by the gyro's maker */
-    const gtc_word_t *networks;    /* [n_networks][GTC_NETWORK_WORDS] */
+    const gtc_word_t *networks;    /* [n_networks + n_stand_ins][GTC_NETWORK_WORDS] */
     const gtc_word_t *centers;     /* [n_centers][GTC_CENTER_WORDS] */
     const gtc_word_t *guards;      /* [n_channels][GTC_GUARD_WORDS], the temperature first */
     const gtc_word_t *terms;       /* [n_terms][GTC_TERM_WORDS] */
@@ -113,6 +114,7 @@ typedef struct {
                                       in larger units (docs/numerics.md) */
     int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
     uint_least32_t n_networks;
+    uint_least32_t n_stand_ins;
     uint_least32_t n_centers;
     uint_least32_t n_channels;
     uint_least32_t n_terms;

@@ -301,9 +301,9 @@ GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
 FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_t *end,
                      uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
 
-/* One network: w0 + linear part + its Gaussians. */
-static inline int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
-                                        const gtc_word_t *centers, const POINT *in)
+/* One network: w0 + linear part + its Gaussians. In the loop, so that a stand-in costs the map no call. */
+GTC_IN_LOOP int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
+                                      const gtc_word_t *centers, const POINT *in)
 {
     const gtc_word_t *center = centers;
     const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];

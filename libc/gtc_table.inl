@@ -16,10 +16,16 @@ static uint_least32_t FN(coverage_words)(const TABLE *table)
     return ((table->coverage_cells[0] * table->coverage_cells[1]) + 31U) / 32U;
 }
 
+/* Networks of the map, and the stand-ins behind them. */
+static uint_least32_t FN(all_networks)(const TABLE *table)
+{
+    return table->n_networks + table->n_stand_ins;
+}
+
 /* Words of all arrays. */
 static uint_least32_t FN(array_words)(const TABLE *table)
 {
-    return GTC_SERIAL_WORDS + (table->n_networks * GTC_NETWORK_WORDS) + (table->n_centers * GTC_CENTER_WORDS)
+    return GTC_SERIAL_WORDS + (FN(all_networks)(table) * GTC_NETWORK_WORDS) + (table->n_centers * GTC_CENTER_WORDS)
            + (table->n_channels * GTC_GUARD_WORDS) + (table->n_terms * GTC_TERM_WORDS) + FN(coverage_words)(table)
            + table->n_sigma + (table->n_probes * GTC_PROBE_WORDS);
 }
@@ -81,7 +87,7 @@ static void FN(wholes)(const TABLE *table, uint_least32_t found[N_WHOLE])
     found[5] = table->slope_blocks;
     found[6] = table->lead_blocks;
     found[7] = table->bias_frac_bits;
-    found[8] = table->n_networks;
+    found[8] = FN(all_networks)(table);
     found[9] = table->n_centers;
     found[10] = table->n_channels;
     found[11] = table->n_terms;
@@ -126,9 +132,10 @@ static int FN(wholes_fit)(const TABLE *table, uint_least32_t first)
     return fit;
 }
 
-/* One network, or several where the code of the hand-over is there; they share out the centers. */
+/* One network, or several where the code of the hand-over is there, and stand-ins; they share out the centers. */
 static int FN(centers_fit)(const TABLE *table)
 {
+    const uint_least32_t n_networks = FN(all_networks)(table);
     uint_least32_t n = 0U;
     uint_least32_t i;
 
@@ -137,7 +144,7 @@ static int FN(centers_fit)(const TABLE *table)
         return 0;
     }
 #endif
-    for (i = 0U; i < table->n_networks; i++) {
+    for (i = 0U; i < n_networks; i++) {
         const uint_least32_t own = table->networks[i * GTC_NETWORK_WORDS].bits;
 
         if (own > table->n_centers) {
@@ -148,21 +155,28 @@ static int FN(centers_fit)(const TABLE *table)
     return (n == table->n_centers) ? 1 : 0;
 }
 
-/* Every term comes with its code; an auxiliary one reads a further channel, others the temperature. */
+/* Every term comes with its code; an auxiliary one reads a further channel, others the temperature. Stand-ins belong to
+ * auxiliary terms, one to each that has one, in their order, behind at least one network of the map. */
 static int FN(terms_fit)(const TABLE *table)
 {
+    uint_least32_t last = table->n_networks;
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
         const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+        const uint_least32_t channel = FN(channel_of)(term);
+        const uint_least32_t stand_in = FN(stand_in_of)(term);
 
+        if (stand_in != 0U) {
+            last++;
+        }
         if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != term[0].bits)
-            || (term[1].bits >= table->n_channels)
-            || ((term[1].bits != 0U) != (term[0].bits == GTC_TERM_AUXILIARY))) {
+            || (channel >= table->n_channels) || ((channel != 0U) != (term[0].bits == GTC_TERM_AUXILIARY))
+            || ((stand_in != 0U) && ((channel == 0U) || (stand_in != last)))) {
             return 0;
         }
     }
-    return 1;
+    return ((last == FN(all_networks)(table)) && (table->n_stand_ins < last)) ? 1 : 0;
 }
 
 /* 1 if the table is of this layout and its counts say where its arrays end, else 0. */
@@ -246,11 +260,12 @@ static int FN(network_fits)(const TABLE *table, const gtc_word_t *network, const
 
 static int FN(networks_fit)(const TABLE *table)
 {
+    const uint_least32_t n_networks = FN(all_networks)(table);
     const gtc_word_t *center = table->centers;
     int fit = 1;
     uint_least32_t i;
 
-    for (i = 0U; i < table->n_networks; i++) {
+    for (i = 0U; i < n_networks; i++) {
         const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
 
         fit &= FN(network_fits)(table, network, center);
@@ -313,7 +328,7 @@ static uint_least32_t FN(crc)(const TABLE *table)
     uint_least32_t crc = FN(header_crc)(table);
 
     crc = gtc_crc_words(crc, table->serial, GTC_SERIAL_WORDS);
-    crc = gtc_crc_words(crc, table->networks, table->n_networks * GTC_NETWORK_WORDS);
+    crc = gtc_crc_words(crc, table->networks, FN(all_networks)(table) * GTC_NETWORK_WORDS);
     crc = gtc_crc_words(crc, table->centers, table->n_centers * GTC_CENTER_WORDS);
     crc = gtc_crc_words(crc, table->guards, table->n_channels * GTC_GUARD_WORDS);
     crc = gtc_crc_words(crc, table->terms, table->n_terms * GTC_TERM_WORDS);
@@ -395,6 +410,7 @@ static void FN(read_header)(volatile TABLE *table, const gtc_word_t *words)
         MEMBER(table->envelope[i]) = ELEMENT(numbers[9U + i]);
     }
     table->n_networks = counts[0].bits;
+    table->n_stand_ins = 0U;
     table->n_centers = counts[1].bits;
     table->n_channels = counts[2].bits;
     table->n_terms = counts[3].bits;
@@ -432,7 +448,7 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
     const gtc_word_t *next = &words[BEFORE_ARRAYS];
 
     table->serial = FN(next)(&next, GTC_SERIAL_WORDS);
-    table->networks = FN(next)(&next, table->n_networks * GTC_NETWORK_WORDS);
+    table->networks = FN(next)(&next, FN(all_networks)(table) * GTC_NETWORK_WORDS);
     table->centers = FN(next)(&next, table->n_centers * GTC_CENTER_WORDS);
     table->guards = FN(next)(&next, table->n_channels * GTC_GUARD_WORDS);
     table->terms = FN(next)(&next, table->n_terms * GTC_TERM_WORDS);
@@ -440,6 +456,20 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
     table->sigma = FN(next)(&next, table->n_sigma);
     table->probes = FN(next)(&next, table->n_probes * GTC_PROBE_WORDS);
     table->crc = next[0].bits;
+}
+
+/* The networks of an image that terms name are stand-ins, not the map's; one at least is left to the map. */
+static void FN(find_stand_ins)(TABLE *table)
+{
+    uint_least32_t i;
+
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        if ((i < table->n_terms) && (table->n_networks > 1U)
+            && (FN(stand_in_of)(&table->terms[i * GTC_TERM_WORDS]) != 0U)) {
+            table->n_networks--;
+            table->n_stand_ins++;
+        }
+    }
 }
 
 /* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. */
@@ -472,6 +502,7 @@ static void FN(read_image)(TABLE *table, const gtc_word_t *words)
 {
     FN(read_header)(table, words);
     FN(find_arrays)(table, words);
+    FN(find_stand_ins)(table);
     FN(find_code)(table);
 }
 

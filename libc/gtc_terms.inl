@@ -5,6 +5,35 @@
  * SPDX-License-Identifier: MIT
  */
 
+/* The channel that a term reads, and the number of its stand-in among the networks, from 1 on; 0: it has none. */
+static uint_least32_t FN(channel_of)(const gtc_word_t *term)
+{
+    return term[1].bits & 0xFFFFU;
+}
+
+static uint_least32_t FN(stand_in_of)(const gtc_word_t *term)
+{
+    return term[1].bits >> 16;
+}
+
+/* What a term adds on average where its channel is not known: its stand-in, at the inputs of the map. */
+static NUM FN(stand_in)(const TABLE *table, uint_least32_t number, const EFFECT *effect)
+{
+    const gtc_word_t *network = table->networks;
+    const gtc_word_t *center = table->centers;
+    POINT in;
+    uint_least32_t i;
+
+    if (FN(locate)(table, effect->temp, effect->slope, &in) < 0) {
+        return NUM_ZERO;
+    }
+    for (i = 1U; i < number; i++) {
+        center = &center[network[0].bits * GTC_CENTER_WORDS];
+        network = &network[GTC_NETWORK_WORDS];
+    }
+    return FN(network)(table, network, center, &in);
+}
+
 /* The hook of terms that have nothing to do there. */
 static void FN(nothing)(STATE *state, uint_least32_t i, NUM x)
 {
@@ -127,11 +156,14 @@ const struct FN(term_code) FN(term_harmonic) = {
 /* ---- linear in the block mean of an auxiliary channel
  *
  * Parameters: slope; reference. Adds slope (mean - reference), the mean of the channel's last block with enough
- * readings, or of what stands for it (gtc_front.inl). */
+ * readings. While nothing of the channel is believed it adds its stand-in; a term that has none takes the guard's
+ * fallback for the mean (gtc_front.inl). */
 
 static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const uint_least32_t channel = state->table->terms[(i * GTC_TERM_WORDS) + 1U].bits;
+    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
+    const uint_least32_t channel = FN(channel_of)(term);
+    const uint_least32_t stand_in = FN(stand_in_of)(term);
     const INPUT *const in = &state->input[channel];
     const NUM slope = FN(parameter)(state, i, 0U);
     const NUM reference = FN(parameter)(state, i, 1U);
@@ -146,7 +178,11 @@ static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFF
     if ((in->clamped & 2U) != 0U) {
         effect->remarks |= GTC_CLAMPED;
     }
-    effect->added = FN(add)(effect->added, FN(scaled_difference)(in->mean, reference, slope));
+    if ((in->gap_us == 0U) && (stand_in != 0U)) {
+        effect->added = FN(add)(effect->added, FN(stand_in)(state->table, stand_in, effect));
+    } else {
+        effect->added = FN(add)(effect->added, FN(scaled_difference)(in->mean, reference, slope));
+    }
 }
 
 const struct FN(term_code) FN(term_auxiliary) = {

@@ -23,7 +23,16 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from .errors import InputError
 from .inputs import read_json
@@ -50,7 +59,7 @@ __all__ = [
 SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
-_MAX_CENTERS = 512  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
+_MAX_CENTERS, _MAX_NETWORKS = 512, 16  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
@@ -179,11 +188,16 @@ class Network(_Frozen):
 
 
 class Term(_Frozen):
-    """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel."""
+    """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel.
+
+    `stand_in`: what it adds on average at a temperature and its rate, while its channel is not known; None: the
+    guard's fallback stands for the channel. In the file only where there is one.
+    """
 
     id: str
     parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]]
     channel: str | None = None
+    stand_in: Network | None = None
 
     @model_validator(mode="after")
     def _known(self) -> Term:
@@ -199,7 +213,16 @@ class Term(_Frozen):
                 raise ValueError(f"{parameter.name} of term {self.id} must be above 0")
         if cause.needs.channel != (self.channel is not None):
             raise ValueError("a channel belongs to an auxiliary term and to no other")
+        if self.stand_in is not None and (self.channel is None or self.stand_in.region is not None):
+            raise ValueError("a stand-in belongs to a term with a channel, and has no region")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = handler(self)
+        if self.stand_in is None:
+            del content["stand_in"]
+        return content
 
     @property
     def cause(self) -> Cause:
@@ -286,8 +309,11 @@ class Model(_Frozen):
 
     @model_validator(mode="after")
     def _whole(self) -> Model:
-        if sum(len(n.centers) for n in self.networks) > _MAX_CENTERS:
+        networks = [*self.networks, *self.stand_ins]
+        if sum(len(n.centers) for n in networks) > _MAX_CENTERS:
             raise ValueError(f"more than {_MAX_CENTERS} centers")
+        if len(networks) > _MAX_NETWORKS:
+            raise ValueError(f"more than {_MAX_NETWORKS} networks, stand-ins of terms among them")
         regions = [n.region is not None for n in self.networks]
         if len(regions) > 1 and not all(regions):
             raise ValueError("every network of a bank needs a region")
@@ -316,7 +342,13 @@ class Model(_Frozen):
         return tuple(map(str, found)) if isinstance(found, list | tuple) else (str(found),)
 
     @property
+    def stand_ins(self) -> tuple[Network, ...]:
+        """Those of the terms that have one, in their order."""
+        return tuple(t.stand_in for t in self.terms if t.stand_in is not None)
+
+    @property
     def n_centers(self) -> int:
+        """Of the map."""
         return sum(len(n.centers) for n in self.networks)
 
     @property
@@ -356,6 +388,12 @@ class Model(_Frozen):
             else np.ones(0, bool)
         )
         return (every_t[seen], every_r[seen]) if seen.any() else (every_t, every_r)
+
+    def network_dph(
+        self, network: Network, temperature_c: ArrayLike, slope_c_per_min: ArrayLike
+    ) -> NDArray[np.float64]:
+        """One network alone, as a stand-in is: float64, deg/h; inputs as for the map."""
+        return self._network_dph(network, self.normalise(temperature_c, slope_c_per_min))
 
     def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:
         bias = network.w0 + z @ np.array(network.linear)

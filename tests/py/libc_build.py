@@ -34,7 +34,7 @@ def _table_struct() -> type[ctypes.Structure]:
     fields: list[Any] = [(name, u32) for name in integers.split()]
     fields += [("authority", u32 * 2), ("effect", u32 * 2), ("rezero", u32)]
     fields += [("scale", u32 * 3), ("envelope", u32 * 4)]
-    fields += [(name, u32) for name in ("n_networks", "n_centers", "n_channels", "n_terms")]
+    fields += [(name, u32) for name in ("n_networks", "n_stand_ins", "n_centers", "n_channels", "n_terms")]
     fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_sigma", u32), ("n_probes", u32)]
     fields += [(name, pointer) for name in ARRAYS]
     fields += [("crc", u32), ("term_code", pointer * 4)]
@@ -133,6 +133,7 @@ class Runtime:
             setattr(struct, name, words.ctypes.data if words.size else None)
             if width and name != "guards":
                 setattr(struct, f"n_{name}", words.size // width)
+        struct.n_networks, struct.n_stand_ins = table.n_networks, table.n_stand_ins
         for i, kind in enumerate(table.terms[:: ARRAYS["terms"]].tolist()):
             name = linked(f"gtc_{table.numeric}_term_{TERMS[kind]}")
             code = ctypes.c_char.in_dll(self.library, name)

@@ -98,8 +98,21 @@ def random_uncertainty(seed: int, n_terms: int = 0) -> Uncertainty:
     return Uncertainty(cells=cells, rows=grid(), uncovered=grid(), rules=rules)
 
 
+def random_stand_in(seed: int, size: float) -> Network:
+    """A network of up to four Gaussians anywhere near room temperature."""
+    rng = np.random.default_rng([seed, 5])
+    n = int(rng.integers(0, 5))
+    return Network(
+        w0=float(rng.normal(0.0, size)),
+        linear=(float(rng.normal(0.0, size)), float(rng.normal(0.0, size))),
+        centers=tuple(zip(rng.uniform(-40.0, 60.0, n).tolist(), rng.uniform(-3.0, 3.0, n).tolist(), strict=True)),
+        widths=tuple((float(w), None if rng.random() < 0.3 else 1.0) for w in rng.uniform(0.4, 3.0, n)),
+        weights=tuple(rng.normal(0.0, size, n).tolist()),
+    )
+
+
 def random_terms(seed: int) -> tuple[Term, ...]:
-    """One to four terms of any kind."""
+    """One to four terms of any kind, those of channels with stand-ins or without."""
     rng = np.random.default_rng([seed, 1])
     tau, amplitude = float(rng.uniform(15.0, 4000.0)), float(rng.normal(0.0, 0.01))
     every = (
@@ -125,11 +138,13 @@ def random_terms(seed: int) -> tuple[Term, ...]:
             id="auxiliary",
             parameters={"slope_dph_per_unit": amplitude, "reference": float(rng.normal(12.0, 3.0))},
             channel="supply_v",
+            stand_in=random_stand_in(seed, 0.01) if seed % 4 else None,
         ),
         Term(
             id="auxiliary",
             parameters={"slope_dph_per_unit": 0.1 * amplitude, "reference": 0.0},
             channel="magnetic_ut",
+            stand_in=random_stand_in(seed + 1, 0.01) if seed % 3 else None,
         ),
     )
     chosen = rng.permutation(len(every))[: int(rng.integers(1, 5))]
@@ -171,13 +186,16 @@ def with_memories(model: Model) -> Model:
 
 
 def bank_with_channels(model: Model) -> Model:
-    """The same network thrice with a hand-over, a harmonic, two auxiliary channels."""
+    """The same network thrice with a hand-over, a harmonic, two auxiliary channels, one with a stand-in."""
     wave = {"period_c": 11.0, "amplitude_dph": 0.0007, "phase_rad": 2.0}
     terms = (
         Term(id="path_length_periodicity", parameters=wave),
         Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.002, "reference": 0.25}, channel="supply_v"),
         Term(
-            id="auxiliary", parameters={"slope_dph_per_unit": -0.001, "reference": 0.0}, channel="magnetic_ut"
+            id="auxiliary",
+            parameters={"slope_dph_per_unit": -0.001, "reference": 0.0},
+            channel="magnetic_ut",
+            stand_in=random_stand_in(3, 0.001),
         ),
     )
     # Without a noise floor: fixed point costs nearly 1 % of the golden one, more than that with other terms.

@@ -143,7 +143,7 @@ def test_every_cause_of_a_table_does_there_what_it_does_in_the_simulation(id: st
     nothing = np.zeros_like(WAVE)
     outcome = TermOutcome(WAVE, nothing, nothing, np.zeros(WAVE.size, dtype=np.int32))
     table = term.table
-    channel = CourseChannel(WAVE, np.zeros(WAVE.size, dtype=np.int32))
+    channel = CourseChannel(WAVE, np.zeros(WAVE.size, dtype=np.int32), np.zeros(WAVE.size, dtype=np.bool_))
     table.recursion(values, 10.0).apply(course, channel, outcome)
     scene = Scene(TIME, TIME, WAVE, WAVE, WAVE, WAVE, 0.0)
     if term.cavity is not None:

@@ -29,7 +29,7 @@ _ARRAY_COMMENTS = {
     "centers": "T: center, gain; slope: center, gain; weight",
     "serial": "four characters of the serial a word, the first one lowest",
     "guards": "low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback",
-    "terms": "kind, channel, parameters",
+    "terms": "kind, channel + 65536 * number of the stand-in among the networks, parameters",
     "coverage": "one bit for each cell of T (fastest) and slope, low bit first",
     "sigma": "1 sigma of the compensated bias, a row for each cell of slope",
     "probes": "known answers: T, slope, bias, status",
@@ -83,6 +83,9 @@ def table_text(table: Table, model: Model) -> TableText:  # long: member after m
         members.append(_member(name, f"{{ {', '.join(group)} }}" if size > 1 else group[0]))
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
+        if name == "n_networks":
+            members += [_member(name, f"{table.n_networks}UL"), _member("n_stand_ins", f"{table.n_stand_ins}UL")]
+            continue
         text = ", ".join(f"{n}UL" for n in counts[name])
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
     arrays = []
@@ -125,11 +128,13 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
     """What a row of an array says in the units of the trade."""
     centers = [
         f"{t:.2f} C, {r:+.3f} C/min; widths {_width(d_t)}, {_width(d_r)}; {w:+.3e} deg/h"
-        for n in model.networks
+        for n in (*model.networks, *model.stand_ins)
         for (t, r), (d_t, d_r), w in zip(n.centers, n.widths, n.weights, strict=True)
     ]
     channels = ["temperature_c", *channel_names(model)]
-    return {"centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
+    stand_ins = [f"stands in for {term.channel}" for term in model.terms if term.stand_in is not None]
+    networks = [*[""] * len(model.networks), *stand_ins]
+    return {"networks": networks, "centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
 
 
 def _width(width: float | None) -> str:

@@ -42,7 +42,9 @@ def channel_at(
     remarks[1:] = np.where(clamped, CLAMPED, 0) | np.where(own.kind == KEEP, HELD, 0)
     fallen = 1 + np.flatnonzero(own.kind == FALLBACK)
     mean[fallen], remarks[fallen] = fallback, HELD | CHANNEL_LOST
-    return CourseChannel(mean[k + 1], remarks[k + 1])
+    is_away = np.zeros(own.at.size + 1, dtype=np.bool_)
+    is_away[0] = is_away[fallen] = True
+    return CourseChannel(mean[k + 1], remarks[k + 1], is_away[k + 1])
 
 
 def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[np.bool_]:

@@ -47,12 +47,18 @@ def table_of(model: Model) -> Table:
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     envelope = f32_words([t0, t1, r0 * per_block, r1 * per_block])
     _check_range(scale, envelope)
-    centers = [_centers(network, scale, per_block) for network in model.networks]
+    networks = (*model.networks, *model.stand_ins)
+    centers = [_centers(network, scale, per_block) for network in networks]
     heads = [
         np.concatenate([np.array([len(n.weights)], np.uint32), _head(n), _region(region, per_block)])
-        for n, region in zip(model.networks, regions(model), strict=True)
+        for n, region in zip(networks, regions(model), strict=True)
     ]
-    parts = _bound_parts(model, scale, envelope, centers, np.concatenate(heads))
+    of_map = len(model.networks)
+    parts = _bound_parts(model, scale, envelope, centers[:of_map], np.concatenate(heads[:of_map]))
+    stand_ins = [
+        _bound(*pair, scale, envelope, per_block)
+        for pair in zip(model.stand_ins, centers[of_map:], strict=True)
+    ]
     return Table(
         numeric="f32",
         **shared(model),
@@ -70,6 +76,7 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
+        stand_in_bounds_dph=tuple(math.fsum(bound.values()) for bound in stand_ins),
     )
 
 
@@ -83,7 +90,7 @@ def _bound_parts(
     """The error bound part by part, deg/h: of a bank the largest of its networks, and what the hand-over adds."""
     per_block = model.block_s / 60.0
     bounds = [
-        _bound(network, scale, envelope, own, per_block)
+        _bound(network, own, scale, envelope, per_block)
         for network, own in zip(model.networks, centers, strict=True)
     ]
     parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
@@ -227,7 +234,7 @@ def _blend(model: Model, scale: Words, envelope: Words) -> float:
 
 
 def _bound(
-    network: Network, scale: Words, envelope: Words, centers: NDArray[np.float32], per_block: float
+    network: Network, centers: NDArray[np.float32], scale: Words, envelope: Words, per_block: float
 ) -> dict[str, float]:
     """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
     largest = _largest(scale, envelope)

@@ -82,8 +82,8 @@ class _Ramps:
 
 
 def regions(model: Model) -> tuple[Envelope, ...]:
-    """Region of every network; the envelope where it is the only one."""
-    return tuple(n.region or model.envelope for n in model.networks)
+    """Region of every network, those of stand-ins last; the envelope where it has none of its own."""
+    return tuple(n.region or model.envelope for n in (*model.networks, *model.stand_ins))
 
 
 def handover_error_dph(
@@ -101,7 +101,7 @@ def handover_error_dph(
     Raises:
         CheckFailed: The regions leave a gap, only touch, or overlap by less than the arithmetic can tell.
     """
-    boxes = regions(model)
+    boxes = regions(model)[: len(model.networks)]
     pairs = ([b.temperature_c for b in boxes], [b.slope_c_per_min for b in boxes])
     limits = (model.envelope.temperature_c, model.envelope.slope_c_per_min)
     ramps = [_ramps(*given, numeric) for given in zip(axes, pairs, limits, strict=True)]

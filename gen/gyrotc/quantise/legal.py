@@ -95,9 +95,16 @@ def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
 
 
 def _terms(table: Table, limits: Limits) -> Iterator[str]:
-    width = ARRAYS["terms"] - 2
-    for record in table.terms.reshape(-1, ARRAYS["terms"]):
-        kind, channel = int(record[0]), int(record[1])
+    width, last = ARRAYS["terms"] - 2, table.n_networks
+    if last < 1:
+        yield "no network is left to the map"
+    for record, channel, stand_in in zip(
+        table.terms.reshape(-1, ARRAYS["terms"]), table.channels, table.stand_ins, strict=True
+    ):
+        kind = int(record[0])
+        last += stand_in != 0
+        if stand_in and (stand_in != last or channel == 0):
+            yield f"stand-in of a term is network {stand_in}"
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
         elif channel >= table.n_channels or (channel != 0) != (kind == TableKind.AUXILIARY):
@@ -111,7 +118,7 @@ def _regions(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
         edges = table.numbers(record[4:])
         for low, high in (edges[:2], edges[2:]):
             wide = high - low >= _WIDTH if table.numeric == "f32" else low < high
-            if not (wide or (len(records) == 1 and low <= high)):
+            if not (wide or (table.n_networks == 1 and low <= high)):
                 yield "region of a network has no width"
 
 

@@ -86,7 +86,8 @@ def table_of(model: Model) -> Table:
     per_block = model.block_s / 60.0
     envelope = _envelope(model, per_block)
     inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
-    surfaces = [surface_of(n, model.scale, per_block, inputs) for n in model.networks]
+    given = (*model.networks, *model.stand_ins)
+    surfaces = [surface_of(n, model.scale, per_block, inputs) for n in given]
     felt = [_felt(surface) for surface in surfaces]
     chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
     fraction = min(_fraction(surface) for surface in chosen)
@@ -100,12 +101,14 @@ def table_of(model: Model) -> Table:
     largest = max(_size(network.solved) for network in networks)
     frac_bits = _frac_bits(max(largest, abs(model.fallback_dph)) + term_size_dph(model))
     bounds = [_bound(network, inputs, frac_bits) for network in networks]
-    parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
-    if len(networks) > 1:
+    of_map, stand_ins = bounds[: len(model.networks)], bounds[len(model.networks) :]
+    parts = {part: max(bound[part] for bound in of_map) for part in bounds[0]}
+    if len(model.networks) > 1:
         axes = _axes(model, inputs, per_block)
         parts["hand-over"] = handover_error_dph(model, "q31", axes, share_step=_SHARE, share_error=0.0)
         parts["blend"] = 2.0**-frac_bits  # the quotient is rounded
-    return _table(model, envelope, inputs, networks, frac_bits, parts)
+    table = _table(model, envelope, inputs, networks, frac_bits, parts)
+    return replace(table, stand_in_bounds_dph=tuple(math.fsum(bound.values()) for bound in stand_ins))
 
 
 def _fixed(whole: Surface, part: Surface, keep: NDArray[np.bool_], fraction: int) -> _Fixed:
@@ -282,7 +285,8 @@ def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
 
     An input is moved to the middle of its cell, and by the rounding of the envelope to which both sides clamp.
     """
-    edges = np.array([_region(region, inputs, model) for region in regions(model)], dtype=np.float64)
+    boxes = regions(model)[: len(model.networks)]
+    edges = np.array([_region(region, inputs, model) for region in boxes], dtype=np.float64)
     t, r = (
         Axis(
             factor=unit * _INPUT * scale.per_unit,

@@ -46,9 +46,10 @@ def f32_terms(model: Model) -> Words:
     """Records in float32."""
     records = [_record(model, term) for term in model.terms]
     words = np.zeros((len(records), 2 + _PARAMETERS), dtype=np.uint32)
-    for row, (kind, channel, values) in zip(words, records, strict=True):
+    heads = _heads(model)
+    for row, head, (kind, _, values) in zip(words, heads, records, strict=True):
         scaled = [64.0 * values[0], *values[1:]] if kind == TableKind.WARM_UP else values
-        row[:2] = kind, channel
+        row[:2] = kind, head
         row[2 : 2 + len(values)] = f32_words(scaled)
     return words.reshape(-1)
 
@@ -68,9 +69,9 @@ def q31_terms(model: Model, frac_bits: int) -> Words:
         TableKind.AUXILIARY: (unit, 2.0**16),
     }
     words = np.zeros((len(model.terms), 2 + _PARAMETERS), dtype=np.uint32)
-    for row, term in zip(words, model.terms, strict=True):
-        kind, channel, values = _record(model, term)
-        row[:2] = kind, channel
+    for row, head, term in zip(words, _heads(model), model.terms, strict=True):
+        kind, _, values = _record(model, term)
+        row[:2] = kind, head
         for k, (value, scale) in enumerate(zip(values, scales[kind], strict=True)):
             wraps = kind == TableKind.HARMONIC and k == 1
             row[2 + k] = _whole(kind, term.id, value * scale, wraps=wraps)
@@ -86,6 +87,15 @@ def _whole(kind: TableKind, id: str, value: float, *, wraps: bool) -> int:
     if abs(whole) >= 2**31 or (abs(whole) >= _LIMIT and kind == TableKind.AUXILIARY):
         raise CheckFailed(f"q31: a parameter of term {id} leaves the range of 32 bits")
     return whole & 0xFFFFFFFF
+
+
+def _heads(model: Model) -> list[int]:
+    """Second words of the records: channel, and number of the stand-in among the networks in the upper half."""
+    heads, last = [], len(model.networks)
+    for term in model.terms:
+        last += term.stand_in is not None
+        heads.append(_record(model, term)[1] + 65536 * (last if term.stand_in is not None else 0))
+    return heads
 
 
 def _record(model: Model, term: Term) -> Record:

@@ -30,7 +30,7 @@ from ..frontend import (
 )
 from ..frontend.numbers import Numbers
 from ..terms.recursion import CourseChannel, TermOutcome
-from .maps import evaluate_map, governed
+from .maps import evaluate_map, governed, stand_in
 from .operations import recursions
 from .sigma import SigmaEvidence, evidence_of
 from .table import ARRAYS, Table, Words
@@ -128,9 +128,15 @@ def _outcome(
         return found
     course = replace(stream.course(steps, samples_per_block), temperature=seen)
     settings = settings_of(table, samples_per_block)
-    for recursion, channel in terms:
+    for recursion, channel, number in zip(terms, table.channels, table.stand_ins, strict=True):
         shown = _shown(table, settings, steps, stream, channels, channel) if channel else None
+        before = found.added
         recursion.apply(course, shown, found)
+        if shown is not None and number:
+            away = np.flatnonzero(shown.is_away & (steps.kind == MAP))
+            found.added[away] = before[away] + stand_in(
+                table, number, found.temperature[away], found.slope[away]
+            )
     return found
 
 

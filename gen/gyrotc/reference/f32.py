@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .table import ARRAYS, Table, Words
 
-__all__ = ["ENTRIES", "FUSIBLE", "Fused", "biases", "cells", "exp2_table", "gauss", "normalise"]
+__all__ = ["ENTRIES", "FUSIBLE", "Fused", "biases", "cells", "exp2_table", "gauss", "normalise", "stand_in"]
 
 Fused = frozenset[str]
 #: Sums of the map that take a product: the grid of the inputs, the linear part, the squared distance (either of its
@@ -100,8 +100,8 @@ def normalise(table: Table, x: NDArray[np.float32], fused: Fused = _NONE) -> Poi
 
 def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
     """Bits of the map's results."""
-    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
-    counts = table.networks.reshape(-1, ARRAYS["networks"])[:, 0].astype(np.int64)
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
+    counts = table.networks.reshape(-1, ARRAYS["networks"])[: table.n_networks, 0].astype(np.int64)
     if len(networks) == 1:
         return _network(table, networks[0], 0, int(counts[0]), points, fused).view(np.uint32)
     total, shares = np.zeros_like(points.z_t), np.zeros_like(points.z_t)
@@ -116,6 +116,13 @@ def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
     quotient = total / np.where(shares > 0, shares, _ONE)
     fallback = table.numbers([table.fallback])[0]
     return np.asarray(np.where(shares > 0, quotient, fallback)).view(np.uint32)
+
+
+def stand_in(table: Table, number: int, points: Points) -> NDArray[np.float32]:
+    """What the network of this number, from 1 on, makes of inputs."""
+    records = table.networks.reshape(-1, ARRAYS["networks"])
+    first, count = int(records[: number - 1, 0].sum()), int(records[number - 1, 0])
+    return _network(table, table.numbers(records[number - 1]), first, count, points, _NONE)
 
 
 def _network(

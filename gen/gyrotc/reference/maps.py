@@ -11,7 +11,7 @@ from ..status import CLAMPED, E_ARG, UNCOVERED
 from . import f32, q31
 from .table import MISSING_Q31, Table, Words
 
-__all__ = ["evaluate_map", "governed"]
+__all__ = ["evaluate_map", "governed", "stand_in"]
 
 
 def evaluate_map(
@@ -46,6 +46,21 @@ def evaluate_map(
     status = status | np.where(_is_covered(table, cells), 0, UNCOVERED)
     status = np.where(usable, status, E_ARG).astype(np.int32)
     return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
+
+
+def stand_in(table: Table, number: int, temperature: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
+    """What stands for a term whose channel is not known.
+
+    Args:
+        table: The table.
+        number: Of the stand-in among its networks, from 1 on.
+        temperature, slope: Inputs of the map, numbers of the arithmetic, shape (n,) each.
+    """
+    low, high = table.numbers(table.envelope).reshape(2, 2).T
+    x = np.minimum(np.maximum(np.stack([temperature, slope], axis=1), low), high)
+    if table.numeric == "f32":
+        return f32.stand_in(table, number, f32.normalise(table, x))
+    return q31.stand_in(table, number, q31.normalise(table, x))
 
 
 def governed(bounds: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:

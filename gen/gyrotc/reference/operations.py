@@ -104,12 +104,11 @@ class _Q31:
 _OPERATIONS: dict[str, Operations] = {"f32": _F32(), "q31": _Q31()}
 
 
-def recursions(table: Table) -> list[tuple[Recursion, int]]:
-    """The terms of a table, and the channel of each."""
+def recursions(table: Table) -> list[Recursion]:
+    """The terms of a table."""
     made = []
     for record in table.terms.reshape(-1, ARRAYS["terms"]):
         numbers = table.numbers(record[2:])
         parameters = list(numbers) if table.numeric == "f32" else [int(n) for n in numbers]
-        recursion = recursion_of(TableKind(int(record[0])), _OPERATIONS[table.numeric], parameters)
-        made.append((recursion, int(record[1])))
+        made.append(recursion_of(TableKind(int(record[0])), _OPERATIONS[table.numeric], parameters))
     return made

@@ -25,6 +25,7 @@ __all__ = [
     "exp2",
     "exp2_table",
     "normalise",
+    "stand_in",
 ]
 
 ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
@@ -81,7 +82,7 @@ def _position(x: Integers, low: int, gain: int) -> Integers:
 
 def biases(table: Table, points: Points) -> Words:
     """Bits of the map's results."""
-    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
     if len(networks) == 1:
         return _bits(_network(table, networks[0], 0, points))
     total: Integers = np.zeros_like(points.x_t)
@@ -94,6 +95,12 @@ def biases(table: Table, points: Points) -> Words:
         first += int(network[0])
     blended = divided(total, np.maximum(shares, 1))
     return _bits(np.where(shares > 0, blended, table.numbers([table.fallback])[0]))
+
+
+def stand_in(table: Table, number: int, points: Points) -> Integers:
+    """What the network of this number, from 1 on, makes of inputs."""
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
 
 
 def _bits(bias: Integers) -> Words:

@@ -93,10 +93,30 @@ class Table:
     probes: Words
     error_bound_dph: float  # |map - model| never exceeds it: arithmetic and input rounding, no terms
     bound_parts_dph: dict[str, float]  # what the bound is made of
+    stand_in_bounds_dph: tuple[float, ...] = ()  # the same of each stand-in alone
 
     @property
     def n_centers(self) -> int:
         return self.centers.size // ARRAYS["centers"]
+
+    @property
+    def stand_ins(self) -> tuple[int, ...]:
+        """Of every term the number of its stand-in among the networks, from 1 on; 0: it has none."""
+        return tuple(int(word) >> 16 for word in self.terms.reshape(-1, ARRAYS["terms"])[:, 1])
+
+    @property
+    def n_stand_ins(self) -> int:
+        return sum(number != 0 for number in self.stand_ins)
+
+    @property
+    def n_networks(self) -> int:
+        """Networks of the map; the stand-ins stand behind them."""
+        return self.networks.size // ARRAYS["networks"] - self.n_stand_ins
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """Channel of every term; 0: the temperature."""
+        return tuple(int(word) & 0xFFFF for word in self.terms.reshape(-1, ARRAYS["terms"])[:, 1])
 
     @property
     def n_channels(self) -> int:
@@ -142,7 +162,7 @@ class Table:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
         pointers = len(ARRAYS) + 4  # arrays, code of terms
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
-        return 4 * (len(self.header) - 1 + pointers + 1 + arrays)
+        return 4 * (len(self.header) - 1 + pointers + 2 + arrays)  # not the length; CRC and number of stand-ins
 
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""

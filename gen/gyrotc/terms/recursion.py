@@ -58,10 +58,12 @@ class CourseChannel:
     Attributes:
         mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
         remarks: Status bits: held, lost, clamped, shape (n,).
+        is_away: Where nothing of it is believed, so that something stands for it, shape (n,).
     """
 
     mean: Numbers
     remarks: NDArray[np.int32]
+    is_away: NDArray[np.bool_]
 
 
 @dataclass(slots=True)

@@ -118,9 +118,9 @@ def _numbers(model: Model, table: Table) -> Iterator[str]:
     yield f"{low_r} {high_r} {gain_r} {r0 * per_block!r} {r1 * per_block!r} 0.0 {half_r * per_block!r}"
     yield f"{narrow} {' '.join(str(int(e)) for e in exp2_table())}"
     network = model.networks[0]
-    _, w0, linear_t, linear_r, *_ = table.numbers(table.networks).tolist()
-    yield f"{w0} {linear_t} {linear_r} {table.n_centers} {len(network.weights)}"
-    for record in table.numbers(table.centers).reshape(-1, 5).tolist():
+    own, w0, linear_t, linear_r, *_ = table.numbers(table.networks).tolist()
+    yield f"{w0} {linear_t} {linear_r} {own} {len(network.weights)}"
+    for record in table.numbers(table.centers).reshape(-1, 5)[:own].tolist():
         yield " ".join(map(str, record))
     yield f"{table.coverage_cells[0]} {table.coverage_cells[1]}"
     yield " ".join(str(int(word)) for word in table.coverage)
