@@ -28,6 +28,7 @@ from .guards import channel_guard
 from .parts import Parts, PartsTrial, chosen_parts
 from .process import Process, TrainingFailed, conditioned, fit_process
 from .rules import start_sigma
+from .stand_ins import stand_in_of
 
 __all__ = ["ChannelChoice", "channel_shown", "chosen_channels", "seen_by_target", "with_channels"]
 
@@ -53,12 +54,14 @@ class ChannelChoice:
         trial: What was tried on history left out.
         references: Mean of each chosen channel in training, in its unit.
         added: What the chosen ones add at every training sample, deg/h.
+        effects: The same of each alone; NaN where the channel is not known.
         rows: Every candidate and every channel that is none.
     """
 
     trial: PartsTrial
     references: Mapping[str, float]
     added: Floats
+    effects: Mapping[str, Floats]
     rows: tuple[ChannelTried, ...]
 
 
@@ -130,7 +133,8 @@ def chosen_channels(
     parts = {n: inputs[n] @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
     rows = [_row(n, trial, parts, samples, against[n], alike.get(n, {})) for n in columns]
-    return ChannelChoice(trial, {n: references[n] for n in trial.chosen}, added, tuple(rows))
+    effects = {n: np.where(np.isfinite(columns[n]), part, np.nan) for n, part in parts.items()}
+    return ChannelChoice(trial, {n: references[n] for n in trial.chosen}, added, effects, tuple(rows))
 
 
 def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingData, scaling: Scaling) -> str:
@@ -226,23 +230,30 @@ def _row(
 def with_channels(
     model: Model, choice: ChannelChoice, runs: Sequence[Run], samples: TrainingData, missing_s: float
 ) -> Model:
-    """The model with a term, a guard and an uncertainty for every chosen channel.
+    """The model with a term, a stand-in for it, a guard and an uncertainty for every chosen channel.
 
     `samples`: those that the map was trained on, without what the channels add.
     """
     cause = next(c for c in CATALOGUE.values() if c.needs.channel and c.table is not None)
     assert cause.amplitudes is not None
     terms: list[dict[str, Any]] = []
-    sigmas = []
+    sigmas, stood = [], np.zeros(len(samples))
     content = model.to_dict()
     rules = content["uncertainty_dph"]["rules"] if content["uncertainty_dph"] else {}
     for name in choice.trial.chosen:
         values = cause.amplitudes(choice.trial.weights[name]) | {"reference": choice.references[name]}
         terms.append({"id": cause.id, "parameters": values, "channel": name})
-        readings = np.concatenate([run.rows().channel(name) for run in runs])
-        sigmas.append(start_sigma(cause.id, values, rules, samples, readings))
+        stand_in = stand_in_of(model, samples, choice.effects[name])
+        if stand_in is None:
+            readings = np.concatenate([run.rows().channel(name) for run in runs])
+            sigmas.append(start_sigma(cause.id, values, rules, samples, readings))
+            continue
+        terms[-1]["stand_in"] = stand_in.network
+        sigmas.append(stand_in.sigma_dph)
+        stood += stand_in.added
     if rules:
         rules["terms"] = sigmas
     guards = {name: channel_guard(runs, name, missing_s) for name in sorted(choice.trial.chosen)}
-    effects = [min(0.0, float(choice.added.min())), max(0.0, float(choice.added.max()))]
+    both = np.concatenate([choice.added, stood])
+    effects = [min(0.0, float(both.min())), max(0.0, float(both.max()))]
     return Model.from_dict({**content, "terms": terms, "guards": guards, "effects_dph": effects})

@@ -44,6 +44,7 @@ from .lot.earlier import EarlierPrior, known_map
 from .lot.means import unit_means
 from .lot.prior import prior_of
 from .noisefloor import noise_terms, sensitivities, stretches
+from .result import snapped
 from .rules import rezero_dph
 from .spans import Span, training_spans
 
@@ -71,7 +72,6 @@ _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
 _UNCERTAINTY_CELLS = (8, 5)
 _MEANS_DIGITS = 8  # of gathered means: a bias may be a million times its noise
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
-_CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 
@@ -346,7 +346,7 @@ def model_of(  # long: one line for each field of model.json
             "scale": fitted.scale,
             "envelope": fitted.envelope,
             "coverage": coverage(data, fitted, _COVERAGE_CELLS),
-            "networks": [_snapped(n, fitted.scale) for n in _joined(fitted, bumps)],
+            "networks": [snapped(n, fitted.scale) for n in _joined(fitted, bumps)],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
             "stuck_s": front.stuck_s,
@@ -382,23 +382,6 @@ def _joined(fitted: Fit, bumps: Bumps | None) -> Sequence[Mapping[str, Any]]:
     if bumps is None:
         return fitted.networks
     return [bumps.beside(network, fitted.scaling.half_range_c) for network in fitted.networks]
-
-
-def _snapped(network: Mapping[str, Any], scale: Mapping[str, Any]) -> dict[str, Any]:
-    """Centers on multiples of 2^-20 of the scale, so that tables hold them without further rounding.
-
-    It moves a center by less than 5e-7 half ranges, far below what the data can tell; the model is what is stored.
-    """
-    (center, half), slope = scale["temperature_c"], scale["slope_c_per_min"]
-    centers = [
-        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)]
-        for t, r in network["centers"]
-    ]
-    return dict(network) | {"centers": centers}
-
-
-def _on_grid(z: float) -> float:
-    return round(z * _CENTER_GRID) / _CENTER_GRID
 
 
 def _earth_rate(dataset: Dataset) -> str:

@@ -17,10 +17,12 @@ from .process import Process
 if TYPE_CHECKING:
     from .lot.prior import MapPosterior
 
-__all__ = ["Fit", "Outcome", "network", "networks_dph", "predict"]
+__all__ = ["Fit", "Outcome", "network", "networks_dph", "predict", "rescaled", "snapped"]
 
 Floats = NDArray[np.float64]
 Network = Mapping[str, Any]
+
+_CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +142,39 @@ def network(
         "widths": np.asarray(widths, dtype=np.float64).tolist(),
         "weights": np.asarray(weights, dtype=np.float64).tolist(),
         "region": None,
+    }
+
+
+def snapped(network: Network, scale: Mapping[str, Any]) -> dict[str, Any]:
+    """A network with its centers on multiples of 2^-20 of a scale, so that tables hold them without further rounding.
+
+    It moves a center by less than 5e-7 half ranges, far below what the data can tell; the model is what is stored.
+    """
+    (center, half), slope = scale["temperature_c"], scale["slope_c_per_min"]
+    centers = [
+        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)]
+        for t, r in network["centers"]
+    ]
+    return {**network, "centers": centers}
+
+
+def _on_grid(z: float) -> float:
+    return round(z * _CENTER_GRID) / _CENTER_GRID
+
+
+def rescaled(network: Network, old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """The same function of temperature and its rate in another scale: linear part and widths count half ranges."""
+    (c_old, h_old), (c_new, h_new) = old["temperature_c"], new["temperature_c"]
+    wider = (h_new / h_old, new["slope_c_per_min"] / old["slope_c_per_min"])
+    linear_t, linear_r = network["linear"]
+    return {
+        **network,
+        "w0": network["w0"] + linear_t * (c_new - c_old) / h_old,
+        "linear": [linear_t * wider[0], linear_r * wider[1]],
+        "widths": [
+            [None if w is None else w / k for w, k in zip(pair, wider, strict=True)]
+            for pair in network["widths"]
+        ],
     }
 
 

@@ -23,7 +23,7 @@ from .process import Process, fit_process
 from .result import Fit, predict
 from .rules import Known, rules_of
 
-__all__ = ["coverage", "uncertainty"]
+__all__ = ["coverage", "of_few", "uncertainty"]
 
 Floats = NDArray[np.float64]
 
@@ -184,7 +184,7 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
     best, its_scale, between = min(found)
     if plain - best <= _SIGNIFICANT:
         return scale, 0.0
-    return its_scale, float(between) * _of_few(len(rows))
+    return its_scale, float(between) * of_few(len(rows))
 
 
 def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float) -> tuple[float, float]:
@@ -202,7 +202,7 @@ def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float)
     return least, scale
 
 
-def _of_few(runs: int) -> float:
+def of_few(runs: int) -> float:
     """Variance of the next run over that of so many: of Student's t with a degree of freedom less than runs."""
     return (runs - 1.0) / max(runs - 3.0, 1.0)
 
