@@ -75,7 +75,6 @@ typedef struct {
     gtc_word_t scale[3];           /* C, 1/C, block/C: center of T, gain of T, gain of slope */
     gtc_word_t envelope[4];        /* C, C, C/block, C/block: T min, max; slope min, max */
     uint_least32_t n_networks;     /* of the map: 1, or more where GTC_WITH_BANK */
-    uint_least32_t n_stand_ins;    /* networks behind these: what terms add while their channels are lost */
     uint_least32_t n_centers;      /* of all networks together */
     uint_least32_t n_channels;     /* 1 + auxiliary channels */
     uint_least32_t n_terms;        /* 0 ... GTC_MAX_TERMS */
@@ -83,6 +82,7 @@ typedef struct {
     uint_least32_t sigma_cells[2];    /* the same for the uncertainty; 0, 0: none */
     uint_least32_t n_sigma;           /* words of the uncertainty: 0, or 2 grids, GTC_SIGMA_RULES, one a term */
     uint_least32_t n_probes;          /* known answers */
+    uint_least32_t n_stand_ins;       /* networks behind those of the map, each for a term whose channel is lost */
     const gtc_word_t *serial;      /* [GTC_SERIAL_WORDS], as given by the gyro's maker */
     const gtc_word_t *networks;    /* [n_networks + n_stand_ins][GTC_NETWORK_WORDS] */
     const gtc_word_t *centers;     /* [n_centers][GTC_CENTER_WORDS] */
@@ -114,7 +114,6 @@ typedef struct {
                                       in larger units (docs/numerics.md) */
     int_least32_t envelope[4];     /* 2^-16 C, 2^-16 C per block */
     uint_least32_t n_networks;
-    uint_least32_t n_stand_ins;
     uint_least32_t n_centers;
     uint_least32_t n_channels;
     uint_least32_t n_terms;
@@ -122,6 +121,7 @@ typedef struct {
     uint_least32_t sigma_cells[2];
     uint_least32_t n_sigma;
     uint_least32_t n_probes;
+    uint_least32_t n_stand_ins;
     const gtc_word_t *serial;
     const gtc_word_t *networks;
     const gtc_word_t *centers;

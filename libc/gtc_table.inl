@@ -183,7 +183,7 @@ static int FN(terms_fit)(const TABLE *table)
 static int FN(is_readable)(const TABLE *table)
 {
     return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
-            && FN(grids_fit)(table) && FN(centers_fit)(table) && FN(terms_fit)(table)) ? 1 : 0;
+            && FN(grids_fit)(table) && FN(terms_fit)(table) && FN(centers_fit)(table)) ? 1 : 0;
 }
 
 /* The constant correction is one that the table may give. */

@@ -68,11 +68,11 @@ TEST(changed_members_are_found)
 /* Counts of arrays whose end nothing can check are left out: in an image its length checks them. */
 TEST(every_flipped_bit_of_a_member_is_found)
 {
-    const size_t more[2] = {offsetof(table_t, n_centers), offsetof(table_t, n_terms)};
+    const size_t more[3] = {offsetof(table_t, n_centers), offsetof(table_t, n_terms), offsetof(table_t, n_stand_ins)};
     const size_t settings = offsetof(table_t, n_networks) / sizeof(uint_least32_t);
     size_t i;
 
-    for (i = 0U; i < ((settings + 2U) * 32U); i++) {
+    for (i = 0U; i < ((settings + 3U) * 32U); i++) {
         const size_t word = i / 32U;
         table_t table = TABLE;
         unsigned char *const at = (unsigned char *)&table

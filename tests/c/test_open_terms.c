@@ -32,6 +32,39 @@ TEST(terms_open_where_their_code_is)
     CHECK_INT(GTC_E_LAYOUT, try_open(n));
 }
 
+#if GTC_OPEN_TERMS
+TEST(an_image_whose_terms_name_other_networks_is_refused)
+{
+    const uint_least32_t n = image_of(&TERMS, image);
+    const uint_least32_t terms = n - 1U - (TERMS.n_probes * 4U) - TERMS.n_sigma - (TERMS.n_terms * 8U);
+    gtc_word_t *const head = &image[terms + (3U * GTC_TERM_WORDS) + 1U];
+    uint_least32_t number;
+    uint_least32_t i;
+    table_t table;
+
+    for (number = 1U; number <= 0xFFFFU; number += (number < 32U) ? 1U : 0x7FFU) {
+        head->bits = 1U + (number << 16);
+        CHECK_INT((number == 2U) ? GTC_OK : GTC_E_LAYOUT, try_open(n));
+    }
+    /* No stand-in: then both networks are the map's. */
+    head->bits = 1U;
+    CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, try_open(n));
+    head->bits = 1U + (2UL << 16);
+    for (i = 0U; i < 3U; i++) {
+        gtc_word_t *const other = &image[terms + (i * GTC_TERM_WORDS) + 1U];
+
+        other->bits = 2UL << 16;
+        CHECK_INT(GTC_E_LAYOUT, try_open(n));
+        other->bits = 0U;
+    }
+    CHECK_INT(GTC_OK, try_open(n));
+    CHECK_INT(GTC_OK, FN(open)(&table, image, n, TERMS.id));
+    CHECK((table.n_networks == 1U) && (table.n_stand_ins == 1U));
+    image[24].bits = 1U; /* networks: with its CRC, but the length does not fit any more */
+    CHECK_INT(GTC_E_IMAGE, try_open(n));
+}
+#endif
+
 TEST(more_terms_than_there_is_room_for_are_refused)
 {
     const uint_least32_t n = image_of(&TERMS, image) + 8U;
@@ -49,6 +82,9 @@ TEST(more_terms_than_there_is_room_for_are_refused)
 int main(void)
 {
     RUN(terms_open_where_their_code_is);
+#if GTC_OPEN_TERMS
+    RUN(an_image_whose_terms_name_other_networks_is_refused);
+#endif
     RUN(more_terms_than_there_is_room_for_are_refused);
     return test_end();
 }

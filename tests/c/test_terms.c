@@ -271,10 +271,94 @@ TEST(no_reading_makes_a_correction_that_is_no_number)
 }
 #endif
 
-TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
+/* The test table, where the guard's fallback stands for the channel. */
+static table_t without_stand_in(gtc_word_t terms[4U * GTC_TERM_WORDS])
 {
+    table_t table = TERMS;
+
+    memcpy(terms, TERMS.terms, 4U * GTC_TERM_WORDS * sizeof terms[0]);
+    terms[(3U * GTC_TERM_WORDS) + 1U].bits = 1U;
+    table.terms = terms;
+    table.n_stand_ins = 0U;
+    table.n_centers = TERMS.networks[0].bits;
+    return table;
+}
+
+/* The stand-in of the test table's channel, as a map. */
+static table_t stand_in_alone(void)
+{
+    table_t table = TERMS;
+
+    table.networks = &TERMS.networks[GTC_NETWORK_WORDS];
+    table.centers = &TERMS.centers[TERMS.networks[0].bits * GTC_CENTER_WORDS];
+    table.n_stand_ins = 0U;
+    table.n_centers = table.networks[0].bits;
+    return table;
+}
+
+TEST(a_stand_in_is_added_while_nothing_of_its_channel_is_believed)
+{
+    const table_t alone = stand_in_alone();
+    const num_t plain = map_with(&TERMS, C(15.0));
+    const num_t instead = plain + map_with(&alone, C(15.0));
     state_t a = started_with(&TERMS);
     state_t b = started_with(&TERMS);
+
+    CHECK(!same(plain, instead));
+    (void)samples(&a, C(15.0), MISSING, 2001);
+    CHECK_INT(GTC_HELD | GTC_CHANNEL_LOST, status_of(&a));
+    CHECK(same(instead, bias_of(&a)));
+    /* It comes back: the term is there again. Then it stays away, held first. */
+    (void)samples(&a, C(15.0), C(12.0), (int)N);
+    CHECK_INT(GTC_OK, status_of(&a));
+    CHECK(same(plain, bias_of(&a)));
+    (void)samples(&a, C(15.0), MISSING, (int)(4U * N));
+    CHECK_INT(GTC_HELD, status_of(&a));
+    CHECK(same(plain, bias_of(&a)));
+    (void)samples(&a, C(15.0), MISSING, (int)N);
+    CHECK(same(instead, bias_of(&a)));
+    /* And at another temperature. */
+    (void)samples(&b, C(40.0), MISSING, 2001);
+    CHECK(same(map_with(&TERMS, C(40.0)) + map_with(&alone, C(40.0)), bias_of(&b)));
+}
+
+TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    gtc_word_t *const head = &terms[(3U * GTC_TERM_WORDS) + 1U];
+    table_t table = without_stand_in(terms);
+    state_t state;
+
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    table.n_centers = TERMS.n_centers;
+    table.n_stand_ins = 1U;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U + (2UL << 16);
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U + (1UL << 16); /* the map's own */
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U + (3UL << 16);
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U + (0xFFFFUL << 16);
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U;
+    terms[1].bits = 2UL << 16; /* of a term without a channel */
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    terms[1].bits = 0U;
+    head->bits = 1U + (2UL << 16);
+    table.n_networks = 0U;
+    table.n_stand_ins = 2U;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    table.n_networks = 0xFFFFFFFFUL;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+}
+
+TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    const table_t table = without_stand_in(terms);
+    state_t a = started_with(&table);
+    state_t b = started_with(&table);
 
     (void)samples(&a, C(15.0), C(14.0), 401);
     (void)samples(&b, C(15.0), C(12.5), 401);
@@ -291,8 +375,10 @@ TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
 
 TEST(a_channel_that_never_came_is_taken_as_its_fallback)
 {
-    state_t a = started_with(&TERMS);
-    state_t b = started_with(&TERMS);
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    const table_t table = without_stand_in(terms);
+    state_t a = started_with(&table);
+    state_t b = started_with(&table);
 
     (void)samples(&a, C(15.0), MISSING, 41);
     (void)samples(&b, C(15.0), C(12.5), 41);
@@ -532,6 +618,8 @@ int main(void)
 #if !TEST_Q31
     RUN(no_reading_makes_a_correction_that_is_no_number);
 #endif
+    RUN(a_stand_in_is_added_while_nothing_of_its_channel_is_believed);
+    RUN(networks_that_no_term_names_or_that_are_not_there_are_refused);
     RUN(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own);
     RUN(a_channel_that_never_came_is_taken_as_its_fallback);
     RUN(a_wrong_first_conversion_leaves_no_trace_in_the_terms);

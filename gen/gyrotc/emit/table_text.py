@@ -83,11 +83,10 @@ def table_text(table: Table, model: Model) -> TableText:  # long: member after m
         members.append(_member(name, f"{{ {', '.join(group)} }}" if size > 1 else group[0]))
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
-        if name == "n_networks":
-            members += [_member(name, f"{table.n_networks}UL"), _member("n_stand_ins", f"{table.n_stand_ins}UL")]
-            continue
         text = ", ".join(f"{n}UL" for n in counts[name])
+        text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts the stand-ins, too
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
+    members.append(_member("n_stand_ins", f"{table.n_stand_ins}UL"))
     arrays = []
     kinds: list[int] = []
     for name, length in _array_lengths(counts).items():

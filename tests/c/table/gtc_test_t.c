@@ -1,7 +1,7 @@
 /* gtc_test_t.c - bias table of gyro TEST-T. Written by gyrotc; do not edit.
  *
  * Make again:  gyrotc emit model.json --out .
- * Model:       sha256 ece8d2ab954afa0ec74d872aac0fa0a9e6ef7ef059eca0009e17bb6f0fd2fcab
+ * Model:       sha256 c24b36fa44754e0c385adc70f5397d3585ed4feec00487c7e3320198c869d125
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
  */
@@ -26,15 +26,17 @@ static const gtc_word_t f32_serial[16] = {
 };
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
-static const gtc_word_t f32_networks[8] = {
+static const gtc_word_t f32_networks[16] = {
     B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
+    B(0x1UL), V(0.0625F), V(0.25F), V(-0.125F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F), /* stands in for supply_v */
 };
 
 /* T: center, gain; slope: center, gain; weight */
-static const gtc_word_t f32_centers[15] = {
+static const gtc_word_t f32_centers[20] = {
     V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    V(-0.125F), V(19.2179585F), V(0.0F), V(0.0F), V(0.375F), /* 15.00 C, +0.500 C/min; widths 0.500, infinite; +3.750e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -43,12 +45,12 @@ static const gtc_word_t f32_guards[16] = {
     V(9.0F), V(15.0F), V(2.0F), V(0.0F), B(0x0UL), B(0x0UL), B(0x4UL), V(12.5F), /* supply_v */
 };
 
-/* kind, channel, parameters */
+/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
 static const gtc_word_t f32_terms[32] = {
     B(0x1UL), B(0x0UL), V(0.221199214F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* cavity_lag */
     B(0x2UL), B(0x0UL), V(2.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* hysteresis */
     B(0x3UL), B(0x0UL), V(9.23324871F), V(0.475614727F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* warm_up */
-    B(0x5UL), B(0x1UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
+    B(0x5UL), B(0x20001UL), V(0.125F), V(12.0F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* auxiliary */
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
@@ -102,13 +104,14 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
     .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
     .n_networks = 1UL,
-    .n_centers = 3UL,
+    .n_centers = 4UL,
     .n_channels = 2UL,
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 19UL,
     .n_probes = 8UL,
+    .n_stand_ins = 1UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -117,7 +120,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .coverage = NULL,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x672bb996UL,
+    .crc = 0xaf383b86UL,
     .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
 };
 
@@ -131,15 +134,17 @@ static const gtc_word_t q31_serial[16] = {
 };
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
-static const gtc_word_t q31_networks[8] = {
+static const gtc_word_t q31_networks[16] = {
     B(0x3UL), B(0xffc006e7UL), B(0x01fffdf0UL), B(0xfefffe6eUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x1UL), B(0xffdfffeaUL), B(0x0100002aUL), B(0xff800000UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL), /* stands in for supply_v */
 };
 
 /* T: center, gain; slope: center, gain; weight */
-static const gtc_word_t q31_centers[15] = {
+static const gtc_word_t q31_centers[20] = {
     B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x017fff90UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
     B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfd7ffd56UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
     B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x009ffec0UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00004cdfUL), B(0xde5e9739UL), B(0x00000000UL), B(0x00000000UL), B(0x00c00024UL), /* 15.00 C, +0.500 C/min; widths 0.500, infinite; +3.750e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -148,12 +153,12 @@ static const gtc_word_t q31_guards[16] = {
     B(0x00090000UL), B(0x000f0000UL), B(0x00020000UL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x4UL), B(0x000c8000UL), /* supply_v */
 };
 
-/* kind, channel, parameters */
+/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
 static const gtc_word_t q31_terms[32] = {
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
     B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
     B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x00f383c6UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
-    B(0x5UL), B(0x1UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
+    B(0x5UL), B(0x20001UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
@@ -207,13 +212,14 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
-    .n_centers = 3UL,
+    .n_centers = 4UL,
     .n_channels = 2UL,
     .n_terms = 4UL,
     .coverage_cells = { 0UL, 0UL },
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 19UL,
     .n_probes = 8UL,
+    .n_stand_ins = 1UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -222,7 +228,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .coverage = NULL,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0xd3977209UL,
+    .crc = 0x71b86a71UL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
 };
 
