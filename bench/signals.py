@@ -30,7 +30,7 @@ from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, 
 from gyrotc.train.parts import Parts, chosen_parts
 from numpy.typing import NDArray
 
-__all__ = ["section", "world"]
+__all__ = ["rms_of", "scenario_of", "section", "without", "world"]
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ comparisons). Median over the worlds.
 """
 
 
-def _scenario(seed: int) -> str:
+def scenario_of(seed: int) -> str:
     """A gyro of its own on the ground of `signals`."""
     rng = np.random.default_rng([seed, 14])
     _, plan = read("signals")
@@ -122,7 +122,7 @@ def _scenario(seed: int) -> str:
 
 def world(seed: int, folder: Path) -> dict[str, Any]:
     """Figures of one gyro."""
-    (folder / "world.toml").write_text(_scenario(seed), "utf-8")
+    (folder / "world.toml").write_text(scenario_of(seed), "utf-8")
     simulate(folder / "world.toml", seed=seed, out=folder / "data")
     whole = load(folder / "data")
     dataset = replace(whole, channels=tuple(n for n in whole.channels if not n.startswith("useless")))
@@ -137,16 +137,16 @@ def world(seed: int, folder: Path) -> dict[str, Any]:
     extra = [row.name for row in beside.training.channels or () if row.verdict == "taken"]
     rows = [run.rows() for run in exam]
     lost = {
-        name: _rms(fitted.model, [_without(r, name) for r in rows], folder)
+        name: rms_of(fitted.model, [without(r, name) for r in rows], folder)
         for name in dataset.channels
         if any(name in one.split(" - ") for one in taken)
     }
     return {
         "seed": seed,
         "oracle": float(np.sqrt(np.mean(noise**2))),
-        "plain": _rms(plain, rows, folder),
-        "channels": _rms(fitted.model, rows, folder),
-        "useless": _rms(beside.model, rows, folder),
+        "plain": rms_of(plain, rows, folder),
+        "channels": rms_of(fitted.model, rows, folder),
+        "useless": rms_of(beside.model, rows, folder),
         "useless_taken": sum(name.startswith("useless") for name in extra),
         "taken": taken,
         "lost": lost,
@@ -156,11 +156,11 @@ def world(seed: int, folder: Path) -> dict[str, Any]:
     }
 
 
-def _without(rows: Rows, name: str) -> Rows:
+def without(rows: Rows, name: str) -> Rows:
     return replace(rows, channels={**rows.channels, name: np.full(len(rows), np.nan)})
 
 
-def _rms(model: Model, runs: list[Rows], folder: Path) -> float:
+def rms_of(model: Model, runs: list[Rows], folder: Path) -> float:
     """RMS of 100-s means of rows of 10 s, without the first, in which the front end starts."""
     model.save(folder / "model.json")
     applied = applied_of(folder / "model.json")

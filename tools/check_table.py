@@ -119,6 +119,10 @@ class Model:
     def channels(self) -> list[str]:
         return sorted({term["channel"] for term in self.raw["terms"] if term.get("channel")})
 
+    def stand_ins(self) -> list[dict[str, Any]]:
+        """Networks that stand for terms whose channels are lost."""
+        return [term["stand_in"] for term in self.raw["terms"] if term.get("stand_in")]
+
     def temperature_guard(self) -> dict[str, float]:
         raw = self.raw
         return {
@@ -207,6 +211,19 @@ class Image:
 
     def bias(self, temperature: float, slope: float) -> float:
         """The equation of docs/numerics.md with the table's words, without the target's rounding."""
+        point, limits = self.point(temperature, slope)
+        shares, parts = [], []
+        stand_ins = sum(word >> 16 != 0 for word in self.array["terms"][1::8])
+        for head, centers in list(self.networks())[: self.one("n_networks") - stand_ins]:
+            regions = ((head[4], head[5]), (head[6], head[7]))
+            share = min(share_in(*edge) for edge in zip(point, regions, limits, strict=True))
+            if share > 0.0:
+                shares.append(share)
+                parts.append(share * self.of_network(head, centers, point))
+        return self.to_dph(math.fsum(parts) / math.fsum(shares))
+
+    def point(self, temperature: float, slope: float) -> tuple[Any, Any]:
+        """Inputs as the networks see them, and the envelope's edges."""
         e, s = self.member["envelope"], self.member["scale"]
         if self.numeric == "f32":
             point = (min(max(temperature, e[0]), e[1]), min(max(slope, e[2]), e[3]))
@@ -215,14 +232,7 @@ class Image:
             t, r = (min(max(round(v * 65536.0), e[k]), e[k + 1]) for v, k in ((temperature, 0), (slope, 2)))
             point = (((t - e[0]) * s[0]) >> 27, ((r - e[2]) * s[1]) >> 27)
             limits = ((0, 65535), (0, 65535))
-        shares, parts = [], []
-        for head, centers in self.networks():
-            regions = ((head[4], head[5]), (head[6], head[7]))
-            share = min(share_in(*edge) for edge in zip(point, regions, limits, strict=True))
-            if share > 0.0:
-                shares.append(share)
-                parts.append(share * self.of_network(head, centers, point))
-        return self.to_dph(math.fsum(parts) / math.fsum(shares))
+        return point, limits
 
     def networks(self) -> Iterator[tuple[list[float], list[list[float]]]]:
         """Record and centers of every network."""
@@ -299,7 +309,9 @@ def source_words(text: str, numeric: str) -> list[int]:
     if struct_text is None:
         raise Unreadable(f"no {numeric} table in the C source")
     members = dict(re.findall(r"^\s*\.(\w+) = (.*?),?$", struct_text[1], re.M))
-    words = [word for entry in HEAD for word in constants(members[entry.partition(":")[0]])]
+    found = {entry: constants(members[entry.partition(":")[0]]) for entry in HEAD}
+    found["n_networks"][0] += constants(members["n_stand_ins"])[0]
+    words = [word for entry in HEAD for word in found[entry]]
     for name in ARRAYS:
         if members[name] != "NULL":
             array = re.search(rf"gtc_word_t {members[name]}\[(\d+)\] = \{{(.*?)\n\}};", text, re.S)
@@ -345,7 +357,7 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
         "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))],
         "calibrated": [calibrated(raw["meta"])], "block_us": [round(raw["block_s"] * 1e6)],
         "slope_blocks": [raw["slope_blocks"]], "lead_blocks": [raw["lead_blocks"]],
-        "n_networks": [len(raw["networks"])],
+        "n_networks": [len(raw["networks"]) + len(model.stand_ins())],
         "n_channels": [1 + len(model.channels())], "n_terms": [len(raw["terms"])],
         "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
         "sigma_cells": (raw["uncertainty_dph"] or {"cells": [0, 0]})["cells"],
@@ -460,8 +472,8 @@ def check_header(model: Model, image: Image, name: str, header: str) -> Iterator
         "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
         "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
         "N_CHANNELS": 1 + len(model.channels()),
-        # 13 pointers; neither magic nor arithmetic and length
-        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 10),
+        # 13 pointers, number of stand-ins; neither magic nor arithmetic and length
+        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 11),
     }  # fmt: skip
     if image.numeric == "q31":
         whole["Q31_BIAS_FRAC_BITS"] = image.one("bias_frac_bits")
@@ -504,7 +516,7 @@ def check_regions(model: Model, image: Image) -> Iterator[str]:
     """Where the networks of a bank hold."""
     e, s = image.member["envelope"], image.member["scale"]
     whole = {"temperature_c": model.t_range, "slope_c_per_min": model.r_range}
-    for network, (head, _) in zip(model.raw["networks"], image.networks(), strict=True):
+    for network, (head, _) in zip([*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True):
         region = network["region"] or whole
         edges = [*region["temperature_c"], *(r * model.per_block for r in region["slope_c_per_min"])]
         for k, (got, edge) in enumerate(zip(head[4:], edges, strict=True)):
@@ -521,9 +533,13 @@ def check_terms(model: Model, image: Image) -> Iterator[str]:
     unit = 2.0 ** image.one("bias_frac_bits")
     scales = {1: (2.0**31, unit, 2.0**24), 2: (2.0**16, unit), 3: (2.0**28, unit),
               4: (2.0**32, 2.0**32, unit), 5: (unit, 2.0**16)}  # fmt: skip
+    last = len(model.raw["networks"])
     for k, term in enumerate(model.raw["terms"]):
         words = image.array["terms"][8 * k : 8 * k + 8]
         kind, channel, values = model.term(term)
+        if term.get("stand_in"):
+            last += 1
+            channel += 65536 * last
         if words[:2] != [kind, channel]:
             yield f"term {term['id']}: kind and channel are {words[:2]}, the model says {[kind, channel]}"
             continue
@@ -567,6 +583,25 @@ def check_map(model: Model, image: Image, bound: float) -> Iterator[str]:
     )
     if worst > bound:
         yield f"at T = {where[0]:.4f} C, slope = {where[1]:.6f} C per block the table departs by {worst:.3e} deg/h"
+
+
+def check_stand_ins(model: Model, image: Image, header: str) -> Iterator[str]:
+    """What stands for the terms of lost channels against the model's networks."""
+    if not model.stand_ins():
+        return
+    printed = re.search(rf"\* {image.numeric} stand-ins: .*\|error\| <= (\S+) deg/h", header)
+    if printed is None:
+        raise Unreadable(f"the header prints no bound of the stand-ins of {image.numeric}")
+    (t0, t1), (r0, r1) = model.t_range, model.r_range
+    own = list(image.networks())[-len(model.stand_ins()) :]
+    for network, (head, centers) in zip(model.stand_ins(), own, strict=True):
+        for t, slope in places(model):
+            point, _ = image.point(image.input(t), image.input(slope))
+            want = model.of_network(network, min(max(t, t0), t1), min(max(slope / model.per_block, r0), r1))
+            error = abs(image.to_dph(image.of_network(head, centers, point)) - want)
+            if error > float(printed[1]):
+                yield f"a stand-in departs by {error:.3e} deg/h at T = {t:.4f} C, more than {printed[1]}"
+                break
 
 
 def check_bound(model: Model, bound: float) -> Iterator[str]:
@@ -660,6 +695,7 @@ def check(folder: Path) -> list[str]:
             *check_members(model, image, name),
             *check_regions(model, image),
             *check_terms(model, image),
+            *check_stand_ins(model, image, header),
             *check_sigma(model, image),
             *check_authority(model, image, bound),
             *check_header(model, image, name, header),

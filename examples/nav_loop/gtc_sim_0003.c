@@ -1,6 +1,6 @@
 /* gtc_sim_0003.c - bias table of gyro SIM-0003. Written by gyrotc; do not edit.
  *
- * Make again:  gyrotc emit model.json --out .
+ * Make again:  gyrotc emit model.json --out . --numeric f32
  * Model:       sha256 7d7f521155691e1ad07a89071ee00c9c1df2362b8a2ea0efb56daf7212558c21
  *
  * The numbers in this file belong to the owner of the gyro's recordings.
@@ -101,6 +101,7 @@ const gtc_f32_table_t gtc_sim_0003_f32 = {
     .sigma_cells = { 8UL, 5UL },
     .n_sigma = 91UL,
     .n_probes = 8UL,
+    .n_stand_ins = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,

@@ -238,6 +238,11 @@ def _sizes(emission: Emission) -> Iterator[str]:
             f"{table.table_bytes} of them parameters; "
             f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
         )
+        if table.n_stand_ins:
+            yield (
+                f"{numeric} stand-ins: {table.stand_in_bytes} of these parameters stand in for channels that are "
+                f"lost; of each |error| <= {_upwards(max(table.stand_in_bounds_dph))} deg/h"
+            )
 
 
 def _upwards(bound: float) -> str:

@@ -158,6 +158,12 @@ class Table:
         return 4 * (3 * networks + 3 + self.centers.size + 6 * terms)
 
     @property
+    def stand_in_bytes(self) -> int:
+        """Those of the stand-ins among them."""
+        counts = self.networks.reshape(-1, ARRAYS["networks"])[self.n_networks :, 0]
+        return 4 * (3 * counts.size + ARRAYS["centers"] * int(counts.sum()))
+
+    @property
     def read_only_bytes(self) -> int:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
         pointers = len(ARRAYS) + 4  # arrays, code of terms
