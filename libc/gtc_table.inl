@@ -458,22 +458,9 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
     table->crc = next[0].bits;
 }
 
-/* The networks of an image that terms name are stand-ins, not the map's; one at least is left to the map. */
-static void FN(find_stand_ins)(TABLE *table)
-{
-    uint_least32_t i;
-
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        if ((i < table->n_terms) && (table->n_networks > 1U)
-            && (FN(stand_in_of)(&table->terms[i * GTC_TERM_WORDS]) != 0U)) {
-            table->n_networks--;
-            table->n_stand_ins++;
-        }
-    }
-}
-
-/* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. */
-static void FN(find_code)(volatile TABLE *table)
+/* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. Networks that
+ * terms name are stand-ins, not the map's; one at least is left to the map. */
+static void FN(find_terms)(volatile TABLE *table)
 {
 #if GTC_OPEN_TERMS
     /* MISRA 9.3: all five are there; their names are macros, which the checker does not count. */
@@ -487,8 +474,13 @@ static void FN(find_code)(volatile TABLE *table)
         table->term_code[i] = NULL;
 #if GTC_OPEN_TERMS
         if (i < table->n_terms) {
-            const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
+            const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+            const uint_least32_t kind = term[0].bits;
 
+            if ((FN(stand_in_of)(term) != 0U) && (table->n_networks > 1U)) {
+                table->n_networks--;
+                table->n_stand_ins++;
+            }
             if ((kind >= 1U) && (kind <= N_KINDS)) {
                 table->term_code[i] = all[kind - 1U];
             }
@@ -502,8 +494,7 @@ static void FN(read_image)(TABLE *table, const gtc_word_t *words)
 {
     FN(read_header)(table, words);
     FN(find_arrays)(table, words);
-    FN(find_stand_ins)(table);
-    FN(find_code)(table);
+    FN(find_terms)(table);
 }
 
 /* Magic, length and CRC, which every layout has in the same places; some layouts are shorter than this one. */

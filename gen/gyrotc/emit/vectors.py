@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from ..frontend import period_us
 from ..model import Model
+from ..quantise.guards import guard_of
+from ..quantise.terms import channel_names
 
 __all__ = ["MISSING", "Calls", "Segment", "Vectors", "make_vectors"]
 
@@ -264,6 +266,14 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # l
         for alone in (n // 2 + 1, n // 2, 2 * n + 3):
             yield replace(ramp(alone, t, noise=40), kind="ALONE")
             yield ramp(3 * n - alone % n, t, noise=40)
+    if model.stand_ins:
+        # Lost, and a ramp over the envelope beside it; then it comes back.
+        longest_s = max(guard_of(model, name).missing_s for name in channel_names(model))
+        yield replace(
+            ramp(min(round(longest_s / model.block_s * n) + 2 * n, 4000), t, noise=40), kind="ALONE"
+        )
+        yield replace(ramp(span, t1, -step, noise=40), kind="ALONE")
+        yield ramp(window, t, noise=40)
     if model.stuck_s:
         yield ramp(min(round(model.stuck_s / model.block_s * n) + 3 * n, 4000), t)
         yield ramp(window, t, noise=40)

@@ -23,6 +23,8 @@ __all__ = ["instruction_bounds"]
 _MACRO = re.compile(r"^#define (\w+) (\d+)U?L?(?: |$)", re.MULTILINE)
 _THUMB_2 = {"-mcpu=cortex-m3", "-mcpu=cortex-m4", "-mcpu=cortex-m7"}
 _ELAPSED_BITS = 24  # of the blocks since the start: MAX_ELAPSED of libc/gtc_front.inl
+# Of the program: the linker leaves lines of functions that it drops at addresses from 0 on, where objdump finds them.
+_TEXT = 0x20000
 _ALL = """#include "gtc_{symbol}.h"
 gtc_word_t gtc_bound_saved[GTC_SAVE_WORDS];
 const void *volatile gtc_bound[] = {{
@@ -90,7 +92,8 @@ def _linked(target: Target, c_folder: Path, numerics: list[str], symbol: str, ru
     source.write_text(_ALL.format(symbol=symbol, rows=rows), encoding="ascii")
     lax = target.model_copy(update={"flags": (*target.flags, "-Wno-pedantic")})  # functions as addresses
     objects = compile_objects(lax, [c_folder / f"gtc_{symbol}.c", source], work, include=c_folder)
-    link(target, [runtime, *objects], work / "bound")
+    placed = target.model_copy(update={"link": (*target.link, f"-Wl,--section-start=.text={_TEXT:#x}")})
+    link(placed, [runtime, *objects], work / "bound")
     return work / "bound"
 
 
