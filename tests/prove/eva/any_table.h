@@ -1,7 +1,7 @@
 /* any_table.h - with -DANY_TABLE the table is any that `init` and `check` accept: words anywhere in libc/gtc_limits.inl.
  *
- * Counts are those of a small table: SHAPE_NETWORKS networks of two centers each, four terms (or three, with a channel
- * each), grids of 3 x 2 cells. Intervals cannot say the conditions on several words; the files that need them take
+ * Counts are those of a small table: SHAPE_NETWORKS networks of two centers each, four terms, grids of 3 x 2 cells; where
+ * the last term is that of a channel, a stand-in behind the networks, which it has or has not. Intervals cannot say the conditions on several words; the files that need them take
  * functions by contract. Included behind gtc.c, whose limits it reads.
  */
 #ifndef ANY_TABLE_H_INCLUDED
@@ -16,11 +16,12 @@
 #define ANY_IN(range) (int_least32_t)Frama_C_long_interval((range).least, (range).most)
 #define MEMBER_OF(member) (member)
 #endif
+#define ALL_NETWORKS (SHAPE_NETWORKS + 1U)
 #define CODE_OF(kind) NAME(kind)
 #define ANY_WHOLE(row) Frama_C_unsigned_long_interval(NAME(whole_limits)[row][0], NAME(whole_limits)[row][1])
 
-static gtc_word_t any_networks[SHAPE_NETWORKS * GTC_NETWORK_WORDS];
-static gtc_word_t any_centers[SHAPE_NETWORKS * 2U * GTC_CENTER_WORDS];
+static gtc_word_t any_networks[ALL_NETWORKS * GTC_NETWORK_WORDS];
+static gtc_word_t any_centers[ALL_NETWORKS * 2U * GTC_CENTER_WORDS];
 static gtc_word_t any_terms[GTC_MAX_TERMS * GTC_TERM_WORDS];
 static gtc_word_t any_coverage[1];
 static gtc_word_t any_guards[2U * GTC_GUARD_WORDS];
@@ -62,13 +63,13 @@ static void any_members(void)
 static void any_arrays(void)
 {
     unsigned i;
-    /*@ loop unroll SHAPE_NETWORKS; */
-    for (i = 0; i < SHAPE_NETWORKS; i++) {
+    /*@ loop unroll ALL_NETWORKS; */
+    for (i = 0; i < ALL_NETWORKS; i++) {
         any_networks[i * GTC_NETWORK_WORDS].bits = 2U;
         any_words(&any_networks[(i * GTC_NETWORK_WORDS) + 1U], NAME(network_limits), GTC_NETWORK_WORDS - 1U);
     }
-    /*@ loop unroll SHAPE_NETWORKS * 2; */
-    for (i = 0; i < (SHAPE_NETWORKS * 2U); i++) {
+    /*@ loop unroll ALL_NETWORKS * 2; */
+    for (i = 0; i < (ALL_NETWORKS * 2U); i++) {
         any_words(&any_centers[i * GTC_CENTER_WORDS], NAME(center_limits), GTC_CENTER_WORDS);
     }
     any_coverage[0].bits = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
@@ -83,14 +84,18 @@ static void any_arrays(void)
     any.coverage_cells[0] = 3U;
     any.coverage_cells[1] = 2U;
     any.n_networks = SHAPE_NETWORKS;
-    any.n_centers = SHAPE_NETWORKS * 2U;
+    any.n_centers = ALL_NETWORKS * 2U;
     any.n_channels = 2U;
 }
 
 static void any_record(unsigned i, const struct NAME(term_code) *code)
 {
     any_terms[i * GTC_TERM_WORDS].bits = code->kind;
-    any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (code->kind == GTC_TERM_AUXILIARY) ? 1U : 0U;
+    any_terms[(i * GTC_TERM_WORDS) + 1U].bits = 0U;
+    if (code->kind == GTC_TERM_AUXILIARY) {
+        any.n_stand_ins = (Frama_C_interval(0, 1) != 0) ? 1U : 0U;
+        any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (any.n_stand_ins != 0U) ? (1U + (ALL_NETWORKS * 65536UL)) : 1U;
+    }
     any_words(&any_terms[(i * GTC_TERM_WORDS) + 2U], NAME(term_limits)[code->kind - 1U], GTC_TERM_WORDS - 2U);
     any.term_code[i] = code;
 }

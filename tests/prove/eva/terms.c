@@ -23,6 +23,16 @@ static inline void gtc_q31_follow(int_least32_t z[2], int_least32_t x, int_least
     ensures FINITE(\result); */
 static inline num_t NAME(mean)(num_t base, wide_t sum, uint_least32_t n);
 
+#if defined(ANY_TABLE) && !defined(F32)
+/* As in map.c. */
+/*@ assigns \result \from x, range[0 .. 1];
+    assigns *position \from x, range[0 .. 1], gain;
+    ensures \initialized(position) && *position <= 65535;
+    ensures \result == 0 || \result == 2 || \result == -1; */
+static inline int gtc_q31_position(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+                                   uint_least32_t *position);
+#endif
+
 #include "gtc.c"
 #include "any_table.h"
 
@@ -44,7 +54,7 @@ static void any_term(unsigned i)
     state.term[i][1] = (int_least32_t)Frama_C_long_interval(0, 65535);
 #endif
     if (kind == GTC_TERM_AUXILIARY) {
-        NAME(input_t) *const in = &state.input[THE_TABLE.terms[(i * GTC_TERM_WORDS) + 1U].bits];
+        NAME(input_t) *const in = &state.input[THE_TABLE.terms[(i * GTC_TERM_WORDS) + 1U].bits & 0xFFFFU];
         in->gap_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
         in->held_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
         in->clamped = Frama_C_unsigned_long_interval(0, 3);
