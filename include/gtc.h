@@ -97,7 +97,7 @@ extern "C" {
 #define GTC_UNCOVERED 4  /* inside the envelope, but no training data near: interpolated */
 #define GTC_HELD 8       /* sample or block missing, stuck, impossible or not confirmed yet: last correction kept */
 #define GTC_FALLBACK 16  /* temperature held too long: the table's constant correction */
-#define GTC_CHANNEL_LOST 32 /* an auxiliary channel held too long: the guard's value stands for it */
+#define GTC_CHANNEL_LOST 32 /* an auxiliary channel held too long: its stand-in, or the guard's value, stands for it */
 #define GTC_E_ARG (-1)       /* NULL pointer, not a number, count or size out of range */
 #define GTC_E_LAYOUT (-2)    /* table of another layout, or one that needs what was not compiled in */
 #define GTC_E_SELF_TEST (-3) /* arithmetic or a known answer wrong: do not navigate with this build */

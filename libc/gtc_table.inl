@@ -155,8 +155,18 @@ static int FN(centers_fit)(const TABLE *table)
     return (n == table->n_centers) ? 1 : 0;
 }
 
-/* Every term comes with its code; an auxiliary one reads a further channel, others the temperature. Stand-ins belong to
- * auxiliary terms, one to each that has one, in their order, behind at least one network of the map. */
+/* A term comes with its code; an auxiliary one reads a further channel, others the temperature. */
+static int FN(term_fits)(const TABLE *table, uint_least32_t i)
+{
+    const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+    const uint_least32_t channel = FN(channel_of)(term);
+
+    return ((table->term_code[i] != NULL) && (table->term_code[i]->kind == term[0].bits)
+            && (channel < table->n_channels) && ((channel != 0U) == (term[0].bits == GTC_TERM_AUXILIARY))) ? 1 : 0;
+}
+
+/* All of them; stand-ins belong to auxiliary terms, one to each that has one, in their order, behind at least one
+ * network of the map. */
 static int FN(terms_fit)(const TABLE *table)
 {
     uint_least32_t last = table->n_networks;
@@ -164,16 +174,16 @@ static int FN(terms_fit)(const TABLE *table)
 
     for (i = 0U; i < table->n_terms; i++) {
         const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
-        const uint_least32_t channel = FN(channel_of)(term);
         const uint_least32_t stand_in = FN(stand_in_of)(term);
 
+        if (!FN(term_fits)(table, i)) {
+            return 0;
+        }
         if (stand_in != 0U) {
             last++;
-        }
-        if ((table->term_code[i] == NULL) || (table->term_code[i]->kind != term[0].bits)
-            || (channel >= table->n_channels) || ((channel != 0U) != (term[0].bits == GTC_TERM_AUXILIARY))
-            || ((stand_in != 0U) && ((channel == 0U) || (stand_in != last)))) {
-            return 0;
+            if ((stand_in != last) || (FN(channel_of)(term) == 0U)) {
+                return 0;
+            }
         }
     }
     return ((last == FN(all_networks)(table)) && (table->n_stand_ins < last)) ? 1 : 0;

@@ -516,7 +516,9 @@ def check_regions(model: Model, image: Image) -> Iterator[str]:
     """Where the networks of a bank hold."""
     e, s = image.member["envelope"], image.member["scale"]
     whole = {"temperature_c": model.t_range, "slope_c_per_min": model.r_range}
-    for network, (head, _) in zip([*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True):
+    for network, (head, _) in zip(
+        [*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True
+    ):
         region = network["region"] or whole
         edges = [*region["temperature_c"], *(r * model.per_block for r in region["slope_c_per_min"])]
         for k, (got, edge) in enumerate(zip(head[4:], edges, strict=True)):

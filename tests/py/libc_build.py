@@ -35,7 +35,13 @@ def _table_struct() -> type[ctypes.Structure]:
     fields += [("authority", u32 * 2), ("effect", u32 * 2), ("rezero", u32)]
     fields += [("scale", u32 * 3), ("envelope", u32 * 4)]
     fields += [(name, u32) for name in ("n_networks", "n_centers", "n_channels", "n_terms")]
-    fields += [("coverage_cells", u32 * 2), ("sigma_cells", u32 * 2), ("n_sigma", u32), ("n_probes", u32), ("n_stand_ins", u32)]
+    fields += [
+        ("coverage_cells", u32 * 2),
+        ("sigma_cells", u32 * 2),
+        ("n_sigma", u32),
+        ("n_probes", u32),
+        ("n_stand_ins", u32),
+    ]
     fields += [(name, pointer) for name in ARRAYS]
     fields += [("crc", u32), ("term_code", pointer * 4)]
     return type("TableStruct", (ctypes.Structure,), {"_fields_": fields})

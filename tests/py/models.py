@@ -105,7 +105,9 @@ def random_stand_in(seed: int, size: float) -> Network:
     return Network(
         w0=float(rng.normal(0.0, size)),
         linear=(float(rng.normal(0.0, size)), float(rng.normal(0.0, size))),
-        centers=tuple(zip(rng.uniform(-40.0, 60.0, n).tolist(), rng.uniform(-3.0, 3.0, n).tolist(), strict=True)),
+        centers=tuple(
+            zip(rng.uniform(-40.0, 60.0, n).tolist(), rng.uniform(-3.0, 3.0, n).tolist(), strict=True)
+        ),
         widths=tuple((float(w), None if rng.random() < 0.3 else 1.0) for w in rng.uniform(0.4, 3.0, n)),
         weights=tuple(rng.normal(0.0, size, n).tolist()),
     )

@@ -148,7 +148,9 @@ def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, chann
     assert table
     nothing = np.zeros_like(temperature_c)
     outcome = TermOutcome(temperature_c, nothing, nothing, np.zeros(len(nothing), dtype=np.int32))
-    seen = CourseChannel(channel, np.zeros(len(nothing), dtype=np.int32), np.zeros(len(nothing), dtype=np.bool_))
+    seen = CourseChannel(
+        channel, np.zeros(len(nothing), dtype=np.int32), np.zeros(len(nothing), dtype=np.bool_)
+    )
     table.recursion(values, 10.0).apply(course_of(temperature_c), seen, outcome)
     return outcome
 

@@ -133,7 +133,12 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
     channels = ["temperature_c", *channel_names(model)]
     stand_ins = [f"stands in for {term.channel}" for term in model.terms if term.stand_in is not None]
     networks = [*[""] * len(model.networks), *stand_ins]
-    return {"networks": networks, "centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
+    return {
+        "networks": networks,
+        "centers": centers,
+        "guards": channels,
+        "terms": [term.id for term in model.terms],
+    }
 
 
 def _width(width: float | None) -> str:

@@ -47,18 +47,11 @@ def table_of(model: Model) -> Table:
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     envelope = f32_words([t0, t1, r0 * per_block, r1 * per_block])
     _check_range(scale, envelope)
-    networks = (*model.networks, *model.stand_ins)
+    of_map, networks = len(model.networks), (*model.networks, *model.stand_ins)
     centers = [_centers(network, scale, per_block) for network in networks]
-    heads = [
-        np.concatenate([np.array([len(n.weights)], np.uint32), _head(n), _region(region, per_block)])
-        for n, region in zip(networks, regions(model), strict=True)
-    ]
-    of_map = len(model.networks)
+    heads = [_head(n, region, per_block) for n, region in zip(networks, regions(model), strict=True)]
     parts = _bound_parts(model, scale, envelope, centers[:of_map], np.concatenate(heads[:of_map]))
-    stand_ins = [
-        _bound(*pair, scale, envelope, per_block)
-        for pair in zip(model.stand_ins, centers[of_map:], strict=True)
-    ]
+    stand_ins = zip(model.stand_ins, centers[of_map:], strict=True)
     return Table(
         numeric="f32",
         **shared(model),
@@ -76,7 +69,9 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
-        stand_in_bounds_dph=tuple(math.fsum(bound.values()) for bound in stand_ins),
+        stand_in_bounds_dph=tuple(
+            math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins
+        ),
     )
 
 
@@ -117,8 +112,11 @@ def _lost(network: Network, largest: NDArray[np.float64]) -> float:
     return float(np.abs(values[small]).sum() + np.abs(weights[np.abs(weights) < _TINY]).sum())
 
 
-def _head(network: Network) -> Words:
-    return f32_words(_flushed(np.array([network.w0, *network.linear])))
+def _head(network: Network, region: Envelope, per_block: float) -> Words:
+    """The record of a network."""
+    count = np.array([len(network.weights)], np.uint32)
+    numbers = f32_words(_flushed(np.array([network.w0, *network.linear])))
+    return np.concatenate([count, numbers, _region(region, per_block)])
 
 
 def _numbers(words: Words) -> NDArray[np.float64]:
