@@ -44,8 +44,7 @@ def table_of(model: Model) -> Table:
     per_block = model.block_s / 60.0
     center, half = model.scale.temperature_c
     scale = f32_words([center, 1.0 / half, 1.0 / (model.scale.slope_c_per_min * per_block)])
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    envelope = f32_words([t0, t1, r0 * per_block, r1 * per_block])
+    envelope = _region(model.envelope, per_block)
     _check_range(scale, envelope)
     of_map, networks = len(model.networks), (*model.networks, *model.stand_ins)
     centers = [_centers(network, scale, per_block) for network in networks]
@@ -69,9 +68,7 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
-        stand_in_bounds_dph=tuple(
-            math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins
-        ),
+        stand_in_bounds_dph=tuple(_whole_bound(*one, scale, envelope, per_block) for one in stand_ins),
     )
 
 
@@ -94,6 +91,12 @@ def _bound_parts(
         parts["hand-over"] = handover_error_dph(model, "f32", axes, share_step=0.0, share_error=_SHARE)
         parts["blend"] = _blend(model, scale, envelope)
     return parts
+
+
+def _whole_bound(
+    network: Network, centers: NDArray[np.float32], scale: Words, envelope: Words, per_block: float
+) -> float:
+    return math.fsum(_bound(network, centers, scale, envelope, per_block).values())
 
 
 def _word(value: float) -> int:
