@@ -264,20 +264,20 @@ typedef struct {
  * calls, which is linked once; stack at the deepest call, whatever terms a table has. Other targets:
  * docs/results.md of gyrotc.
  *               f32 code  stack   q31 code  stack
- *   check           4480    450       3530    460
- *   open            2770    470       2460    490
- *   map              910     20        760    130
- *   init            2630    300       2350    320
- *   sample          4170    170       4580    310
- *   sample_at       4500    180       4920    330
- *   missed          3350    160       3980    310
+ *   check           4450    410       3520    430
+ *   open            2720    440       2490    460
+ *   map              910     20        760    120
+ *   init            2560    260       2360    290
+ *   sample          4990    180       5180    320
+ *   sample_at       5330    200       5510    340
+ *   missed          4210    180       4580    310
  *   bias              80      0         70     10
  *   snapshot        1110     30       1880    110
- *   rezero          1340     40       2240    110
+ *   rezero          1350     40       2240    110
  *   unzero           120      0        110     10
  *   angle            340      0        180     20
  *   save             560     30        550     30
- *   restore         4350    810       3960    860 */
+ *   restore         4270    770       3970    830 */
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
