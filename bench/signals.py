@@ -66,9 +66,8 @@ With {useless} useless channels beside: RMS changes by {harm} in the worlds (aim
 
 ## A channel lost during the whole exam
 
-RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the channel's
-median stands for it. A table of one thermometer can be carried beside and taken while GTC_CHANNEL_LOST
-is set: its correction is then that of the table of one thermometer.
+RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the stand-in
+of the term is added, a network of temperature and its rate; GTC_CHANNEL_LOST is set, and sigma has grown.
 
 | channel lost | worlds | worse by, largest |
 | --- | --- | --- |

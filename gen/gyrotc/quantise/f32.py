@@ -48,7 +48,7 @@ def table_of(model: Model) -> Table:
     _check_range(scale, envelope)
     of_map, networks = len(model.networks), (*model.networks, *model.stand_ins)
     centers = [_centers(network, scale, per_block) for network in networks]
-    heads = [_head(n, region, per_block) for n, region in zip(networks, regions(model), strict=True)]
+    heads = [_record(n, region, per_block) for n, region in zip(networks, regions(model), strict=True)]
     parts = _bound_parts(model, scale, envelope, centers[:of_map], np.concatenate(heads[:of_map]))
     stand_ins = zip(model.stand_ins, centers[of_map:], strict=True)
     return Table(
@@ -115,11 +115,13 @@ def _lost(network: Network, largest: NDArray[np.float64]) -> float:
     return float(np.abs(values[small]).sum() + np.abs(weights[np.abs(weights) < _TINY]).sum())
 
 
-def _head(network: Network, region: Envelope, per_block: float) -> Words:
-    """The record of a network."""
+def _record(network: Network, region: Envelope, per_block: float) -> Words:
     count = np.array([len(network.weights)], np.uint32)
-    numbers = f32_words(_flushed(np.array([network.w0, *network.linear])))
-    return np.concatenate([count, numbers, _region(region, per_block)])
+    return np.concatenate([count, _head(network), _region(region, per_block)])
+
+
+def _head(network: Network) -> Words:
+    return f32_words(_flushed(np.array([network.w0, *network.linear])))
 
 
 def _numbers(words: Words) -> NDArray[np.float64]:
