@@ -19,6 +19,8 @@ constexpr int kOfT = 40;         // functions of temperature alone, shared by s1
 constexpr int kCoupledT = 10;    // functions of the coupled part, by input
 constexpr int kCoupledR = 8;     // 121 in all: docs/training.md, section 1, step 2
 constexpr int kBasis = 1 + kOfT + kCoupledT * kCoupledR;
+constexpr int kRows = 480;        // of the basis at once: 0.5 MB, which stays in the cache
+constexpr int kColumns = 24;      // of a triangle at once: what is zero above or below them is left out
 constexpr double kReach = 1.4;            // domain over largest |input|: the basis vanishes at its edge
 constexpr double kConstVariance = 100.0;  // of the constant, in units of the bias' variance
 constexpr double kVarianceFloor = 1e-10;  // a function that is not used keeps the equations solvable
@@ -54,6 +56,22 @@ Density density(double s, double l, double w) {
     const double lw2 = l * l * w * w;
     const double v = s * s * std::sqrt(2.0 * kPi) * l * std::exp(-0.5 * lw2);
     return {v, 2.0 * v, v * (1.0 - lw2)};
+}
+
+// Rows of a block that begins at `at`. The last one takes the rest with it: Eigen sums a lone row in another order, and
+// no result shall depend on where a block ends.
+Eigen::Index rows_from(Eigen::Index at, Eigen::Index all) { return all - at < 2 * kRows ? all - at : kRows; }
+
+// Inverse of a lower triangle. What lies above a block of columns is zero and is not solved for.
+MatrixXd inverse_of(const MatrixXd &lower) {
+    const Eigen::Index n = lower.rows();
+    MatrixXd inverse = MatrixXd::Identity(n, n);
+    for (Eigen::Index at = 0; at < n; at += kColumns) {
+        const Eigen::Index left = n - at, width = std::min<Eigen::Index>(kColumns, left);
+        auto block = inverse.block(at, at, left, width);
+        lower.bottomRightCorner(left, left).triangularView<Eigen::Lower>().solveInPlace(block);
+    }
+    return inverse;
 }
 
 double reach_of(const VectorXd &x) { return kReach * std::max(x.cwiseAbs().maxCoeff(), 1e-3); }
@@ -124,7 +142,7 @@ double EvidenceModel::objective(const EvidenceParameters &log_parameters, Eviden
     const double value = 0.5 * fitted / noise + llt.matrixLLT().diagonal().array().log().sum() +
                          (samples_ - kBasis) * log_parameters[7] + 0.5 * deviation.squaredNorm();
     if (gradient) {
-        const MatrixXd inverse_l = llt.matrixL().solve(MatrixXd::Identity(kBasis, kBasis));
+        const MatrixXd inverse_l = inverse_of(llt.matrixLLT());
         const VectorXd inverse_diagonal = inverse_l.colwise().squaredNorm();
         const VectorXd by_log_lambda =
             0.5 * (1.0 - noise * inverse_diagonal.array() - alpha.array().square()).matrix();
@@ -135,7 +153,7 @@ double EvidenceModel::objective(const EvidenceParameters &log_parameters, Eviden
     return value;
 }
 
-void EvidenceModel::condition(const EvidenceParameters &log_parameters) {
+void EvidenceModel::condition(const EvidenceParameters &log_parameters, bool mean_alone) {
     log_parameters_ = log_parameters;
     const VectorXd h = prior_variance(log_parameters, nullptr).cwiseSqrt();
     const double noise = std::exp(2.0 * log_parameters[7]);
@@ -144,7 +162,9 @@ void EvidenceModel::condition(const EvidenceParameters &log_parameters) {
     const Eigen::LLT<MatrixXd> llt(a);
     if (llt.info() != Eigen::Success) throw std::runtime_error("evidence: the posterior is not positive definite");
     coefficients_ = h.cwiseProduct(llt.solve(h.cwiseProduct(moment_)));
-    const MatrixXd inverse_l = llt.matrixL().solve(MatrixXd::Identity(kBasis, kBasis));
+    factor_.resize(0, 0);
+    if (mean_alone) return;
+    const MatrixXd inverse_l = inverse_of(llt.matrixLLT());
     factor_ = std::sqrt(noise) * (h.asDiagonal() * inverse_l.transpose());
     freedom_ = kBasis - noise * inverse_l.squaredNorm();
 }
@@ -199,10 +219,32 @@ void EvidenceModel::optimise(const EvidenceParameters *start) {
     condition(at);
 }
 
-VectorXd EvidenceModel::mean(const VectorXd &t, const VectorXd &r) const { return basis(t, r) * coefficients_; }
+VectorXd EvidenceModel::mean(const VectorXd &t, const VectorXd &r) const {
+    VectorXd found(t.size());
+    for (Eigen::Index at = 0, rows; at < t.size(); at += rows) {
+        rows = rows_from(at, t.size());
+        found.segment(at, rows).noalias() = basis(t.segment(at, rows), r.segment(at, rows)) * coefficients_;
+    }
+    return found;
+}
 
+// The factor is an upper triangle: below a block of its columns it is zero.
 VectorXd EvidenceModel::variance(const VectorXd &t, const VectorXd &r) const {
-    return (basis(t, r) * factor_).rowwise().squaredNorm();
+    if (factor_.size() == 0) throw std::logic_error("evidence: conditioned for its mean alone");
+    VectorXd found(t.size());
+    MatrixXd product;
+    for (Eigen::Index at = 0, rows; at < t.size(); at += rows) {
+        rows = rows_from(at, t.size());
+        const MatrixXd phi = basis(t.segment(at, rows), r.segment(at, rows));
+        product.resize(rows, kBasis);
+        for (int from = 0; from < kBasis; from += kColumns) {
+            const int to = std::min(from + kColumns, kBasis);
+            product.middleCols(from, to - from).noalias() =
+                phi.leftCols(to) * factor_.block(0, from, to, to - from);
+        }
+        found.segment(at, rows) = product.rowwise().squaredNorm();
+    }
+    return found;
 }
 
 }  // namespace gyrotc

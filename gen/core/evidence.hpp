@@ -41,8 +41,8 @@ class EvidenceModel {
     // Maximises the evidence from two starts of the short scale (and from `start` if given), then conditions.
     void optimise(const EvidenceParameters *start = nullptr);
 
-    // Conditions on the bins with these parameters.
-    void condition(const EvidenceParameters &log_parameters);
+    // Conditions on the bins with these parameters; `mean_alone`: without what `variance` and `freedom` need.
+    void condition(const EvidenceParameters &log_parameters, bool mean_alone = false);
 
     Eigen::VectorXd mean(const Eigen::VectorXd &t, const Eigen::VectorXd &r) const;
     Eigen::VectorXd variance(const Eigen::VectorXd &t, const Eigen::VectorXd &r) const;

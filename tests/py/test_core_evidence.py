@@ -142,3 +142,27 @@ def test_noise_is_found() -> None:
     process = _core.EvidenceModel(t, r, np.ones(800), y, 0.0, 800.0)
     process.optimise()
     assert process.sigma == pytest.approx(0.25, rel=0.08)
+
+
+def test_many_points_are_answered_as_each_part_of_them() -> None:
+    """Points go through in blocks: none may be lost at an edge, nor depend on the others."""
+    rng = np.random.default_rng(7)
+    process = model(bins(7))
+    process.optimise()
+    t, r = rng.uniform(-1.1, 1.1, (2, 2003))
+    for ask in (process.mean, process.variance):
+        whole = ask(t, r)
+        for part in (slice(0, 1), slice(0, 481), slice(477, 962), slice(1400, 2003)):
+            np.testing.assert_allclose(ask(t[part], r[part]), whole[part], rtol=1e-11)
+
+
+def test_a_process_for_its_mean_alone_has_the_same_mean_and_no_variance() -> None:
+    data = bins(8)
+    whole, mean_alone = model(data), model(data)
+    whole.condition(PRIOR_MEAN)
+    mean_alone.optimise()  # an earlier variance is not that of the new parameters
+    mean_alone.condition(PRIOR_MEAN, mean_alone=True)
+    at = np.linspace(-1.0, 1.0, 50), np.linspace(1.0, -1.0, 50)
+    assert np.array_equal(whole.mean(*at), mean_alone.mean(*at))
+    with pytest.raises(RuntimeError, match="for its mean alone"):
+        mean_alone.variance(*at)

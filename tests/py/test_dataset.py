@@ -6,6 +6,7 @@ import hashlib
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -14,7 +15,8 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
-from gyrotc.dataset import Applied, axes_of, load, survey
+from gyrotc.dataset import Applied, axes_of, load, source, survey
+from gyrotc.dataset.csvfile import CsvFile
 from gyrotc.dataset.earth import EARTH_RATE_DPH, earth_rate
 from gyrotc.dataset.problems import Problems
 from gyrotc.errors import InputError
@@ -146,6 +148,28 @@ def test_a_recording_that_was_changed_is_refused(tmp_path: Path) -> None:
     write_csv(run.path, columns(seed=2))
     with pytest.raises(InputError, match="was changed"):
         run.rows()
+
+
+def test_a_small_file_is_read_once_and_nobody_writes_into_what_was_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    read = CsvFile.read
+
+    def counted(file: CsvFile, names: Sequence[str]) -> dict[str, np.ndarray] | None:
+        calls.append(file.name)
+        return read(file, names)
+
+    monkeypatch.setattr(CsvFile, "read", counted)
+    run = load(folder_of(tmp_path)).runs[0]
+    first, again = run.rows(), run.rows()
+    assert len(calls) == 1 and np.array_equal(first.rate_dph, again.rate_dph)
+    with pytest.raises(ValueError, match="read-only"):
+        again.temperature_c[0] = 0.0
+    monkeypatch.setattr(source, "_KEPT_BYTES", 0)
+    large = load(folder_of(tmp_path / "large")).runs[0]
+    large.rows()
+    assert len(calls) == 3, "what is beyond the limit is read again"
 
 
 # ---- description ----

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import subprocess
 import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from gyrotc.errors import GyrotcError, InputError
-from gyrotc.outputs import MARKER, faults, read_marker, result_folder, write_atomically, write_result
+from gyrotc.outputs import (
+    MARKER,
+    faults,
+    json_text,
+    read_marker,
+    result_folder,
+    write_atomically,
+    write_result,
+)
 from gyrotc.outputs import exchange as exchanging
 from gyrotc.outputs import folder as folders
 from gyrotc.outputs import update as updating
@@ -321,3 +331,25 @@ def test_json_replaces_only_what_gyrotc_wrote(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="No space left"):
         write_result(Path("/dev/full"), "{}")
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["x.json"]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_json_text_is_that_of_the_standard_library(seed: int) -> None:
+    """The bytes of results do not depend on how fast they are written."""
+    rng = random.Random(seed)
+    plain = [True, False, None, 0, -17, 1e-300, -2.5, 1e22, "", "x, y", 'ä"\\\n[{', "\u2028"]
+
+    def drawn(depth: int) -> Any:
+        kind = rng.randrange(6 if depth else 3)
+        if kind < 3:
+            return rng.choice(plain)
+        inner = [drawn(depth - 1) for _ in range(rng.randrange(5))]
+        if kind < 5:
+            return inner if kind == 3 else tuple(inner)
+        return {f"{rng.choice(['a', 'é', ': ', ','])}{k}": part for k, part in enumerate(inner)}
+
+    for content in (drawn(5) for _ in range(300)):
+        assert json_text(content) == json.dumps(content, indent=1) + "\n"
+    for wrong in (float("nan"), [1.0, float("inf")], {"a": [[float("-inf")]]}):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            json_text(wrong)

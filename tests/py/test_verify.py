@@ -8,14 +8,15 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import Command
 from emitted import emitted, entries, flip, recorded, spoil
 from gyrotc import verify as package
+from gyrotc.emit import expected_answers
 from gyrotc.errors import CheckFailed, InputError
-from gyrotc.reference import answers
 from gyrotc.verify import verify
 from gyrotc.verify.boardlog import compared_words, read_output
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
@@ -99,12 +100,13 @@ def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
 
 
 def test_a_flipped_bit_of_the_reference_fails(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def wrong(*arguments: object) -> np.ndarray:
-        words = answers(*arguments).copy()  # type: ignore[arg-type]
-        words[12345, 1] ^= 1
+    def wrong(*arguments: Any) -> dict[str, np.ndarray]:
+        words = {numeric: rows.copy() for numeric, rows in expected_answers(*arguments).items()}
+        for rows in words.values():
+            rows[12345, 1] ^= 1
         return words
 
-    monkeypatch.setattr(package, "answers", wrong)
+    monkeypatch.setattr(package, "expected_answers", wrong)
     for entry in entries(whole, FAST).values():
         assert entry["mismatches"] == 1
         assert entry["first_mismatches"][0].startswith("vector 12345: ")

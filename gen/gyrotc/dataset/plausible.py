@@ -27,6 +27,7 @@ _FASTEST_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress scre
 _RISE_C = 5.0  # of a change that is looked at, in six steps of which none is nearly half of it
 _STEPS = 6  # of temperature that a rise must last: a single wild reading has two
 _LARGEST_STEP = 0.4  # share of the rise: of six even steps each is 0.17, of a jump one is nearly 1
+_NEARLY = 0.999  # of a bound: a sum of six steps and the difference of the ends differ by rounding
 _FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
 _QUIETEST = 0.1 * _FLOWN  # ten times quieter than the quietest gyro is no gyro
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
@@ -144,18 +145,23 @@ def _of_time(
 def _sustained(time: Floats, temperature: Floats) -> float:
     """Fastest change of temperature that lasts, C/min: six steps of one sign, 5 C or more, no step nearly half of it.
 
-    It is sought on every scale: cells are merged in pairs until too few are left.
+    It is sought on every scale: cells are merged in pairs until too few are left. 0 where none is faster than a
+    chamber: only windows from whose first to whose last cell it went that fast are looked at.
     """
     fastest = 0.0
     while len(time) > _STEPS:
-        step = np.diff(temperature)
-        windows = np.lib.stride_tricks.sliding_window_view(step, _STEPS)
-        rise, took = np.abs(windows.sum(axis=1)), time[_STEPS:] - time[:-_STEPS]
-        one_sign = np.abs(np.sign(windows).sum(axis=1)) == _STEPS
-        even = np.abs(windows).max(axis=1) <= _LARGEST_STEP * rise
-        lasting = one_sign & even & (rise >= _RISE_C) & (took > 0.0)
-        if lasting.any():
-            fastest = max(fastest, float(np.max(60.0 * rise[lasting] / took[lasting])))
+        took = time[_STEPS:] - time[:-_STEPS]
+        moved = np.abs(temperature[_STEPS:] - temperature[:-_STEPS])
+        fast = (moved >= _NEARLY * _RISE_C) & (60.0 * moved >= _NEARLY * _FASTEST_C_PER_MIN * took)
+        looked = np.flatnonzero(fast & (took > 0.0))
+        if len(looked):
+            windows = np.lib.stride_tricks.sliding_window_view(np.diff(temperature), _STEPS)[looked]
+            rise = np.abs(windows.sum(axis=1))
+            one_sign = np.abs(np.sign(windows).sum(axis=1)) == _STEPS
+            even = np.abs(windows).max(axis=1) <= _LARGEST_STEP * rise
+            lasting = one_sign & even & (rise >= _RISE_C)
+            if lasting.any():
+                fastest = max(fastest, float(np.max(60.0 * rise[lasting] / took[looked][lasting])))
         half = len(time) // 2 * 2
         time, temperature = time[:half].reshape(-1, 2).mean(1), temperature[:half].reshape(-1, 2).mean(1)
     return fastest

@@ -84,7 +84,7 @@ class Reader:
         layout = self.layout
         value = layout.value_of(self.axis)
         self.file.check_unchanged()
-        columns = self.file.read((layout.time, layout.temperature, value, *self.channels))
+        columns = self.file.columns((layout.time, layout.temperature, value, *self.channels))
         if columns is None:
             columns, _, _ = self.file.scan()
         columns = _converted(columns, self.units)
@@ -200,7 +200,7 @@ def _checked(
     problems: Problems,
 ) -> tuple[Floats, Evidence, Fingerprints]:  # long: one refusal after the other
     """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
-    values = file.read(file.names)
+    values = file.columns(file.names)
     lines = None
     if values is None:
         values, lines, unread = file.scan()

@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import io
 from abc import ABC, abstractmethod
+from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Lock
 
 from ..errors import InputError
 from ..inputs import open_input
@@ -16,6 +18,7 @@ from .values import Fault
 __all__ = ["Prefix", "Source"]
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
+_KEPT_BYTES = 2**25  # of columns in memory: forty runs of the paper's size
 
 
 class Prefix(io.RawIOBase):
@@ -36,6 +39,34 @@ class Prefix(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
+
+
+class _LastRead:
+    """Columns of the files that were read last, `_KEPT_BYTES` at most."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Source, dict[str, Floats]] = OrderedDict()
+        self._lock = Lock()
+
+    def of(self, file: Source) -> dict[str, Floats]:
+        with self._lock:
+            return self._kept.get(file, {})
+
+    def keep(self, file: Source, columns: dict[str, Floats]) -> None:
+        for values in columns.values():
+            values.flags.writeable = False
+        with self._lock:
+            self._kept[file] = columns
+            while sum(_bytes(c) for c in self._kept.values()) > _KEPT_BYTES:
+                self._kept.popitem(last=False)
+
+
+def _bytes(columns: dict[str, Floats]) -> int:
+    """Of whole arrays in memory, where columns are parts of larger ones."""
+    return sum((values if values.base is None else values.base).nbytes for values in columns.values())
+
+
+_last_read = _LastRead()
 
 
 class Source(ABC):
@@ -79,6 +110,17 @@ class Source(ABC):
     @abstractmethod
     def place(self, row: int) -> int:
         """Place of a row (0 is the first) in the file: number of its line, or of the row counted from 1."""
+
+    def columns(self, names: Sequence[str]) -> dict[str, Floats] | None:
+        """As `read`; not to write to. Small files that were read last are not read again: a job asks three times."""
+        kept = _last_read.of(self)
+        if not all(name in kept for name in names):
+            found = self.read(names)
+            if found is None:
+                return None
+            _last_read.keep(self, found)
+            kept = found
+        return {name: kept[name] for name in names}
 
     def keep_as_read(self) -> None:
         """Sets `sha256`; `check_unchanged` refers to the file as it is now."""

@@ -2,16 +2,17 @@
 
 from .files import (
     Emission,
-    answers_text,
     board_test_text,
     emit,
     emit_texts,
     emitted_tables,
     example_period_us,
     example_samples,
+    expected_answers,
     quantise_all,
     write_texts,
 )
+from .vectors import answers_text
 
 __all__ = [
     "Emission",
@@ -22,6 +23,7 @@ __all__ = [
     "emitted_tables",
     "example_period_us",
     "example_samples",
+    "expected_answers",
     "quantise_all",
     "write_texts",
 ]

@@ -7,8 +7,8 @@ done in `quantise`; here integers are printed.
 
 from __future__ import annotations
 
+import functools
 import math
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal, localcontext
@@ -31,19 +31,20 @@ from ..reference.runtime import runtime_folders
 from ..reference.table import LAYOUT
 from ..texts import CText, c_code, c_environment, c_literal
 from .amalgamate import amalgamate
+from .image import image_of, intel_hex
 from .record import RECORD, Options, read_options, record_text
 from .table_text import table_text
-from .vectors import MISSING, Vectors, make_vectors
+from .vectors import MISSING, Vectors, answers_text, make_vectors
 
 __all__ = [
     "Emission",
-    "answers_text",
     "board_test_text",
     "emit",
     "emit_texts",
     "emitted_tables",
     "example_period_us",
     "example_samples",
+    "expected_answers",
     "quantise_all",
     "write_texts",
 ]
@@ -126,7 +127,6 @@ def emit_texts(
     *,
     asked: bool = False,
     zero_at: float | None = None,
-    expected: Mapping[str, NDArray[np.uint32]] | None = None,
 ) -> dict[str, bytes]:
     """All files of `c/` by name.
 
@@ -135,11 +135,53 @@ def emit_texts(
         emission: Its tables.
         asked: The arithmetics were asked for by name.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
-        expected: Answers of the tables to the vectors, each (status, bits), shape (n, 2), where they are known already.
     """
+    return dict(_texts(_Made(model.hash, model, emission), asked, zero_at))
+
+
+def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.uint32]]:
+    """Answers of the tables to the model's vectors by arithmetic: (status, bits), shape (n, 2), not to write to."""
+    return dict(_expected(_Made(model.hash, model, emission)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A model and its tables; another one is the same if the model's hash is, and the tables are the same objects."""
+
+    hash: str
+    model: Model
+    emission: Emission
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Made) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self.hash, tuple((numeric, id(table)) for numeric, table in self.emission.tables.items())
+
+
+@functools.lru_cache(maxsize=2)
+def _vectors(made: _Made) -> Vectors:
+    return make_vectors(made.model, tuple(made.emission.tables))
+
+
+@functools.lru_cache(maxsize=2)
+def _expected(made: _Made) -> dict[str, NDArray[np.uint32]]:
+    """Kept for the next stages of the same job, which ask again; so are the texts."""
+    found = {numeric: answers(table, _vectors(made)) for numeric, table in made.emission.tables.items()}
+    for rows in found.values():
+        rows.flags.writeable = False
+    return found
+
+
+@functools.lru_cache(maxsize=2)
+def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
+    model, emission = made.model, made.emission
     numerics = tuple(emission.tables)
     options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
-    vectors = make_vectors(model, numerics)
+    vectors = _vectors(made)
     texts = _from_templates(model, emission, options, vectors)
     header, source = amalgamate(
         *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
@@ -148,11 +190,9 @@ def emit_texts(
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
-        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
-        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
-    if expected is None:
-        expected = {n: answers(t, vectors) for n, t in emission.tables.items()}
-    texts[f"vectors_{model.id}.txt"] = answers_text(expected)
+        texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = intel_hex(image_of(table)).encode("ascii")
+    texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     texts[RECORD] = record_text(model, options, texts)
     return texts
 
@@ -198,23 +238,6 @@ def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> b
         id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
     )
     return text.encode("ascii")
-
-
-def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
-    """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
-    parts = [
-        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows)
-        for numeric, rows in expected.items()
-    ]
-    return b"".join(parts)
-
-
-def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
-    """Two words a line, in eight hex digits each."""
-    digits = np.frombuffer(rows.astype(">u4").tobytes().hex().encode("ascii"), dtype=np.uint8).reshape(-1, 16)
-    lines = np.full((len(rows), 18), ord(" "), dtype=np.uint8)
-    lines[:, :8], lines[:, 9:17], lines[:, 17] = digits[:, :8], digits[:, 8:], ord("\n")
-    return lines.tobytes()
 
 
 def _facts(model: Model) -> Iterator[str]:
@@ -326,20 +349,3 @@ def example_period_us(model: Model) -> int:
     """A sample period that fits the model's block: 10 ms where it does, else a tenth of the block."""
     block_us = max(1, round(model.block_s * 1e6))
     return _EXAMPLE_US if block_us % _EXAMPLE_US == 0 else period_us(block_us, min(10, block_us))
-
-
-def _image(table: Table) -> bytes:
-    return struct.pack(f"<{len(table.words)}I", *table.words)
-
-
-def _intel_hex(data: bytes) -> str:
-    def record(kind: int, address: int, payload: bytes) -> str:
-        body = bytes([len(payload), address >> 8 & 255, address & 255, kind]) + payload
-        return ":" + (body + bytes([-sum(body) & 255])).hex().upper() + "\n"
-
-    lines = []
-    for start in range(0, len(data), 16):
-        if start and start % 65536 == 0:
-            lines.append(record(4, 0, struct.pack(">H", start >> 16)))
-        lines.append(record(0, start & 0xFFFF, data[start : start + 16]))
-    return "".join(lines) + record(1, 0, b"")

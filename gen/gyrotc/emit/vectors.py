@@ -12,7 +12,7 @@ import functools
 import itertools
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..model import Model
 from ..quantise.guards import guard_of
 from ..quantise.terms import channel_names
 
-__all__ = ["MISSING", "Calls", "Segment", "Vectors", "make_vectors"]
+__all__ = ["MISSING", "Calls", "Segment", "Vectors", "answers_text", "make_vectors"]
 
 N_RANDOM = 20000  # a fault that shows in one input of a thousand is missed with a chance of 2e-9
 SAMPLES_PER_BLOCK = 8  # short blocks, so that a few thousand samples make hundreds of corrections
@@ -278,3 +278,20 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # l
         yield ramp(min(round(model.stuck_s / model.block_s * n) + 3 * n, 4000), t)
         yield ramp(window, t, noise=40)
     yield ramp(window, t, max(step // 7, 1), noise=2)
+
+
+def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
+    """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
+    parts = [
+        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows)
+        for numeric, rows in expected.items()
+    ]
+    return b"".join(parts)
+
+
+def _hex_lines(rows: NDArray[np.uint32]) -> bytes:
+    """Two words a line, in eight hex digits each."""
+    digits = np.frombuffer(rows.astype(">u4").tobytes().hex().encode("ascii"), dtype=np.uint8).reshape(-1, 16)
+    lines = np.full((len(rows), 18), ord(" "), dtype=np.uint8)
+    lines[:, :8], lines[:, 9:17], lines[:, 17] = digits[:, :8], digits[:, 8:], ord("\n")
+    return lines.tobytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -272,6 +273,12 @@ def _write(path: Path, result: dict[str, Any]) -> None:
     write_atomically(path, json_text(result))
 
 
+@functools.cache
+def _versions() -> dict[str, str]:
+    """Of the libraries behind the figures; a fleet asks for each of its serials."""
+    return {name: metadata.version(name) for name in _VERSIONED}
+
+
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
     from .fleet.fingerprint import program_of  # the package of fleets imports this module
@@ -283,7 +290,7 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         axis=model.axis,
         model_hash=model.hash,
         refused=refused,
-        versions={"python": sys.version.split()[0], **{p: metadata.version(p) for p in _VERSIONED}},
+        versions={"python": sys.version.split()[0], **_versions()},
         meta=dict(dataset.meta),
         units=units_of(dataset),
         sources=tuple(dataset.sources),

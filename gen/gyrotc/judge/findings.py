@@ -195,11 +195,11 @@ def _contradictions(
     for members in np.split(order, np.flatnonzero(np.diff(place.reshape(-1)[order])) + 1):
         if len(members) < 2:
             continue
-        middle = float(np.median(mean[members]))
-        for k, m in enumerate(members):
-            other = (
-                middle if len(members) > 2 else float(mean[members[1 - k]])
-            )  # of two, each against the other
+        if len(members) > 2:
+            others = [float(np.median(mean[members]))] * len(members)
+        else:  # of two, each against the other
+            others = [float(mean[m]) for m in members[::-1]]
+        for m, other in zip(members, others, strict=True):
             departures.setdefault(int(keys[m, 2]), []).append(float(mean[m]) - other)
     for k, values in departures.items():
         apart = float(np.median(np.abs(values)))

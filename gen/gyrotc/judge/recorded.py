@@ -71,8 +71,10 @@ def sign_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     for k, f in enumerate(runs):
         others = [c for j, c in enumerate(curves) if j != k]
         mine = [_correlation(curves[k], other) for other in others]
+        if max(mine) >= -_ALIKE:
+            continue
         among = [_correlation(a, b) for i, a in enumerate(others) for b in others[i + 1 :]]
-        if max(mine) < -_ALIKE and min(among) > _ALIKE:
+        if min(among) > _ALIKE:
             yield {
                 "id": "sign_reversed",
                 "text": (

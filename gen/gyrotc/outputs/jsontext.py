@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from typing import Any
 
 __all__ = ["canonical_json", "digest_of", "json_text"]
+
+_NESTED = (dict, list, tuple)
 
 
 def json_text(content: Any) -> str:
@@ -15,7 +18,33 @@ def json_text(content: Any) -> str:
     Raises:
         ValueError: A number is not finite.
     """
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+    return _text(content, 0) + "\n"
+
+
+def _text(content: Any, level: int) -> str:
+    """As `json.dumps(content, indent=1)`, to the byte; that goes value by value in Python, and takes ten times as long.
+
+    What holds no list or object itself is written in one go, with line ends for blanks.
+    """
+    if not isinstance(content, _NESTED) or not content:
+        return _encoder(level).encode(content)
+    inner = content.values() if isinstance(content, dict) else content
+    line, last = "\n" + " " * (level + 1), "\n" + " " * level
+    if not any(isinstance(part, _NESTED) for part in inner):
+        text = _encoder(level).encode(content)
+        return text[0] + line + text[1:-1] + last + text[-1]
+    if not isinstance(content, dict):
+        return "[" + line + ("," + line).join(_text(part, level + 1) for part in content) + last + "]"
+    if not all(isinstance(key, str) for key in content):
+        raise TypeError("a key of an object is text")
+    parts = (f"{_encoder(0).encode(key)}: {_text(part, level + 1)}" for key, part in content.items())
+    return "{" + line + ("," + line).join(parts) + last + "}"
+
+
+@functools.cache
+def _encoder(level: int) -> json.JSONEncoder:
+    """Writes lists and objects that hold plain values, one a line."""
+    return json.JSONEncoder(allow_nan=False, separators=(",\n" + " " * (level + 1), ": "))
 
 
 def canonical_json(content: Any) -> bytes:

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["Bins", "Scaling", "TrainingData", "average", "cleaned", "gather", "joined", "scaling_of"]
+__all__ = [
+    "Bins",
+    "Cells",
+    "Scaling",
+    "TrainingData",
+    "average",
+    "cells_of",
+    "cleaned",
+    "gather",
+    "joined",
+    "scaling_of",
+]
 
 Floats = NDArray[np.float64]
 
@@ -148,27 +159,51 @@ def average(data: TrainingData, length_s: float) -> TrainingData:
     Returns:
         One sample for each cell that holds any: means of inputs and bias, summed weight and duration.
     """
-    if float(np.median(data.duration_s)) > 0.5 * length_s:
+    cells = cells_of(data, length_s)
+    if cells.edges is None:
         return data
-    starts = np.flatnonzero(np.r_[True, np.diff(data.run) != 0])
+    return TrainingData(
+        temperature_c=cells.mean(data.temperature_c),
+        slope_c_per_min=cells.mean(data.slope_c_per_min),
+        bias_dph=cells.mean(data.bias_dph),
+        weight=cells.weight,
+        run=data.run[cells.edges],
+        time_s=data.time_s[cells.edges],
+        duration_s=np.add.reduceat(data.duration_s, cells.edges),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Which samples make a mean: those from an edge to the next; None: each sample is its own.
+
+    Attributes:
+        edges: First sample of each mean.
+        of: Weights of the samples.
+        weight: Weights of the means.
+    """
+
+    edges: NDArray[np.intp] | None
+    of: Floats
+    weight: Floats
+
+    def mean(self, x: Floats) -> Floats:
+        """Weighted means of what samples have, shape (means,)."""
+        if self.edges is None:
+            return x
+        return np.asarray(np.add.reduceat(x * self.of, self.edges) / self.weight)
+
+
+def cells_of(data: TrainingData, length_s: float) -> Cells:
+    """Cells of `average`."""
+    if float(np.median(data.duration_s)) > 0.5 * length_s:
+        return Cells(None, data.weight, data.weight)
+    next_run = np.diff(data.run) != 0
+    starts = np.r_[0, np.flatnonzero(next_run) + 1]
     origin = np.repeat(data.time_s[starts], np.diff(np.r_[starts, len(data)]))
     cell = np.floor((data.time_s - origin) / length_s + 1e-9)
-    edges = np.flatnonzero(np.r_[True, (np.diff(data.run) != 0) | (np.diff(cell) != 0)])
-    weight = np.add.reduceat(data.weight, edges)
-
-    def mean(x: Floats) -> Floats:
-        return np.asarray(np.add.reduceat(x * data.weight, edges) / weight)
-
-    return replace(
-        data,
-        temperature_c=mean(data.temperature_c),
-        slope_c_per_min=mean(data.slope_c_per_min),
-        bias_dph=mean(data.bias_dph),
-        weight=weight,
-        run=data.run[edges],
-        time_s=data.time_s[edges],
-        duration_s=np.add.reduceat(data.duration_s, edges),
-    )
+    edges = np.r_[0, np.flatnonzero(next_run | (np.diff(cell) != 0)) + 1]
+    return Cells(edges, data.weight, np.add.reduceat(data.weight, edges))
 
 
 def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:

@@ -32,17 +32,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics import LEAST_SPAN_C
-from .data import Scaling, TrainingData, average
+from .data import Scaling, TrainingData, average, cells_of
 from .paired import more_than_its_error, of_pieces, surely_above_0, t_statistic
 from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .residual_noise import difference_sigma
-from .simple import SIMPLE, design, solve
+from .simple import SIMPLE, columns_of, design, solve
 from .spans import Fold, history_folds
 
 __all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb", "pieces_of"]
 
 Floats = NDArray[np.float64]
-Correction = Callable[[Floats, Floats], Floats]
 
 MAPS = ("mrbf_t", "mrbf")
 RUNGS = ("nothing", *SIMPLE, *MAPS)
@@ -249,22 +248,39 @@ def _squares(
     limits = [(float(x.min()), float(x.max())) for x in (rest.temperature_c, rest.slope_c_per_min)]
     at = scaling.normalise(np.clip(held.temperature_c, *limits[0]), np.clip(held.slope_c_per_min, *limits[1]))
     flat = limits[0][1] - limits[0][0] < LEAST_SPAN_C
-    known = kept[~fold.near]
+    cells, asked = cells_of(held, average_s), _Places.of(*at)
+    places = _Places.of(*scaling.normalise(rest.temperature_c, rest.slope_c_per_min))
     squares = []
     for name in RUNGS:
         taught = "constant" if flat and name != "nothing" else name
         try:
-            correction = _taught(taught, rest, known, scaling, process)
+            correction = _taught(taught, rest, places, kept[~fold.near], process)
         except TrainingFailed:
             squares.append(np.nan)
             continue
-        left = average(replace(held, bias_dph=held.bias_dph - correction(*at)), average_s)
-        squares.append(float(np.average(left.bias_dph**2, weights=left.weight)))
+        left = cells.mean(held.bias_dph - correction(asked))
+        squares.append(float(np.average(left**2, weights=cells.weight)))
     return squares
 
 
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Normalised inputs, and their powers as `cubic_slope` has them: of these are the columns of all simple rungs."""
+
+    t: Floats
+    r: Floats
+    powers: Floats
+
+    @classmethod
+    def of(cls, t: Floats, r: Floats) -> _Places:
+        return cls(t, r, design("cubic_slope", t, r))
+
+
+Correction = Callable[[_Places], Floats]
+
+
 def _taught(
-    name: str, rest: TrainingData, known: NDArray[np.bool_], scaling: Scaling, process: Process | None
+    name: str, rest: TrainingData, at: _Places, known: NDArray[np.bool_], process: Process | None
 ) -> Correction:
     """A rung fitted to what remains: a function of normalised inputs, deg/h.
 
@@ -272,14 +288,13 @@ def _taught(
         TrainingFailed: The map cannot be fitted.
     """
     if name == "nothing":
-        return lambda t, r: np.zeros(len(t))
-    t, r = scaling.normalise(rest.temperature_c, rest.slope_c_per_min)
+        return lambda asked: np.zeros(len(asked.t))
     if name in SIMPLE:
         center = float(np.average(rest.bias_dph, weights=rest.weight))
-        found = solve(name, t, r, rest.bias_dph - center, rest.weight)
-        return lambda t, r: center + design(name, t, r) @ found
+        found = solve(columns_of(name, at.powers), rest.bias_dph - center, rest.weight)
+        return lambda asked: center + columns_of(name, asked.powers) @ found
     if process is None:
         raise TrainingFailed("there is no evidence process")
     of_rate = 1.0 if name == "mrbf" else 0.0
-    mean = conditioned(process, t[known], of_rate * r[known], rest.bias_dph[known], rest.weight[known])
-    return lambda t, r: mean(t, of_rate * r)
+    mean = conditioned(process, at.t[known], of_rate * at.r[known], rest.bias_dph[known], rest.weight[known])
+    return lambda asked: mean(asked.t, of_rate * asked.r)

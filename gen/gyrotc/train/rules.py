@@ -166,10 +166,11 @@ def _balanced(squares: Floats, x: Floats, variance: Floats) -> float:
         return 0.0
     variance = np.maximum(variance, 1e-6 * float(np.mean(squares)))
     scale = float(np.mean(squares) / np.mean(x))
+    both = squares + variance
     low, high = -30.0, 10.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        if np.mean((squares + variance) / (variance + np.exp(middle) * scale * x)) > 1.0:
+        if np.mean(both / (variance + np.exp(middle) * scale * x)) > 1.0:
             low = middle
         else:
             high = middle
@@ -208,14 +209,15 @@ def _correlation_s(known: Known, block_s: float) -> float:
     z_t, z_r = z_t / scale_t, z_r / scale_r
     lag, longest = 1, max(int(np.max(np.bincount(s.run))) // 2, 1)
     last, constant = 1.0, known.between**2
+    every, variance = max(1, len(s) // _MOST), known.sigma**2
     while True:
-        k = np.arange(0, len(s) - lag, max(1, len(s) // _MOST))
-        k = k[s.run[k] == s.run[k + lag]]
-        if k.size == 0:
+        now, then = slice(0, max(len(s) - lag, 0), every), slice(lag, None, every)
+        same = s.run[now] == s.run[then]
+        if not same.any():
             break
-        apart = (z_t[k + lag] - z_t[k]) ** 2 + (z_r[k + lag] - z_r[k]) ** 2
-        both = known.sigma[k] * known.sigma[k + lag]
-        size = np.sqrt(np.mean(known.sigma[k] ** 2) * np.mean(known.sigma[k + lag] ** 2))
+        apart = ((z_t[then] - z_t[now]) ** 2 + (z_r[then] - z_r[now]) ** 2)[same]
+        both = (known.sigma[now] * known.sigma[then])[same]
+        size = np.sqrt(np.mean(variance[now][same]) * np.mean(variance[then][same]))
         last = float((np.mean(both * np.exp(-0.5 * apart)) + constant) / (size + constant))
         if last <= np.exp(-1.0) or lag >= longest:
             break

@@ -16,7 +16,7 @@ from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
 from .result import Network, Outcome, network
 
-__all__ = ["SIMPLE", "design", "fit_simple", "solve", "without_rate"]
+__all__ = ["SIMPLE", "columns_of", "design", "fit_simple", "solve", "without_rate"]
 
 Floats = NDArray[np.float64]
 
@@ -51,11 +51,15 @@ def design(name: str, t: Floats, r: Floats) -> Floats:
     return np.stack([t**a * r**b for a, b in SIMPLE[name]], axis=1)
 
 
-def solve(name: str, t: Floats, r: Floats, y: Floats, weight: Floats) -> Floats:
-    """Weights of the columns by weighted least squares; of equally good ones the smallest."""
+def columns_of(name: str, richest: Floats) -> Floats:
+    """The columns of a correction among those of `cubic_slope`, which has all powers."""
+    return np.ascontiguousarray(richest[:, [SIMPLE["cubic_slope"].index(powers) for powers in SIMPLE[name]]])
+
+
+def solve(columns: Floats, y: Floats, weight: Floats) -> Floats:
+    """Weights of columns, shape (n, powers), by weighted least squares; of equally good ones the smallest."""
     root = np.sqrt(weight / weight.max())
-    columns = design(name, t, r) * root[:, None]
-    return np.asarray(np.linalg.lstsq(columns, y * root, rcond=None)[0], dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0], dtype=np.float64)
 
 
 def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
@@ -63,13 +67,14 @@ def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float
     began = time.process_time()
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     center = float(np.average(data.bias_dph, weights=data.weight))
-    found = solve(name, t, r, data.bias_dph - center, data.weight)
+    columns = design(name, t, r)
+    found = solve(columns, data.bias_dph - center, data.weight)
     by_power = dict(zip(SIMPLE[name], found, strict=True))
     w0 = center + by_power[0, 0]
     linear = [by_power.get((1, 0), 0.0), by_power.get((0, 1), 0.0)]
     centers, widths, weights = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
     if (3, 0) in by_power:
-        residual = data.bias_dph - center - design(name, t, r) @ found
+        residual = data.bias_dph - center - columns @ found
         floor = floor_dph(data, residual, average_s)
         extra, z, width, weights = _as_gaussians(by_power[2, 0], by_power[3, 0], _TOLERANCE * floor)
         w0, linear[0] = w0 + extra[0], linear[0] + extra[1]

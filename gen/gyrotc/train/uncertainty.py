@@ -192,14 +192,10 @@ def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float)
 
     Means over a patch keep more of the noise than white noise would leave: its level is free, else κ² takes the rest.
     """
-    least, scale = np.inf, 1.0
-    for level in _NOISES:
-        total = _SCALES[:, None] * variance + (between + level * noise)
-        deviance = np.sum(squares / total + np.log(total), axis=1) + (np.log(_SCALES) / _SCALE_SD) ** 2
-        k = int(np.argmin(deviance))
-        if deviance[k] < least:
-            least, scale = float(deviance[k]), float(_SCALES[k])
-    return least, scale
+    total = (_SCALES[:, None] * variance) + (between + _NOISES[:, None] * noise)[:, None]
+    deviance = np.sum(squares / total + np.log(total), axis=2) + (np.log(_SCALES) / _SCALE_SD) ** 2
+    level, k = np.unravel_index(np.argmin(deviance), deviance.shape)
+    return float(deviance[level, k]), float(_SCALES[k])
 
 
 def of_few(runs: int) -> float:

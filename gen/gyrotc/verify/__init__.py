@@ -17,11 +17,10 @@ import numpy as np
 
 from .. import __version__
 from ..dataset import Dataset
-from ..emit import emit_texts
+from ..emit import emit_texts, expected_answers
 from ..emit.vectors import Vectors, make_vectors
 from ..errors import InputError
 from ..model import Model, load_model
-from ..reference import answers
 from ..results.base import read_optional
 from ..results.verification import (
     EmittedWith,
@@ -89,14 +88,12 @@ def verify(  # long: the order of the checks, then one line for each field of th
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
-    expected = {n: answers(table, vectors) for n, table in tables.items()}
-    job = Job(folder / "c", model, tables, expected, trust_code)
+    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
     texts = emit_texts(
         model,
         emission,
         asked=options.numeric is not None,
         zero_at=options.zero_at_c,
-        expected=job.expected,
     )
     emitted = file_entries(job.c_folder, texts, edited)
     signed = check_signature(job.c_folder, key) if key is not None else None
