@@ -133,30 +133,37 @@ def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotStat
 
 
 def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, Floats, Floats]:
-    """The clusters' means, and of each unit the covariance of its coefficients and their deviation from the mean."""
+    """The clusters' means, and of each unit the covariance of its coefficients and their deviation from the mean.
+
+    With S the spread, G the precision of a unit and P = (S⁻¹ + G)⁻¹ its posterior covariance, what a unit says of its
+    cluster's mean has the precision G − G P G = S⁻¹ − S⁻¹ P S⁻¹ and the moment b − G P b = S⁻¹ P b: their sums need
+    that of P alone, and an inverse is all that each unit costs.
+    """
     spread = state.spread()
     inverse = np.linalg.inv(spread)
-    posterior = np.linalg.inv(inverse + units.precision)
-    gain = units.precision @ posterior
-    information = units.precision - gain @ units.precision
-    score = units.moment - np.einsum("uij,uj->ui", gain, units.moment)
+    told = inverse + units.precision
+    posterior: Floats = np.asarray(np.linalg.inv(told), dtype=np.float64)
+    alone = _times(posterior, units.moment)
     known = state.basis.variance(state.of_mean)
-    clusters = range(int(state.cluster.max()) + 1)
-    covariances = np.array(
-        [np.linalg.inv(np.diag(1.0 / known) + information[state.cluster == c].sum(0)) for c in clusters]
-    )
-    totals = np.array([score[state.cluster == c].sum(axis=0) for c in clusters])
+    groups = [state.cluster == c for c in range(int(state.cluster.max()) + 1)]
+    shared = [g.sum() * inverse - inverse @ posterior[g].sum(axis=0) @ inverse for g in groups]
+    covariances = np.array([np.linalg.inv(np.diag(1.0 / known) + one) for one in shared])
+    totals = np.array([inverse @ alone[g].sum(axis=0) for g in groups])
     means = np.einsum("cij,cj->ci", covariances, totals)
-    own = means[state.cluster]
-    moved = np.einsum("uij,uj->ui", posterior, units.moment - np.einsum("uij,uj->ui", units.precision, own))
-    value = 0.5 * float(np.einsum("ui,uij,uj->", units.moment, posterior, units.moment))
-    value += 0.5 * float(np.linalg.slogdet(posterior)[1].sum()) - 0.5 * len(units) * float(
+    moved = np.subtract(alone, _times(posterior, _times(units.precision, means[state.cluster])))
+    value = 0.5 * float(np.sum(units.moment * alone))
+    value -= 0.5 * float(np.linalg.slogdet(told)[1].sum()) + 0.5 * len(units) * float(
         np.linalg.slogdet(spread)[1]
     )
     value += 0.5 * float(np.sum(totals * means)) + 0.5 * float(np.linalg.slogdet(covariances)[1].sum())
     value -= 0.5 * len(means) * float(np.sum(np.log(known)))
     known_now = replace(state, means=means, covariances=covariances, evidence=value)
-    return known_now, np.asarray(posterior), np.asarray(moved)
+    return known_now, posterior, np.asarray(moved)
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """A matrix of each unit times its vector, shape (units, n)."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
 def predictive(state: LotState, scale: float = 1.0) -> list[tuple[Floats, Floats]]:
