@@ -32,6 +32,18 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
     )
 
 
+def run_here(*args: str | Path) -> str:
+    """What the command prints, in this process, which has all modules already; what it raises is raised."""
+    from gyrotc.commands import app
+    from typer.testing import CliRunner
+
+    done = CliRunner().invoke(app, [str(a) for a in args])
+    if isinstance(done.exception, Exception):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
 @pytest.fixture(scope="session")
 def gyrotc() -> Command:
     return run_gyrotc

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.commands import app
+from conftest import run_here
 from gyrotc.dataset import load
 from gyrotc.diagnose.extend.refitting import Refitting
 from gyrotc.diagnose.screen.gather import records_of
@@ -22,7 +22,6 @@ from gyrotc.train import predict
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from gyrotc.train.lot import prior_of
-from typer.testing import CliRunner
 
 RUNS = """
 title = "Two short cycles"
@@ -45,14 +44,6 @@ profiles = [PROFILES]
 """
 
 
-def run(*arguments: str | Path) -> str:
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    if isinstance(done.exception, Exception):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.output
-
-
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Five units with all runs, their fleet and lot; the sixth with a single short one."""
@@ -60,10 +51,10 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, profiles in (("whole", '"slow", "fast", "slow"'), ("short", '"fast"')):
         (place / f"{name}.toml").write_text(RUNS.replace("PROFILES", profiles), "utf-8")
     made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet")
-    run(*made, "--units", "5", "--base", place / "whole.toml", "--out", place / "whole")
-    run(*made, "--units", "6", "--base", place / "short.toml", "--out", place / "short")
-    run("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
-    told = run("lot", place / "fleet", "--out", place / "lot.json")
+    run_here(*made, "--units", "5", "--base", place / "whole.toml", "--out", place / "whole")
+    run_here(*made, "--units", "6", "--base", place / "short.toml", "--out", place / "short")
+    run_here("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
+    told = run_here("lot", place / "fleet", "--out", place / "lot.json")
     assert "5 units" in told and "before any run" in told
     return place
 
@@ -78,8 +69,10 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
 
 
 def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
-    told = run("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
-    run("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
+    told = run_here(
+        "fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with"
+    )
+    run_here("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
     lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
     use = json.loads((world / "with" / "training.json").read_text())["lot"]
     assert use["checksum"] == lot.checksum and use["accepted"] and not use["member"]
@@ -93,21 +86,21 @@ def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world:
 def test_header_and_report_show_the_lot(world: Path) -> None:
     out = world / "built"
     unit = world / "short" / "LOT-0005-006"
-    run("build", unit, "--lot", world / "lot.json", "--numeric", "f32", "--out", out)
+    run_here("build", unit, "--lot", world / "lot.json", "--numeric", "f32", "--out", out)
     assert "a lot of 5 units leaves" in next((out / "c").glob("gtc_lot*.h")).read_text()
     page = (out / "report.html").read_text()
     assert "<h2>The lot</h2>" in page and "the lot alone, 5 units" in page
     with pytest.raises(InputError, match="--extend"):
-        run("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
+        run_here("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
 
 
 def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> None:
     data, out = world / "few", world / "few-out"
     data.mkdir()
     (data / "LOT-0005-006").symlink_to(world / "short" / "LOT-0005-006")
-    first = run("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
-    again = run("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
-    other = run("fleet", data, "--out", out, "--jobs", "1")
+    first = run_here("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
+    again = run_here("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
+    other = run_here("fleet", data, "--out", out, "--jobs", "1")
     assert "done before" not in first and "done before" in again and "done before" not in other
 
 
@@ -115,7 +108,7 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
     lot = load_lot(world / "lot.json")
     before = prior_of(lot).alone().rms_sigma_dph()
     asked = ("--lot", world / "lot.json", "--require", f"accuracy={0.5 * before:.3g}")
-    told = run("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
+    told = run_here("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
     assert "with the lot: " in told and "without: " in told
     found = LotPlan.model_validate_json((tmp_path / "plan" / "plan.json").read_text())
     assert found.with_lot.reached and found.with_lot.sigma_dph <= found.accuracy_dph < found.before_dph
@@ -130,33 +123,33 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
     steeper = plan_with_lot(lot, str(world / "whole.toml"), 0.4 * before)
     assert steeper.with_lot.hours > found.with_lot.hours
     with pytest.raises(InputError, match="--require"):
-        run("plan", "paper", "--lot", world / "lot.json", "--require", "hysteresis=1e-4")
+        run_here("plan", "paper", "--lot", world / "lot.json", "--require", "hysteresis=1e-4")
 
 
 def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Path) -> None:
     unit, scenario = world / "fleet" / "LOT-0005-001", world / "whole.toml"
     price = ("--hours", "0.5", "--price-per-hour", "90", "--price-per-run", "150")
-    told = run("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
+    told = run_here("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
     found = NextRun.model_validate_json((tmp_path / "next" / "plan.json").read_text())
     assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in told
     assert all(p.programme.hours <= 0.5 and 0.0 <= p.removed_share < 1.0 for p in found.proposals)
     assert (tmp_path / "next" / "programme.csv").read_text().startswith("time_min,set_point_c")
-    run(
+    run_here(
         "plan", scenario, "--unit", unit, "--lot", world / "lot.json", *price, "--json", tmp_path / "lot.json"
     )
     with_lot = NextRun.model_validate_json((tmp_path / "lot.json").read_text())
     assert with_lot.before_dph != found.before_dph
     with pytest.raises(InputError, match="--unit"):
-        run("plan", scenario, "--unit", world, *price)
+        run_here("plan", scenario, "--unit", world, *price)
     with pytest.raises(InputError, match="--require"):
-        run("plan", scenario, "--unit", unit, "--require", "accuracy=1e-4")
+        run_here("plan", scenario, "--unit", unit, "--require", "accuracy=1e-4")
 
 
 def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> None:
     """The map beside the causes, from one of three runs, has less error on the others; a single cycle goes without."""
     (tmp_path / "fast.toml").write_text(RUNS.replace("PROFILES", '"fast", "slow", "fast"'), "utf-8")
     made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "6")
-    run(*made, "--base", tmp_path / "fast.toml", "--out", tmp_path / "units")
+    run_here(*made, "--base", tmp_path / "fast.toml", "--out", tmp_path / "units")
     dataset, lot = load(tmp_path / "units" / "LOT-0005-006"), load_lot(world / "lot.json")
     records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
     left = []
@@ -169,7 +162,7 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
         left.append(float(np.mean(away**2)))
         assert (fitted.lot is not None and fitted.lot.accepted) == (options.lot is not None)
     assert left[0] < left[1]
-    told = run(
+    told = run_here(
         *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),
         *("--json", tmp_path / "found.json"),
     )
@@ -178,7 +171,7 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
         and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
     )
     with pytest.raises(InputError, match="--lot"):
-        run("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--model", world)
+        run_here("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--model", world)
 
 
 def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:
@@ -191,11 +184,11 @@ def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:
 
 def test_what_is_no_lot_of_units_is_told(world: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="0 calibrated units"):
-        run("lot", tmp_path, "--out", tmp_path / "lot.json")
+        run_here("lot", tmp_path, "--out", tmp_path / "lot.json")
     with pytest.raises(InputError, match="no folder"):
-        run("lot", tmp_path / "none", "--out", tmp_path / "lot.json")
+        run_here("lot", tmp_path / "none", "--out", tmp_path / "lot.json")
     with pytest.raises(InputError, match="0 calibrated units, 5 of another axis"):
-        run("lot", world / "fleet", "--axis", "x", "--out", tmp_path / "lot.json")
+        run_here("lot", world / "fleet", "--axis", "x", "--out", tmp_path / "lot.json")
     training = tmp_path / "fleet" / "A" / "training.json"
     training.parent.mkdir(parents=True)
     content = json.loads((world / "fleet" / "LOT-0005-001" / "training.json").read_text())
@@ -205,5 +198,5 @@ def test_what_is_no_lot_of_units_is_told(world: Path, tmp_path: Path) -> None:
         (world / "fleet" / "LOT-0005-001" / "model.json").read_bytes()
     )
     with pytest.raises(InputError, match="has no means"):
-        run("lot", tmp_path / "fleet", "--out", tmp_path / "lot.json")
+        run_here("lot", tmp_path / "fleet", "--out", tmp_path / "lot.json")
     assert not (tmp_path / "lot.json").exists()

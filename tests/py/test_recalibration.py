@@ -12,9 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.commands import app
+from conftest import run_here
+from gyrotc.emit import emitted_tables
 from gyrotc.errors import InputError
+from gyrotc.model import load_model
+from gyrotc.results.base import read_result
+from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.training import Training
+from gyrotc.results.verification import Verification
 from gyrotc.train import TrainingData, fit, predict
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.lot import UnitMeans
@@ -30,7 +35,6 @@ from gyrotc.train.lot.means import unit_means
 from numpy.typing import NDArray
 from recordings import write_csv
 from scipy.stats import kstest
-from typer.testing import CliRunner
 
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, Floats], Floats]
@@ -172,14 +176,6 @@ def test_what_is_known_of_a_map_is_read_back() -> None:
             posterior_of_known(stored.model_copy(update={field: getattr(stored, field)[1:]}), "training.json")
 
 
-def run(*arguments: str | Path) -> str:
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    if isinstance(done.exception, Exception):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.output
-
-
 def dataset(folder: Path, seed: int, day: str, *, check: bool, change: Change | None = None) -> Path:
     data = recorded(np.random.default_rng(seed), CHECK if check else CALIBRATION, change)
     text = 'schema = 1\nserial = "RLG-0007"\nearth_rate = "removed"\n'
@@ -200,9 +196,9 @@ def dataset(folder: Path, seed: int, day: str, *, check: bool, change: Change | 
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("recalibration")
     block = ("--block-s", "50")
-    run("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old", *block)
+    run_here("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old", *block)
     dataset(place / "check", 12, "2026-01-01", check=True)
-    told = run("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
+    told = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
     assert "earlier model: the model " in told and "is confirmed" in told
     return place
 
@@ -213,24 +209,74 @@ def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path
     assert "is confirmed" in json.loads((world / "new" / "model.json").read_text())["meta"]["prior"]
     bumped = dataset(tmp_path / "bumped", 13, "2026-06-01", check=True, change=CHANGES["local"])
     block = ("--block-s", "50")
-    told = run("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
+    told = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
     assert "no longer holds" in told and "finding prior_does_not_hold" in told
-    told = run(
+    told = run_here(
         "fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged", *block
     )
     assert "ageing of 0.005 deg/h" in told
 
 
+def sigma_dph(result: Path) -> float:
+    """Mean 1 sigma of the cells of a result's map, deg/h."""
+    known = load_model(result / "model.json").uncertainty_dph
+    assert known is not None
+    return float(np.mean(known.rows))
+
+
+def proven(result: Path) -> None:
+    """The table of a result is emitted, and its C answers as the reference: to vectors and to the recordings."""
+    model, verified = load_model(result / "model.json"), read_result(result / "verify.json", Verification)
+    assert verified.failed == 0 and verified.passed > 0 and verified.model_hash == model.hash
+    assert read_result(result / "evaluate.json", Evaluation).mismatches == 0
+    assert emitted_tables(result / "c", model)["f32"].sigma.size > 0
+
+
+def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "built"
+    block = ("--block-s", "50")
+    run_here("build", world / "check", "--prior", world / "old", "--numeric", "f32", "--out", out, *block)
+    proven(out)
+    prior = read_result(out / "training.json", Training).prior
+    assert prior is not None and prior.accepted
+    page = (out / "report.html").read_text()
+    assert "<h2>The earlier model</h2>" in page and prior.text in page and "is confirmed" in prior.text
+    assert "the earlier model after ageing" in page and "with this unit&#x27;s own runs" not in page
+    assert page.count("<td>within</td>") == len(prior.cells) and "<td>outside</td>" not in page
+    [header] = (out / "c").glob("gtc_rlg*.h")
+    assert "prior:" in header.read_text() and load_model(world / "old" / "model.json").hash[:12] in page
+    run_here("fit", world / "check", "--out", tmp_path / "alone", *block)
+    assert sigma_dph(out) < sigma_dph(tmp_path / "alone"), "the table's sigma is that of both together"
+    earlier = json.loads((out / "changes.json").read_text())
+    assert earlier, "the earlier model is also what the result is compared with"
+
+
+def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "built"
+    bumped = dataset(tmp_path / "bumped", 15, "2026-06-01", check=True, change=CHANGES["local"])
+    run_here("build", bumped, "--prior", world / "old", "--numeric", "f32", "--out", out, "--block-s", "50")
+    proven(out)
+    prior = read_result(out / "training.json", Training).prior
+    assert prior is not None and not prior.accepted and prior.change is not None
+    low, high = prior.change.temperature_c
+    assert prior.change.kind == "local" and low < 35.0 < high and high - low <= 40.0
+    page = (out / "report.html").read_text()
+    assert "no longer holds" in page and f"between {low:.0f} ... {high:.0f} C" in page
+    assert "The correction was made without the earlier model." in page and "<td>outside</td>" in page
+    model = load_model(out / "model.json")
+    assert "no longer holds" in str(model.meta["prior"]) and model.hash in page
+
+
 def test_what_cannot_be_a_prior_is_told(world: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="was made from it"):
-        run("fit", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
+        run_here("fit", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
     with pytest.raises(InputError, match="--ageing"):
-        run("fit", world / "check", "--ageing", "1e-4", "--out", tmp_path / "a")
+        run_here("fit", world / "check", "--ageing", "1e-4", "--out", tmp_path / "a")
     with pytest.raises(InputError, match=r"--prior .* has no model\.json"):
-        run("fit", world / "check", "--prior", world, "--out", tmp_path / "a")
+        run_here("fit", world / "check", "--prior", world, "--out", tmp_path / "a")
     other = dataset(tmp_path / "other", 14, "2026-01-01", check=True)
     text = (other / "dataset.toml").read_text().replace("RLG-0007", "RLG-0008")
     (other / "dataset.toml").write_text(text)
     with pytest.raises(InputError, match="RLG-0008"):
-        run("fit", other, "--prior", world / "old", "--out", tmp_path / "a")
+        run_here("fit", other, "--prior", world / "old", "--out", tmp_path / "a")
     assert not (tmp_path / "a").exists()
