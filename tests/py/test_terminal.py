@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import shutil
@@ -15,6 +16,7 @@ import pytest
 from conftest import Command
 from emitted import emitted
 from gyrotc.cli import _hoisted
+from gyrotc.commands.base import folded
 from gyrotc.commands.stages import BUILD, DIAGNOSE, FIT, StageLine, time_left
 from gyrotc.outputs import kept
 from recordings import described
@@ -167,6 +169,39 @@ def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
         )
         wide += [line for line in told.stdout.splitlines() if len(line) > 80]
     assert wide == []
+
+
+def test_long_lines_are_broken_between_words_and_stay_to_be_copied() -> None:
+    exclude = 'exclude = [{from_s = 10.0, to_s = 12.0, reason = "thermometer stuck for a while"}]'
+    path = "/data/" + "long/" * 20 + "run-01.csv"
+    text = f"  finding stuck_temperature: it stays at 20.5 C from 10 to 12 s; look at {path} or write: {exclude}"
+    lines = folded(text, 80).split("\n")
+    assert " ".join(line.strip() for line in lines) == text.strip(), "no word is lost or cut"
+    assert lines[0].startswith("  finding") and all(line.startswith("    ") for line in lines[1:])
+    assert all(len(line) <= 80 or line.strip() in (path, exclude) for line in lines)
+    assert [line.strip() for line in lines if "exclude" in line] == [exclude], "one piece, to be pasted"
+    assert folded("short:  as it is", 80) == "short:  as it is"
+
+
+def test_a_terminal_of_80_columns_gets_lines_of_80_columns(tmp_path: Path) -> None:
+    """A pipe gets each line whole, as scripts expect."""
+    described(tmp_path / "R")
+    command = [str(PROGRAM), "check", str(tmp_path / "R")]
+    whole = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert max(len(line) for line in whole.splitlines()) > 80
+    environment = os.environ | {"COLUMNS": "80", "TERM": "xterm"}
+    reader, writer = os.openpty()
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writer, env=environment) as process:
+        os.close(writer)
+        told = b""
+        with contextlib.suppress(OSError):  # Linux says so when the other side has gone
+            while part := os.read(reader, 4096):
+                told += part
+        os.close(reader)
+    assert process.returncode == 0
+    lines = told.decode().splitlines()
+    assert all(len(line) <= 80 for line in lines if len(line.split()) > 1)
+    assert "".join("".join(lines).split()) == "".join(whole.split())
 
 
 def test_bash_completes_commands_and_options(tmp_path: Path, gyrotc: Command) -> None:

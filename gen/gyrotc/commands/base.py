@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -47,6 +48,8 @@ class _Console(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(terminal_text(text), **options | {"markup": False, "emoji": False})
 
+
+_TO_COPY = re.compile(r"\w+ = \[\{.*?\}\]|\S+")
 
 OUT = _Console(width=None if sys.stdout.isatty() else 120)
 ERR = _Console(stderr=True)
@@ -170,10 +173,30 @@ def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
 
 
 def tell(text: str, *, wrong: bool = False) -> None:
-    """A line of the result on stdout, as it is; with --quiet only what went wrong."""
+    """A line of the result on stdout, on a terminal broken between words; with --quiet only what went wrong."""
     if _Loudness.quiet and not wrong:
         return
-    OUT.print(terminal_line(text), highlight=False, soft_wrap=True)
+    line = terminal_line(text)
+    OUT.print(folded(line, OUT.width) if OUT.is_terminal else line, highlight=False, soft_wrap=True)
+
+
+def folded(line: str, width: int) -> str:
+    """A line in lines of at most so many characters, the further ones indented by two more.
+
+    A word that is longer stays whole, and so does an entry for dataset.toml: both are there to be copied.
+    """
+    if len(line) <= width:
+        return line
+    margin = line[: len(line) - len(line.lstrip())]
+    lines, at = [margin], len(margin)
+    for word in _TO_COPY.findall(line):
+        blank = " " if len(lines[-1]) > at else ""
+        if blank and len(lines[-1]) + 1 + len(word) > width:
+            at = len(margin) + 2
+            lines.append(" " * at)
+            blank = ""
+        lines[-1] += blank + word
+    return "\n".join(lines)
 
 
 def show(table: Table) -> None:
