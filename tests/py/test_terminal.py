@@ -11,13 +11,16 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import Command
 from emitted import emitted
 from gyrotc.cli import _hoisted
 from gyrotc.commands.base import folded
-from gyrotc.commands.stages import BUILD, DIAGNOSE, FIT, StageLine, time_left
+from gyrotc.commands.stages import BUILD, DIAGNOSE, EMIT, FIT, StageLine, time_left
+from gyrotc.emit import emit
+from gyrotc.model import Model
 from gyrotc.outputs import kept
 from recordings import described
 
@@ -45,6 +48,13 @@ def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path
     assert all(course.share_of(line.partition(" s  ")[2]) > 0.0 for line in lines[1:]), "a stage has no place"
 
 
+def test_every_stage_of_emit_has_a_place(model_dict: dict[str, Any], tmp_path: Path) -> None:
+    told: list[str] = []
+    emit(Model.from_dict(model_dict), tmp_path, progress=told.append)
+    shares = [StageLine(EMIT).share_of(text) for text in told]
+    assert shares == sorted(shares) and len(set(shares)) == len(told) == len(EMIT)
+
+
 def test_the_time_left() -> None:
     assert time_left(1, 10, 1.9) == "" and time_left(0, 10, 60.0) == ""
     assert time_left(5, 20, 30.0) == ", 25 %, about 90 s left"
@@ -68,7 +78,7 @@ def test_what_a_text_tells_of_the_work_that_is_done() -> None:
     assert (
         StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
     )
-    for stages in (BUILD, DIAGNOSE, FIT):
+    for stages in (BUILD, DIAGNOSE, EMIT, FIT):
         assert sum(share for _, share in stages) == pytest.approx(1.0)
 
 
@@ -174,7 +184,9 @@ def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
 def test_long_lines_are_broken_between_words_and_stay_to_be_copied() -> None:
     exclude = 'exclude = [{from_s = 10.0, to_s = 12.0, reason = "thermometer stuck for a while"}]'
     path = "/data/" + "long/" * 20 + "run-01.csv"
-    text = f"  finding stuck_temperature: it stays at 20.5 C from 10 to 12 s; look at {path} or write: {exclude}"
+    text = (
+        f"  finding stuck_temperature: it stays at 20.5 C from 10 to 12 s; look at {path} or write: {exclude}"
+    )
     lines = folded(text, 80).split("\n")
     assert " ".join(line.strip() for line in lines) == text.strip(), "no word is lost or cut"
     assert lines[0].startswith("  finding") and all(line.startswith("    ") for line in lines[1:])

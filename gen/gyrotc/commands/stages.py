@@ -10,7 +10,19 @@ from rich.text import Text
 
 from ..texts import terminal_text
 
-__all__ = ["BUILD", "COMPARE", "DIAGNOSE", "FIT", "LOT", "PLAN", "VERIFY", "StageLine", "Stages", "time_left"]
+__all__ = [
+    "BUILD",
+    "COMPARE",
+    "DIAGNOSE",
+    "EMIT",
+    "FIT",
+    "LOT",
+    "PLAN",
+    "VERIFY",
+    "StageLine",
+    "Stages",
+    "time_left",
+]
 
 _SILENT_S = 2.0  # before a time left is told
 
@@ -19,6 +31,8 @@ Stages = Sequence[tuple[str, float]]
 
 # Shares of the time as `-v` tells it for `gyrotc simulate paper --seed 1`, two processors; a guess for other data.
 FIT: Stages = (("reading", 0.5), ("training", 0.3), ("leaving out span", 0.2))
+# Of a map of 512 centers; a usual one takes a tenth of a second
+EMIT: Stages = (("rounding to f32", 0.2), ("rounding to q31", 0.65), ("answering the vectors", 0.15))
 VERIFY: Stages = (("comparing files", 0.05), ("", 0.75), ("replaying", 0.1), ("every input", 0.1))
 DIAGNOSE: Stages = (
     ("reading", 0.05), ("training", 0.02), ("leaving out span", 0.02), ("screening", 0.02),

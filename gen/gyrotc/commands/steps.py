@@ -49,7 +49,7 @@ from .results import (
     verify_notes,
     verify_table,
 )
-from .stages import FIT, VERIFY
+from .stages import EMIT, FIT, VERIFY
 from .traces import evaluation_folders
 
 
@@ -128,11 +128,11 @@ def emit(
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
     apart = target.resolve() != source.resolve()
-    with result_folder(out, "emit", entries=("c", "model.json") if apart else ("c",)) as stage:
+    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")[: 1 + apart]) as stage:
         stage.of(loaded.serial, loaded.axis)
         if apart and target.is_file() and target.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
-        emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at)
+        emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at, progress=say)
         if apart:
             loaded.save(stage.folder / "model.json")
     result = Emitted(

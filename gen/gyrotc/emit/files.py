@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
@@ -60,7 +60,9 @@ class Emission:
     refused: dict[str, str]
 
 
-def quantise_all(model: Model, numerics: Sequence[str] | None) -> Emission:
+def quantise_all(
+    model: Model, numerics: Sequence[str] | None, say: Callable[[str], None] = lambda _: None
+) -> Emission:
     """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
 
     Raises:
@@ -77,6 +79,7 @@ def quantise_all(model: Model, numerics: Sequence[str] | None) -> Emission:
     tables: dict[str, Table] = {}
     refused: dict[str, str] = {}
     for numeric in NUMERICS if numerics is None else tuple(dict.fromkeys(numerics)):
+        say(f"rounding to {numeric}")
         try:
             tables[numeric] = quantise(model, numeric)
         except CheckFailed as error:
@@ -89,10 +92,16 @@ def quantise_all(model: Model, numerics: Sequence[str] | None) -> Emission:
 
 
 def emit(
-    model: Model, out: Path, *, numerics: Sequence[str] | None = None, zero_at: float | None = None
+    model: Model,
+    out: Path,
+    *,
+    numerics: Sequence[str] | None = None,
+    zero_at: float | None = None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Emission:
     """Writes `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced."""
-    emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics)
+    emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics, progress)
+    progress("answering the vectors")
     texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at)
     write_texts(out, texts, model)
     return emission
