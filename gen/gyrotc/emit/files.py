@@ -8,7 +8,7 @@ done in `quantise`; here integers are printed.
 from __future__ import annotations
 
 import functools
-import math
+import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal, localcontext
@@ -19,19 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckFailed, InputError
-from ..frontend import period_us
 from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
 from ..quantise.authority import MARGIN
-from ..quantise.guards import guard_of
 from ..quantise.terms import channel_names
 from ..reference import answers
 from ..reference.runtime import runtime_folders
 from ..reference.table import LAYOUT
 from ..texts import CText, c_code, c_environment, c_literal
 from .amalgamate import amalgamate
-from .image import image_of, intel_hex
+from .example import example_values
 from .record import RECORD, Options, read_options, record_text
 from .table_text import table_text
 from .vectors import MISSING, Vectors, answers_text, make_vectors
@@ -42,14 +40,10 @@ __all__ = [
     "emit",
     "emit_texts",
     "emitted_tables",
-    "example_period_us",
-    "example_samples",
     "expected_answers",
     "quantise_all",
     "write_texts",
 ]
-
-_EXAMPLE_US = 10000  # 100 samples a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,8 +193,8 @@ def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
-        texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
-        texts[f"gtc_{model.id}{suffix}.hex"] = intel_hex(image_of(table)).encode("ascii")
+        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
     texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     texts[RECORD] = record_text(model, options, texts)
     return texts
@@ -229,7 +223,7 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "sizes": list(_sizes(emission)),
         "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
-        **_example_values(model),
+        **example_values(model),
     }
     named = {
         f"gtc_{model.id}.h": "table.h.j2",
@@ -310,18 +304,6 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
         yield number(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
 
 
-def _example_values(model: Model) -> dict[str, Any]:
-    """What the example reads: the middle of the envelope, and of each further channel what is used when it is lost."""
-    middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
-    readings = [middle, *(guard_of(model, name).fallback for name in channel_names(model))]
-    return {
-        "readings": [c_code(f"{middle:.1f}F"), *(c_code(f"{value:#.7g}F") for value in readings[1:])],
-        "readings_q16": [round(value * 65536) for value in readings],
-        "period_us": example_period_us(model),
-        "samples": example_samples(model),
-    }
-
-
 def _macro(name: str, text: CText, comment: str) -> dict[str, str]:
     return {"name": name, "text": text, "comment": comment}
 
@@ -348,13 +330,18 @@ def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
         yield _macro(f"AUTHORITY_{name}_DPH", text, told)
 
 
-def example_samples(model: Model) -> int:
-    """Samples until the first start of the example is believed, of every channel."""
-    longest_s = max(guard_of(model, name).agree_s for name in (None, *channel_names(model)))
-    return math.ceil(longest_s * 1e6 / example_period_us(model)) + 1
+def _image(table: Table) -> bytes:
+    return struct.pack(f"<{len(table.words)}I", *table.words)
 
 
-def example_period_us(model: Model) -> int:
-    """A sample period that fits the model's block: 10 ms where it does, else a tenth of the block."""
-    block_us = max(1, round(model.block_s * 1e6))
-    return _EXAMPLE_US if block_us % _EXAMPLE_US == 0 else period_us(block_us, min(10, block_us))
+def _intel_hex(data: bytes) -> str:
+    def record(kind: int, address: int, payload: bytes) -> str:
+        body = bytes([len(payload), address >> 8 & 255, address & 255, kind]) + payload
+        return ":" + (body + bytes([-sum(body) & 255])).hex().upper() + "\n"
+
+    lines = []
+    for start in range(0, len(data), 16):
+        if start and start % 65536 == 0:
+            lines.append(record(4, 0, struct.pack(">H", start >> 16)))
+        lines.append(record(0, start & 0xFFFF, data[start : start + 16]))
+    return "".join(lines) + record(1, 0, b"")
