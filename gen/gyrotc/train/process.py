@@ -194,7 +194,7 @@ def conditioned(
     bins = gather(t, r, y, weight / np.median(weight))
     model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
     try:
-        model.condition(process.model.log_parameters, mean_alone=True)
+        model.condition(process.model.log_parameters)
     except RuntimeError as error:
         raise TrainingFailed(f"the evidence model cannot be solved ({error})") from error
     return lambda t, r: center + process.spread * model.mean(t, r)
