@@ -74,7 +74,7 @@ NB_MODULE(_core, m) {
              })
         .def("optimise", [](EvidenceModel &self) { self.optimise(); })
         .def("optimise_from", [](EvidenceModel &self, const EvidenceParameters &start) { self.optimise(&start); })
-        .def("condition", &EvidenceModel::condition, "log_parameters"_a, "mean_alone"_a = false)
+        .def("condition", &EvidenceModel::condition)
         .def("mean", &EvidenceModel::mean, "t"_a, "r"_a)
         .def("variance", &EvidenceModel::variance, "t"_a, "r"_a)
         .def_prop_ro("log_parameters", [](const EvidenceModel &self) { return self.log_parameters(); })

@@ -153,20 +153,30 @@ double EvidenceModel::objective(const EvidenceParameters &log_parameters, Eviden
     return value;
 }
 
-void EvidenceModel::condition(const EvidenceParameters &log_parameters, bool mean_alone) {
+void EvidenceModel::condition(const EvidenceParameters &log_parameters) {
     log_parameters_ = log_parameters;
-    const VectorXd h = prior_variance(log_parameters, nullptr).cwiseSqrt();
+    root_ = prior_variance(log_parameters, nullptr).cwiseSqrt();
     const double noise = std::exp(2.0 * log_parameters[7]);
-    MatrixXd a = h.asDiagonal() * gram_ * h.asDiagonal();
+    MatrixXd a = root_.asDiagonal() * gram_ * root_.asDiagonal();
     a.diagonal().array() += noise;
     const Eigen::LLT<MatrixXd> llt(a);
     if (llt.info() != Eigen::Success) throw std::runtime_error("evidence: the posterior is not positive definite");
-    coefficients_ = h.cwiseProduct(llt.solve(h.cwiseProduct(moment_)));
+    coefficients_ = root_.cwiseProduct(llt.solve(root_.cwiseProduct(moment_)));
+    lower_ = llt.matrixLLT();
     factor_.resize(0, 0);
-    if (mean_alone) return;
-    const MatrixXd inverse_l = inverse_of(llt.matrixLLT());
-    factor_ = std::sqrt(noise) * (h.asDiagonal() * inverse_l.transpose());
+}
+
+void EvidenceModel::spread() const {
+    if (factor_.size() > 0 || lower_.size() == 0) return;
+    const double noise = std::exp(2.0 * log_parameters_[7]);
+    const MatrixXd inverse_l = inverse_of(lower_);
+    factor_ = std::sqrt(noise) * (root_.asDiagonal() * inverse_l.transpose());
     freedom_ = kBasis - noise * inverse_l.squaredNorm();
+}
+
+double EvidenceModel::freedom() const {
+    spread();
+    return freedom_;
 }
 
 void EvidenceModel::optimise(const EvidenceParameters *start) {
@@ -230,7 +240,7 @@ VectorXd EvidenceModel::mean(const VectorXd &t, const VectorXd &r) const {
 
 // The factor is an upper triangle: below a block of its columns it is zero.
 VectorXd EvidenceModel::variance(const VectorXd &t, const VectorXd &r) const {
-    if (factor_.size() == 0) throw std::logic_error("evidence: conditioned for its mean alone");
+    spread();
     VectorXd found(t.size());
     MatrixXd product;
     for (Eigen::Index at = 0, rows; at < t.size(); at += rows) {

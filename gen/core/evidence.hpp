@@ -41,15 +41,15 @@ class EvidenceModel {
     // Maximises the evidence from two starts of the short scale (and from `start` if given), then conditions.
     void optimise(const EvidenceParameters *start = nullptr);
 
-    // Conditions on the bins with these parameters; `mean_alone`: without what `variance` and `freedom` need.
-    void condition(const EvidenceParameters &log_parameters, bool mean_alone = false);
+    // Conditions on the bins with these parameters. What `variance` and `freedom` need is made when they are asked.
+    void condition(const EvidenceParameters &log_parameters);
 
     Eigen::VectorXd mean(const Eigen::VectorXd &t, const Eigen::VectorXd &r) const;
     Eigen::VectorXd variance(const Eigen::VectorXd &t, const Eigen::VectorXd &r) const;
 
     const EvidenceParameters &log_parameters() const { return log_parameters_; }
     double sigma() const { return std::exp(log_parameters_[kEvidenceParameters - 1]); }
-    double freedom() const { return freedom_; }        // effective number of parameters
+    double freedom() const;                            // effective number of parameters
     double value() const { return value_; }            // objective at the optimum
     int evaluations() const { return evaluations_; }
 
@@ -65,8 +65,13 @@ class EvidenceModel {
     Eigen::VectorXd moment_;             // Phi' N y
     EvidenceParameters log_parameters_ = EvidenceParameters::Zero();
     Eigen::VectorXd coefficients_;       // posterior mean
-    Eigen::MatrixXd factor_;             // sqrt of the posterior covariance: cov = factor factor'
-    double freedom_ = 0.0, value_ = 0.0;
+    void spread() const;
+
+    Eigen::VectorXd root_;               // sqrt of the prior variances
+    Eigen::MatrixXd lower_;              // Cholesky factor of the posterior precision, scaled by root_ and noise
+    mutable Eigen::MatrixXd factor_;     // sqrt of the posterior covariance: cov = factor factor'; empty: not made yet
+    mutable double freedom_ = 0.0;
+    double value_ = 0.0;
     int evaluations_ = 0;
 };
 

@@ -156,13 +156,14 @@ def test_many_points_are_answered_as_each_part_of_them() -> None:
             np.testing.assert_allclose(ask(t[part], r[part]), whole[part], rtol=1e-11)
 
 
-def test_a_process_for_its_mean_alone_has_the_same_mean_and_no_variance() -> None:
+def test_a_process_that_is_conditioned_anew_forgets_its_earlier_variance() -> None:
     data = bins(8)
-    whole, mean_alone = model(data), model(data)
-    whole.condition(PRIOR_MEAN)
-    mean_alone.optimise()  # an earlier variance is not that of the new parameters
-    mean_alone.condition(PRIOR_MEAN, mean_alone=True)
+    again, fresh = model(data), model(data)
     at = np.linspace(-1.0, 1.0, 50), np.linspace(1.0, -1.0, 50)
-    assert np.array_equal(whole.mean(*at), mean_alone.mean(*at))
-    with pytest.raises(RuntimeError, match="for its mean alone"):
-        mean_alone.variance(*at)
+    again.condition(PRIOR_MEAN - 0.5)
+    before, freedom = again.variance(*at), again.freedom
+    again.condition(PRIOR_MEAN)
+    fresh.condition(PRIOR_MEAN)
+    assert not np.array_equal(again.variance(*at), before) and again.freedom != freedom
+    assert np.array_equal(again.variance(*at), fresh.variance(*at)) and again.freedom == fresh.freedom
+    assert np.array_equal(again.mean(*at), fresh.mean(*at))
