@@ -15,7 +15,7 @@ from gyrotc.diagnose.attribute.misfit import misfit
 from gyrotc.diagnose.attribute.overlap import overlap
 from gyrotc.diagnose.attribute.pairs import best_of, clear_pair, makes_sense
 from gyrotc.diagnose.attribute.refine import Refined, model_columns, refine
-from gyrotc.diagnose.attribute.rivals import EQUIVALENT, Rival, probabilities_of, rivals_of
+from gyrotc.diagnose.attribute.rivals import EQUIVALENT, Rival, near_of, probabilities_of, ranked_rivals
 from gyrotc.diagnose.detect.search import Search
 from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
 from numpy.typing import NDArray
@@ -182,7 +182,7 @@ def test_rivals_are_near_in_the_criterion() -> None:
         _point(g, (id, 1.0))
         for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))
     ]
-    [near] = rivals_of(singles, [], singles[0].members, 400)
+    [near] = map(near_of, ranked_rivals(singles, [], singles[0].members, 400))
     assert [r.id for r in near] == ["thermal_gradient"]
     prices = [p.criterion(400) for p in singles]
     assert near[0].distance == pytest.approx(prices[0] - prices[1])
@@ -191,7 +191,7 @@ def test_rivals_are_near_in_the_criterion() -> None:
         _point(198.0, ("hysteresis", 1.0), ("ageing", 1.0)),
         _point(199.0, ("thermal_gradient", 1.0), ("ageing", 1.0)),
     ]
-    first, second = rivals_of(singles, pairs, pairs[0].members, 400)
+    first, second = map(near_of, ranked_rivals(singles, pairs, pairs[0].members, 400))
     assert [r.id for r in first] == [] and [r.id for r in second] == ["ageing"]
 
 
@@ -211,9 +211,9 @@ def test_what_is_called_equal_and_the_probabilities_agree() -> None:
     for id in ("thermal_gradient", "warm_up", "ageing"):
         one = _point(0.0, (id, 1.0))
         singles.append(_point(price - far - one.criterion(size), (id, 1.0)))
-    [near] = rivals_of(singles[:2], [], singles[0].members, size)
+    [near] = map(near_of, ranked_rivals(singles[:2], [], singles[0].members, size))
     assert near == (), "one alone is ruled out"
-    [near] = rivals_of(singles, [], singles[0].members, size)
+    [near] = map(near_of, ranked_rivals(singles, [], singles[0].members, size))
     assert near, "three together are not"
 
 

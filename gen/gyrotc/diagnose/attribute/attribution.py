@@ -22,7 +22,8 @@ from .gains import Gains, Point
 from .misfit import misfit
 from .pairs import best_of, clear_pair, makes_sense
 from .refine import Refined, model_columns, refine
-from .rivals import Rival, probabilities_of, ranked_rivals, rivals_of
+from .rivals import Rival, near_of, probabilities_of, ranked_rivals
+from .simulated_odds import calibrated
 
 __all__ = ["Attribution", "attribute", "choose"]
 
@@ -105,19 +106,20 @@ def attribute(search: Search) -> Attribution:
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
     taken = tuple(stage.chosen[k] for k in order)
-    rivals = rivals_of(singles, pairs, taken, gains.size)
     ranked = ranked_rivals(singles, pairs, taken, gains.size)
+    pool = singles if len(taken) == 1 else pairs
+    likely = [calibrated(gains, pool, taken, k, near) for k, near in enumerate(ranked)]
     return Attribution(
         first=first,
         causes=refined,
         p_values=tuple(_p_value(first, r.candidate) for r in refined),
-        rivals=rivals,
+        rivals=tuple(map(near_of, likely)),
         gain=stage.gain,
         misfit_p=stage.misfit_p,
         share=stage.share,
         last=stage.found,
-        other=_contest(gains, refined, rivals),
-        probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, ranked, strict=True)),
+        other=_contest(gains, refined, tuple(map(near_of, ranked))),
+        probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
     )
 
 

@@ -10,7 +10,16 @@ import numpy as np
 from ..signatures.candidates import Candidate
 from .gains import Point
 
-__all__ = ["EQUIVALENT", "Rival", "probabilities_of", "ranked_rivals", "rivals_of"]
+__all__ = [
+    "EQUIVALENT",
+    "Kind",
+    "Rival",
+    "kind_of",
+    "near_of",
+    "odds_of",
+    "probabilities_of",
+    "ranked_rivals",
+]
 
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
@@ -23,26 +32,22 @@ equal has 1 in 10. Map, noise colour and grid are known less well than the likel
 _SURE = 0.9  # probability from which one cause is told as the explanation
 _TOLD = 0.01  # smaller ones are not worth a line
 
-_Kind = tuple[str, str]  # cause and channel ("" for none)
+Kind = tuple[str, str]  # cause and channel ("" for none)
 
 
 @dataclass(frozen=True)
 class Rival:
-    """Another cause, or channel, in place of a chosen one: its criterion's distance, 0 is equal."""
+    """Another cause, or channel, in place of a chosen one.
+
+    Attributes:
+        distance: How far its criterion is behind, 0 is equal.
+        odds: Against the chosen one, where simulation has told them; None: those of the distance.
+    """
 
     id: str
     distance: float
     channel: str | None = None
-
-
-def rivals_of(
-    singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
-) -> tuple[tuple[Rival, ...], ...]:
-    """Other causes in the place of each chosen one that explain the recordings as well, nearest first.
-
-    These are all within `EQUIVALENT`, and as many more as it takes until they and the chosen one have 0.9.
-    """
-    return tuple(_near(ranked) for ranked in ranked_rivals(singles, pairs, chosen, size))
+    odds: float | None = None
 
 
 def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
@@ -50,17 +55,22 @@ def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
     odds = {chosen: 1.0}
     for rival in ranked:
         if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause
-            odds[rival.id] = _odds(rival)
+            odds[rival.id] = odds_of(rival)
     total = sum(odds.values())
     return {id: value / total for id, value in odds.items() if id == chosen or value / total >= _TOLD}
 
 
-def _odds(rival: Rival) -> float:
-    return float(np.exp(-0.5 * _TEMPER * rival.distance))
+def odds_of(rival: Rival) -> float:
+    """Of a rival against the chosen cause."""
+    return float(np.exp(-0.5 * _TEMPER * rival.distance)) if rival.odds is None else rival.odds
 
 
-def _near(ranked: Sequence[Rival]) -> tuple[Rival, ...]:
-    odds = np.array([1.0, *map(_odds, ranked)])
+def near_of(ranked: Sequence[Rival]) -> tuple[Rival, ...]:
+    """Those of all rivals, the likeliest first, that explain the recordings as well as the chosen cause.
+
+    These are all within `EQUIVALENT`, and as many more as it takes until they and the chosen one have 0.9.
+    """
+    odds = np.array([1.0, *map(odds_of, ranked)])
     enough = int(np.searchsorted(np.cumsum(odds) / odds.sum(), _SURE))
     return tuple(r for k, r in enumerate(ranked) if k < enough or r.distance <= EQUIVALENT)
 
@@ -69,13 +79,13 @@ def ranked_rivals(
     singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
 ) -> tuple[tuple[Rival, ...], ...]:
     """Other causes in the place of each chosen one, everything else kept in kind: all of them, nearest first."""
-    kinds = [_kind(c) for c in chosen]
+    kinds = [kind_of(c) for c in chosen]
     pool = singles if len(chosen) == 1 else pairs
     if len(chosen) > 2:
         return tuple(() for _ in chosen)
-    best: dict[tuple[_Kind, ...], float] = {}
+    best: dict[tuple[Kind, ...], float] = {}
     for p in pool:
-        key = tuple(sorted(_kind(m) for m in p.members))
+        key = tuple(sorted(kind_of(m) for m in p.members))
         value = p.criterion(size)
         if value > best.get(key, -np.inf):
             best[key] = value
@@ -83,7 +93,7 @@ def ranked_rivals(
     out = []
     for k in range(len(kinds)):
         others = kinds[:k] + kinds[k + 1 :]
-        near: dict[_Kind, float] = {}
+        near: dict[Kind, float] = {}
         for key, value in best.items():
             rest = list(key)
             if any(o not in rest for o in others):
@@ -97,5 +107,6 @@ def ranked_rivals(
     return tuple(out)
 
 
-def _kind(candidate: Candidate) -> _Kind:
+def kind_of(candidate: Candidate) -> Kind:
+    """Cause and channel."""
     return candidate.id, candidate.channel or ""
