@@ -177,11 +177,12 @@ class _Simulated:
         """How much likelier a lead like the measured one is where the rival acts than where the named cause does.
 
         At most 1: the rival has the worse criterion. Densities are of normal kernels (Silverman 1986, eq. 3.28) at the
-        measured lead; half a draw is added to each, so that no finite number of them makes anything impossible.
+        measured lead, as wide as leads of the named cause, about which it lies, ask for: those of offsets drawn anew
+        spread over far more. Half a draw is added to each, so that no number of them makes anything impossible.
         """
         lead = float((self.measured[named] - self.measured[rival])[0])
         of = {kind: self.drawn[kind][named] - self.drawn[kind][rival] for kind in (named, rival)}
-        width = max(1.06 * _DRAWS**-0.2 * max(float(leads.std()) for leads in of.values()), _FINEST)
+        width = max(1.06 * _DRAWS**-0.2 * float(of[named].std()), _FINEST)
         near = {kind: float(np.exp(-0.5 * ((x - lead) / width) ** 2).sum()) for kind, x in of.items()}
         return min((near[rival] + 0.5) / (near[named] + 0.5), 1.0)
 
