@@ -70,6 +70,8 @@ extern "C" {
 #define gtc_f32_term_warm_up GTC_LINKED(gtc_f32_term_warm_up)
 #define gtc_f32_term_harmonic GTC_LINKED(gtc_f32_term_harmonic)
 #define gtc_f32_term_auxiliary GTC_LINKED(gtc_f32_term_auxiliary)
+#define gtc_f32_term_curve GTC_LINKED(gtc_f32_term_curve)
+#define gtc_f32_term_product GTC_LINKED(gtc_f32_term_product)
 #define gtc_q31_check GTC_LINKED(gtc_q31_check)
 #define gtc_q31_open GTC_LINKED(gtc_q31_open)
 #define gtc_q31_map GTC_LINKED(gtc_q31_map)
@@ -88,6 +90,8 @@ extern "C" {
 #define gtc_q31_term_warm_up GTC_LINKED(gtc_q31_term_warm_up)
 #define gtc_q31_term_harmonic GTC_LINKED(gtc_q31_term_harmonic)
 #define gtc_q31_term_auxiliary GTC_LINKED(gtc_q31_term_auxiliary)
+#define gtc_q31_term_curve GTC_LINKED(gtc_q31_term_curve)
+#define gtc_q31_term_product GTC_LINKED(gtc_q31_term_product)
 
 /* What a call did. 0: done. Positive: done, with remarks as bits. Negative: nothing was written.
  * A released value keeps its meaning for ever; treat an unknown negative one as a failure. */

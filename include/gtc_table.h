@@ -31,7 +31,9 @@
 #define GTC_TERM_PLAY 2U      /* play operator: hysteresis */
 #define GTC_TERM_WARM_UP 3U   /* exponential in the time since power-on */
 #define GTC_TERM_HARMONIC 4U  /* harmonic in T: path_length_periodicity */
-#define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel */
+#define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel; kinds from here on read one */
+#define GTC_TERM_CURVE 6U     /* a line and two Gaussians in an auxiliary channel */
+#define GTC_TERM_PRODUCT 7U   /* a line in T times a line in an auxiliary channel */
 
 #if (UINT_LEAST32_MAX != 4294967295U) || (INT_LEAST32_MIN + 1 != -2147483647)
 #error "gtc needs least-width 32-bit integers of just 32 bits, in two's complement"

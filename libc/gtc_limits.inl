@@ -13,7 +13,7 @@
 #define N_WHOLE 18U    /* whole numbers of a table's header ... */
 #define FIRST_COUNT 8U /* ... of which the counts are the last */
 #define N_NUMBERS 13U  /* other numbers of the header */
-#define N_KINDS 5U     /* of terms */
+#define N_KINDS 7U     /* of terms */
 
 typedef struct {
     NUM least;
@@ -132,6 +132,22 @@ static const FN(range_t) FN(term_limits)[N_KINDS][GTC_TERM_WORDS - 2U] = {
         RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* auxiliary: reference */
         RANGE(0.0F, 0.0F,              0, 0),
         RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+        RANGE(0.0F, 0.0F,              0, 0),
+    },
+    {
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* curve: slope */
+        RANGE(0.0F, 1.0e9F,            0, 2147483647),               /* curve: gain */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741823, 1073741823),     /* curve: reference, first center */
+        RANGE(-1.0e9F, 1.0e9F,         -536870912, 536870912),       /* curve: first weight */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741823, 1073741823),     /* curve: second center */
+        RANGE(-1.0e9F, 1.0e9F,         -536870912, 536870912),       /* curve: second weight */
+    },
+    {
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* product: slope */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* product: reference */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* product: slope of the slope over T */
+        RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* product: reference of T */
         RANGE(0.0F, 0.0F,              0, 0),
         RANGE(0.0F, 0.0F,              0, 0),
     },

@@ -482,6 +482,30 @@ static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitud
     return value;
 }
 
+/* weight * 2^(-((x - center) gain)^2 / 64); bell: center, weight */
+GTC_IN_LOOP float FN(bell)(float x, float gain, const gtc_word_t *bell)
+{
+    float u;
+
+    u = x - bell[0].value;
+    u = u * gain;
+    u = u * u;
+    u = FN(exp2)(u);
+    u = bell[1].value * u;
+    return u;
+}
+
+/* Two of one gain: gain; center, weight; center, weight. */
+static inline float FN(bells)(float x, const gtc_word_t *bells)
+{
+    const float first = FN(bell)(x, bells[0].value, &bells[1]);
+    float sum;
+
+    sum = FN(bell)(x, bells[0].value, &bells[3]);
+    sum = first + sum;
+    return sum;
+}
+
 /* ---- the uncertainty -------------------------------------------------------------------- */
 
 #define SNAPSHOT gtc_f32_snapshot_t

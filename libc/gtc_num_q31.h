@@ -280,20 +280,24 @@ GTC_IN_LOOP int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t 
     return argument.integer;
 }
 
+/* Takes weight * 2^-u into the sum. */
+GTC_IN_LOOP FN(sum_t) FN(weighted)(FN(sum_t) sum, int_least32_t weight, uint_least32_t u, uint_least32_t g)
+{
+#if defined(__ARM_FEATURE_SAT)
+    return FN(accumulate)(sum, weight, FN(exp2)(__usat((int_least32_t)u, 29), g));
+#else
+    return (u <= Q31_LAST) ? FN(accumulate)(sum, weight, FN(exp2)(u, g)) : sum;
+#endif
+}
+
 /* Takes one Gaussian into the sum. */
 GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
                                           const POINT *in, uint_least32_t g)
 {
-    uint_least32_t u;
+    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
+                                                 FN(argument)(&center[2], in->x_slope));
 
-    u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
-                                 FN(argument)(&center[2], in->x_slope));
-#if defined(__ARM_FEATURE_SAT)
-    u = __usat((int_least32_t)u, 29);
-    return FN(accumulate)(sum, center[4].integer, FN(exp2)(u, g));
-#else
-    return (u <= Q31_LAST) ? FN(accumulate)(sum, center[4].integer, FN(exp2)(u, g)) : sum;
-#endif
+    return FN(weighted)(sum, center[4].integer, u, g);
 }
 
 /* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
@@ -478,6 +482,23 @@ static inline int_least32_t FN(ahead)(int_least32_t temp, int_least32_t slope, u
     return FN(saturated)(temp + ((int_least64_t)slope * (int_least64_t)blocks));
 }
 
+#define Q31_PART 1073741824 /* 2^30, so that products of two keep to 63 bits with room for a sum */
+
+/* The nearest number of magnitude 2^30 at most. */
+static inline int_least64_t FN(limited)(int_least64_t x)
+{
+    int_least64_t y = x;
+
+    if (y > Q31_PART) {
+        y = Q31_PART;
+    } else if (y < -Q31_PART) {
+        y = -Q31_PART;
+    } else {
+        /* it fits */
+    }
+    return y;
+}
+
 /* ---- the terms -------------------------------------------------------------------------- */
 
 static inline int_least32_t FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
@@ -571,28 +592,43 @@ static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, i
     return FN(floored)(amplitude * h, 30U);
 }
 
+/* Takes weight * 2^-((x - center) gain)^2 into the sum; bell: center, weight. gain in 2^-24 for each unit of x;
+ * |x| <= 2^30, |center| < 2^30, gain >= 0. From 6 on it is 0, as the square is then 36 octaves. */
+GTC_IN_LOOP FN(sum_t) FN(bell)(FN(sum_t) sum, int_least32_t x, int_least32_t gain, const gtc_word_t *bell,
+                                  uint_least32_t g)
+{
+    const int_least32_t d = x - bell[0].integer;
+    const uint_least64_t way = (uint_least64_t)((int_least64_t)d * gain);
+    const uint_least32_t whole = (uint_least32_t)(way >> 32);
+    gtc_word_t argument; /* in 2^-28 */
+
+    GTC_ASSERT_RANGE((d >= -2147483647) && (gain >= 0));
+    if (((whole + 0x600U) & 0xFFFFFFFFU) >= 0xC00U) {
+        return sum;
+    }
+    argument.bits = ((whole << 20) & 0xFFFFFFFFU) | ((uint_least32_t)(way & 0xFFFFFFFFU) >> 12);
+    return FN(weighted)(sum, bell[1].integer, FN(high_of_squares)(argument.integer, 0), g);
+}
+
+/* Two of one gain: gain; center, weight; center, weight. |weight| <= 2^29 */
+static inline int_least64_t FN(bells)(int_least32_t x, const gtc_word_t *bells)
+{
+    const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64]; /* as for the map */
+    FN(sum_t) sum = FN(begun)(0);
+    gtc_word_t total;
+
+    sum = FN(bell)(sum, x, bells[0].integer, &bells[1], g);
+    sum = FN(bell)(sum, x, bells[0].integer, &bells[3], g);
+    total.bits = FN(units)(sum);
+    return total.integer;
+}
+
 /* ---- the uncertainty -------------------------------------------------------------------- */
 
 #define SNAPSHOT gtc_q31_snapshot_t
 #define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
 #define NO_SQUARE 0U
 #define SHIFT_SHARE uint_least64_t /* 2^-31 */
-#define Q31_PART 1073741824
-
-/* The nearest number of magnitude 2^30 at most. */
-static inline int_least64_t FN(limited)(int_least64_t x)
-{
-    int_least64_t y = x;
-
-    if (y > Q31_PART) {
-        y = Q31_PART;
-    } else if (y < -Q31_PART) {
-        y = -Q31_PART;
-    } else {
-        /* it fits */
-    }
-    return y;
-}
 
 static inline uint_least64_t FN(squared)(int_least64_t x)
 {

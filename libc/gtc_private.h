@@ -40,6 +40,9 @@ uint_least32_t gtc_crc_word(uint_least32_t crc, uint_least32_t word);
 /* The same for n words of a table; n may be 0. */
 uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_least32_t n);
 
+/* Whether a kind of term reads an auxiliary channel. */
+#define READS_CHANNEL(kind) ((kind) >= GTC_TERM_AUXILIARY)
+
 /* What terms make of the inputs and add to the bias. */
 typedef struct {
     float temp;
@@ -80,10 +83,14 @@ extern const struct gtc_f32_term_code gtc_f32_term_play;
 extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
 extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
 extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
+extern const struct gtc_f32_term_code gtc_f32_term_curve;
+extern const struct gtc_f32_term_code gtc_f32_term_product;
 extern const struct gtc_q31_term_code gtc_q31_term_memory;
 extern const struct gtc_q31_term_code gtc_q31_term_play;
 extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
 extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
 extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
+extern const struct gtc_q31_term_code gtc_q31_term_curve;
+extern const struct gtc_q31_term_code gtc_q31_term_product;
 
 #endif /* GTC_PRIVATE_H_INCLUDED */

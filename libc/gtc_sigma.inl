@@ -179,7 +179,7 @@ static SQUARE FN(variance_of_terms)(const STATE *state)
         const NUM word = FN(rule)(table, GTC_SIGMA_RULES + i);
         const NUM first = FN(parameter)(state, i, 0U);
 
-        if (kind == GTC_TERM_AUXILIARY) {
+        if (READS_CHANNEL(kind)) {
             if ((state->status & GTC_CHANNEL_LOST) != 0) {
                 sum = FN(plus)(sum, FN(squared)(word));
             }

@@ -155,17 +155,17 @@ static int FN(centers_fit)(const TABLE *table)
     return (n == table->n_centers) ? 1 : 0;
 }
 
-/* A term comes with its code; an auxiliary one reads a further channel, others the temperature. */
+/* A term comes with its code; some kinds read a further channel, others the temperature. */
 static int FN(term_fits)(const TABLE *table, uint_least32_t i)
 {
     const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
     const uint_least32_t channel = FN(channel_of)(term);
 
     return ((table->term_code[i] != NULL) && (table->term_code[i]->kind == term[0].bits)
-            && (channel < table->n_channels) && ((channel != 0U) == (term[0].bits == GTC_TERM_AUXILIARY))) ? 1 : 0;
+            && (channel < table->n_channels) && ((channel != 0U) == READS_CHANNEL(term[0].bits))) ? 1 : 0;
 }
 
-/* All of them; stand-ins belong to auxiliary terms, one to each that has one, in their order, behind at least one
+/* All of them; stand-ins belong to terms of a channel, one to each that has one, in their order, behind at least one
  * network of the map. */
 static int FN(terms_fit)(const TABLE *table)
 {
@@ -473,9 +473,10 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
 static void FN(find_terms)(volatile TABLE *table)
 {
 #if GTC_OPEN_TERMS
-    /* MISRA 9.3: all five are there; their names are macros, which the checker does not count. */
-    static const struct FN(term_code) *const all[5] = {
+    /* MISRA 9.3: all are there; their names are macros, which the checker does not count. */
+    static const struct FN(term_code) *const all[N_KINDS] = {
         &FN(term_memory), &FN(term_play), &FN(term_warm_up), &FN(term_harmonic), &FN(term_auxiliary),
+        &FN(term_curve), &FN(term_product),
     };
 #endif
     uint_least32_t i;

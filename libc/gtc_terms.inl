@@ -153,22 +153,19 @@ const struct FN(term_code) FN(term_harmonic) = {
     GTC_TERM_HARMONIC, 0U, FN(nothing), FN(nothing), FN(harmonic_apply),
 };
 
-/* ---- linear in the block mean of an auxiliary channel
+/* ---- functions of the block mean of an auxiliary channel
  *
- * Parameters: slope; reference. Adds slope (mean - reference), the mean of the channel's last block with enough
- * readings. While nothing of the channel is believed it adds its stand-in; a term that has none takes the guard's
- * fallback for the mean (gtc_front.inl). */
+ * The mean is that of the channel's last block with enough readings. While nothing of the channel is believed a term
+ * adds its stand-in; one that has none takes the guard's fallback for the mean (gtc_front.inl). */
 
-static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
+/* Whether the channel of a term shows a mean, with the remarks about it; else the stand-in is added. */
+static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NUM *mean)
 {
     const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
     const uint_least32_t channel = FN(channel_of)(term);
     const uint_least32_t stand_in = FN(stand_in_of)(term);
     const INPUT *const in = &state->input[channel];
-    const NUM slope = FN(parameter)(state, i, 0U);
-    const NUM reference = FN(parameter)(state, i, 1U);
 
-    (void)x;
     if ((in->gap_us == 0U) || (in->held_blocks != 0U)) {
         effect->remarks |= GTC_HELD;
     }
@@ -180,11 +177,71 @@ static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFF
     }
     if ((in->gap_us == 0U) && (stand_in != 0U)) {
         effect->added = FN(add)(effect->added, FN(stand_in)(state->table, stand_in, effect));
-    } else {
-        effect->added = FN(add)(effect->added, FN(scaled_difference)(in->mean, reference, slope));
+        return 0;
+    }
+    *mean = in->mean;
+    return 1;
+}
+
+/* Linear. Parameters: slope; reference. Adds slope (mean - reference). */
+static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
+{
+    const NUM slope = FN(parameter)(state, i, 0U);
+    const NUM reference = FN(parameter)(state, i, 1U);
+    NUM mean = NUM_ZERO;
+
+    (void)x;
+    if (FN(is_shown)(state, i, effect, &mean) != 0) {
+        effect->added = FN(add)(effect->added, FN(scaled_difference)(mean, reference, slope));
     }
 }
 
 const struct FN(term_code) FN(term_auxiliary) = {
     GTC_TERM_AUXILIARY, 0U, FN(nothing), FN(nothing), FN(auxiliary_apply),
+};
+
+/* ---- a line and two Gaussians in the block mean of an auxiliary channel
+ *
+ * Parameters: slope; gain, sqrt(log2 e) / width, times 8 in float32; reference, the first center; first weight; second
+ * center; second weight. Adds slope (mean - reference) + sum of weight exp(-((mean - center) / width)^2). */
+
+static void FN(curve_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
+{
+    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
+    NUM mean = NUM_ZERO;
+    WIDE sum;
+
+    (void)x;
+    if (FN(is_shown)(state, i, effect, &mean) != 0) {
+        mean = (NUM)FN(limited)(mean);
+        sum = FN(scaled_difference)(mean, ELEMENT(term[4]), ELEMENT(term[2]));
+        sum = FN(add)(sum, FN(bells)(mean, &term[3]));
+        effect->added = FN(add)(effect->added, sum);
+    }
+}
+
+const struct FN(term_code) FN(term_curve) = {
+    GTC_TERM_CURVE, 0U, FN(nothing), FN(nothing), FN(curve_apply),
+};
+
+/* ---- a line in the temperature times a line in the block mean of an auxiliary channel
+ *
+ * Parameters: slope; reference; growth, by which the slope grows with each C; reference of T. Adds
+ * (slope + growth (T - reference of T)) (mean - reference). */
+
+static void FN(product_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
+{
+    const NUM reference = FN(parameter)(state, i, 1U);
+    const NUM growth = FN(parameter)(state, i, 2U);
+    const NUM middle = FN(parameter)(state, i, 3U);
+    const WIDE here = FN(add)(FN(parameter)(state, i, 0U), FN(scaled_difference)(x, middle, growth));
+    NUM mean = NUM_ZERO;
+
+    if (FN(is_shown)(state, i, effect, &mean) != 0) {
+        effect->added = FN(add)(effect->added, FN(scaled_difference)(mean, reference, (NUM)FN(limited)(here)));
+    }
+}
+
+const struct FN(term_code) FN(term_product) = {
+    GTC_TERM_PRODUCT, 0U, FN(nothing), FN(nothing), FN(product_apply),
 };

@@ -34,7 +34,7 @@ HEAD = [
 ]  # fmt: skip
 NUMBERS = {"fallback", "authority", "effect", "rezero", "scale", "envelope"}
 ARRAYS = ("serial", "networks", "centers", "guards", "terms", "coverage", "sigma", "probes")
-TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
+TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary", 6: "curve", 7: "product"}
 CLAMPED, UNCOVERED = 2, 4
 MARGIN = 0.25  # of the range of corrections, granted at either end: the header says so
 LARGEST_BOUND = 0.01  # of the noise floor, beyond which a format is refused: docs/numerics.md, section 4
@@ -159,7 +159,14 @@ class Model:
             return 3, channel, [block / p["tau_s"] * math.log2(math.e), p["amplitude_dph"] / half]
         if term["id"] == "path_length_periodicity":
             return 4, channel, [1.0 / p["period_c"], p["phase_rad"] / math.tau, p["amplitude_dph"]]
-        return 5, channel, [p["slope_dph_per_unit"], p["reference"]]
+        slope, reference = p["slope_dph_per_unit"], p["reference"]
+        if "width" in p:
+            root = math.sqrt(math.log2(math.e)) / p["width"]
+            bells = [reference, p["first_dph"], p["second_center"], p["second_dph"]]
+            return 6, channel, [slope, root, *bells]
+        if "reference_c" in p:
+            return 7, channel, [slope, reference, p["slope_dph_per_unit_per_c"], p["reference_c"]]
+        return 5, channel, [slope, reference]
 
 
 def share_in(x: float, region: Pair, envelope: Pair) -> float:
@@ -433,10 +440,14 @@ def effect_of(model: Model) -> Pair:
     span, low, high = model.t_range[1] - model.t_range[0], 0.0, 0.0
     for term in model.raw["terms"]:
         kind, _, values = model.term(term)
-        if kind == 5:
-            guard = model.guard(term["channel"])
-            ends = [values[0] * (x - values[1]) for x in (guard["low"], guard["high"])]
-            low, high = low + min(0.0, *ends), high + max(0.0, *ends)
+        if kind >= 5:
+            guard, p = model.guard(term["channel"]), term["parameters"]
+            growth, middle = p.get("slope_dph_per_unit_per_c", 0.0), p.get("reference_c", 0.0)
+            slopes = [p["slope_dph_per_unit"] + growth * (t - middle) for t in model.t_range]
+            ends = [s * (guard[edge] - p["reference"]) for s in slopes for edge in ("low", "high")]
+            bells = [p.get("first_dph", 0.0), p.get("second_dph", 0.0)]
+            low += min(0.0, *ends) + sum(min(0.0, b) for b in bells)
+            high += max(0.0, *ends) + sum(max(0.0, b) for b in bells)
         else:
             scale = {1: span, 2: values[0], 3: 1.0, 4: 1.0}[kind]
             size = abs(values[2 if kind == 4 else 1]) * scale
@@ -534,7 +545,9 @@ def check_terms(model: Model, image: Image) -> Iterator[str]:
     """The records of the extension terms against the model's parameters."""
     unit = 2.0 ** image.one("bias_frac_bits")
     scales = {1: (2.0**31, unit, 2.0**24), 2: (2.0**16, unit), 3: (2.0**28, unit),
-              4: (2.0**32, 2.0**32, unit), 5: (unit, 2.0**16)}  # fmt: skip
+              4: (2.0**32, 2.0**32, unit), 5: (unit, 2.0**16),
+              6: (unit, 2.0**24, 2.0**16, unit, 2.0**16, unit),
+              7: (unit, 2.0**16, unit, 2.0**16)}  # fmt: skip
     last = len(model.raw["networks"])
     for k, term in enumerate(model.raw["terms"]):
         words = image.array["terms"][8 * k : 8 * k + 8]
@@ -546,7 +559,8 @@ def check_terms(model: Model, image: Image) -> Iterator[str]:
             yield f"term {term['id']}: kind and channel are {words[:2]}, the model says {[kind, channel]}"
             continue
         if image.numeric == "f32":
-            values = [64.0 * v if (kind, i) == (3, 0) else v for i, v in enumerate(values)]
+            octaves = {(3, 0): 64.0, (6, 1): 8.0}
+            values = [octaves.get((kind, i), 1.0) * v for i, v in enumerate(values)]
         else:
             values = [v * scale for v, scale in zip(values, scales[kind], strict=True)]
         for i, word in enumerate(words[2:]):

@@ -313,11 +313,36 @@ TEST(parameters_of_terms_keep_to_their_ranges)
     }
 }
 
+TEST(functions_of_a_channel_keep_to_their_ranges)
+{
+    const uint_least32_t curve = terms_at(&CURVED);
+    const uint_least32_t product = curve + GTC_TERM_WORDS;
+
+    REFUSED(CURVED, curve + 2U, 1.1e9F, 1073741825L);
+    REFUSED(CURVED, curve + 3U, -1.0F, -1L);
+    REFUSED(CURVED, curve + 3U, 1.1e9F, -2147483647L);
+    REFUSED(CURVED, curve + 4U, 1.1e9F, 1073741824L);
+    REFUSED(CURVED, curve + 5U, -1.1e9F, 536870913L);
+    REFUSED(CURVED, curve + 6U, -1.1e9F, -1073741824L);
+    REFUSED(CURVED, curve + 7U, 1.1e9F, -536870913L);
+    REFUSED(CURVED, product + 2U, 1.1e9F, 1073741825L);
+    REFUSED(CURVED, product + 3U, -1.1e9F, -1073741825L);
+    REFUSED(CURVED, product + 4U, 1.1e9F, 1073741825L);
+    REFUSED(CURVED, product + 5U, 1.1e9F, 1073741825L);
+    REFUSED(CURVED, product + 6U, 1.0F, 1L);
+    REFUSED(CURVED, product + 7U, 1.0F, 1L);
+}
+
 TEST(terms_read_the_channels_that_are_theirs)
 {
     const uint_least32_t play = of_kind(GTC_TERM_PLAY, 1U);
     gtc_word_t word;
 
+    word.bits = 0U;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&CURVED, terms_at(&CURVED) + 1U, word));
+    CHECK_INT(GTC_E_LAYOUT, status_with(&CURVED, terms_at(&CURVED) + GTC_TERM_WORDS + 1U, word));
+    word.bits = 2U;
+    CHECK_INT(GTC_E_LAYOUT, status_with(&CURVED, terms_at(&CURVED) + 1U, word));
     word.bits = 1U;
     CHECK_INT(GTC_E_LAYOUT, status_with(&TERMS, play, word));
     word.bits = 0xFFFFFFFFUL;
@@ -349,6 +374,7 @@ int main(void)
 #endif
 #if GTC_OPEN_TERMS
     RUN(parameters_of_terms_keep_to_their_ranges);
+    RUN(functions_of_a_channel_keep_to_their_ranges);
     RUN(terms_read_the_channels_that_are_theirs);
 #endif
     return test_end();

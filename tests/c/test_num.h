@@ -12,6 +12,7 @@
 #include "gtc_test.h"
 #include "gtc_test_1.h"
 #include "gtc_test_b.h"
+#include "gtc_test_c.h"
 #include "gtc_test_h.h"
 #include "gtc_test_t.h"
 
@@ -24,6 +25,7 @@ typedef gtc_q31_state_t state_t;
 #define BANK gtc_test_b_q31
 #define TERMS gtc_test_t_q31
 #define NARROW gtc_test_h_q31
+#define CURVED gtc_test_c_q31
 #define C(temperature) ((int_least32_t)((temperature) * 65536.0))
 #define MISSING GTC_TEMP_MISSING
 #define WORD_OF(member) (member)
@@ -37,6 +39,7 @@ typedef gtc_f32_state_t state_t;
 #define BANK gtc_test_b_f32
 #define TERMS gtc_test_t_f32
 #define NARROW gtc_test_h_f32
+#define CURVED gtc_test_c_f32
 #define C(temperature) ((float)(temperature))
 #define MISSING test_nan()
 #define WORD_OF(member) ((member).value)

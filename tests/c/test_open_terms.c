@@ -26,7 +26,7 @@ TEST(terms_open_where_their_code_is)
 #else
     (void)table;
 #endif
-    image[kind].bits = 6U;
+    image[kind].bits = 8U;
     CHECK_INT(GTC_E_LAYOUT, try_open(n));
     image[kind].bits = 0U;
     CHECK_INT(GTC_E_LAYOUT, try_open(n));

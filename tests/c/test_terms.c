@@ -43,6 +43,7 @@ TEST(tables_with_terms_pass_their_self_test)
 {
     CHECK_INT(GTC_OK, FN(check)(&TERMS));
     CHECK_INT(GTC_OK, FN(check)(&NARROW));
+    CHECK_INT(GTC_OK, FN(check)(&CURVED));
 }
 
 TEST(at_rest_memories_and_plays_come_to_rest_and_warm_up_fades)
@@ -74,6 +75,94 @@ TEST(an_auxiliary_channel_is_added_and_held_when_it_is_missing)
     (void)samples(&b, C(15.0), C(13.0), 8);
     CHECK_INT(GTC_OK, status_of(&b));
 }
+
+/* What the terms of CURVED add at a temperature and a supply within their envelope and guard, deg/h. */
+static double added_at(num_t temp, num_t supply)
+{
+    state_t state = started_with(&CURVED);
+#if TEST_Q31
+    const double unit = 1.0 / (double)(1UL << CURVED.bias_frac_bits);
+#else
+    const double unit = 1.0;
+#endif
+
+    CHECK_INT(GTC_OK, samples(&state, temp, supply, 40));
+    return ((double)bias_of(&state) - (double)map_with(&CURVED, temp)) * unit;
+}
+
+static int is_about(double want, double found)
+{
+    return ((found - want < 2.0e-6) && (want - found < 2.0e-6)) ? 1 : 0;
+}
+
+/* tests/c/model_curve.json: 0.125 (u - 11) + 0.25 e^-((u - 11) / 0.5)^2 - 0.0625 e^-((u - 13) / 0.5)^2, and
+ * (0.0625 + 0.03125 (T - 15)) (u - 12). */
+TEST(a_curve_is_a_line_and_two_gaussians)
+{
+    CHECK(is_about(0.25 - 0.0625, added_at(C(15.0), C(11.0))));
+    CHECK(is_about(0.125 + (0.1875 * 0.01831563889), added_at(C(15.0), C(12.0))));
+    CHECK(is_about(0.25 - 0.0625 + 0.0625, added_at(C(15.0), C(13.0))));
+    /* far from both centers: one is cut off, or both */
+    CHECK(is_about(-0.25 + (0.25 * 1.125351747e-07) - 0.1875, added_at(C(15.0), C(9.0))));
+    CHECK(is_about(0.5 - (0.0625 * 1.125351747e-07) + 0.1875, added_at(C(15.0), C(15.0))));
+}
+
+TEST(a_product_has_another_slope_at_another_temperature)
+{
+    const double at_15 = added_at(C(15.0), C(14.0)) - added_at(C(15.0), C(12.0));
+    const double at_17 = added_at(C(17.0), C(14.0)) - added_at(C(17.0), C(12.0));
+
+    CHECK(is_about(2.0 * 2.0 * 0.03125, at_17 - at_15));
+}
+
+TEST(a_curve_of_a_lost_channel_is_that_of_its_fallback)
+{
+    state_t a = started_with(&CURVED);
+    state_t b = started_with(&CURVED);
+
+    (void)samples(&a, C(15.0), C(12.5), 400);
+    (void)samples(&b, C(15.0), C(9.5), 400);
+    CHECK(!same(bias_of(&a), bias_of(&b)));
+    (void)samples(&b, C(15.0), MISSING, 40);
+    CHECK((status_of(&b) & GTC_CHANNEL_LOST) != 0);
+    CHECK(same(bias_of(&a), bias_of(&b)));
+}
+
+#if TEST_Q31
+/* With any guard, center, gain and weight that `open` takes: the sums keep to their words. */
+TEST(a_curve_at_the_ends_of_all_ranges_stays_a_number)
+{
+    static const int_least32_t ends[3] = {-1073741823, 0, 1073741823};
+    gtc_word_t guards[2U * GTC_GUARD_WORDS];
+    gtc_word_t terms[2U * GTC_TERM_WORDS];
+    table_t table = CURVED;
+    unsigned k;
+
+    memcpy(guards, CURVED.guards, sizeof guards);
+    memcpy(terms, CURVED.terms, sizeof terms);
+    guards[GTC_GUARD_WORDS].integer = -2147483647;
+    guards[GTC_GUARD_WORDS + 1U].integer = 2147483647;
+    guards[GTC_GUARD_WORDS + 2U].integer = 2147483647;
+    table.guards = guards;
+    table.terms = terms;
+    for (k = 0U; k < 81U; k++) {
+        state_t state;
+
+        terms[2].integer = ends[k % 3U];
+        terms[3].integer = ((k & 1U) != 0U) ? 2147483647 : 1;
+        terms[4].integer = ends[(k / 3U) % 3U];
+        terms[5].integer = ends[(k / 9U) % 3U] / 2;
+        terms[6].integer = ends[(k / 27U) % 3U];
+        terms[7].integer = 536870912;
+        terms[10].integer = ends[k % 3U];
+        terms[12].integer = ends[(k / 3U) % 3U];
+        terms[13].integer = ends[(k / 9U) % 3U];
+        state = started_with(&table);
+        (void)sample(&state, C(15.0), ((k & 2U) != 0U) ? 2147483647 : -2147483647);
+        CHECK((bias_of(&state) >= CURVED.authority[0]) && (bias_of(&state) <= CURVED.authority[1]));
+    }
+}
+#endif
 
 TEST(a_play_moves_only_when_the_temperature_has_gone_its_way)
 {
@@ -614,6 +703,12 @@ int main(void)
     RUN(tables_with_terms_pass_their_self_test);
     RUN(at_rest_memories_and_plays_come_to_rest_and_warm_up_fades);
     RUN(an_auxiliary_channel_is_added_and_held_when_it_is_missing);
+    RUN(a_curve_is_a_line_and_two_gaussians);
+    RUN(a_product_has_another_slope_at_another_temperature);
+    RUN(a_curve_of_a_lost_channel_is_that_of_its_fallback);
+#if TEST_Q31
+    RUN(a_curve_at_the_ends_of_all_ranges_stays_a_number);
+#endif
     RUN(a_reading_beyond_its_range_is_taken_as_the_edge_and_said);
 #if !TEST_Q31
     RUN(no_reading_makes_a_correction_that_is_no_number);

@@ -61,12 +61,12 @@ static inline num_t next_number(stream_t *in)
 #endif
 }
 
-/* One of the test tables: plain, bank, terms, narrow widths with terms. */
+/* One of the test tables: plain, bank, terms, narrow widths with terms, functions of a channel. */
 static inline const table_t *next_table(stream_t *in)
 {
-    static const table_t *const tables[4] = {&TABLE, &BANK, &TERMS, &NARROW};
+    static const table_t *const tables[5] = {&TABLE, &BANK, &TERMS, &NARROW, &CURVED};
 
-    return tables[next_byte(in) % 4U];
+    return tables[next_byte(in) % 5U];
 }
 
 /* A correction is one that the table may give. */

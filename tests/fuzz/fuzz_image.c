@@ -30,9 +30,9 @@ static uint_least32_t plain_image(const table_t *from, gtc_word_t *words)
 /* Images without their CRC are made once. */
 static const gtc_word_t *kept_image(uint_least32_t k, uint_least32_t *n)
 {
-    static const table_t *const tables[4] = {&TABLE, &BANK, &TERMS, &NARROW};
-    static gtc_word_t images[4][IMAGE_MAX];
-    static uint_least32_t lengths[4];
+    static const table_t *const tables[5] = {&TABLE, &BANK, &TERMS, &NARROW, &CURVED};
+    static gtc_word_t images[5][IMAGE_MAX];
+    static uint_least32_t lengths[5];
 
     if (lengths[k] == 0U) {
         lengths[k] = plain_image(tables[k], images[k]);

@@ -2,12 +2,14 @@
  *
  * Prints one line for each: name, arguments visited, arguments that differ; for the Gaussian also its worst error
  * in 2^-29 against 2^-v for every v that truncates to u. Its argument k, if any, visits every k-th argument of
- * the Gaussian alone.
+ * the Gaussian alone. Arguments `curve k` visit every k-th reading of a channel for the two Gaussians of three
+ * records of terms: its worst error against float64 is in units of the weights.
  */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "gtc_num_q31.h"
 
@@ -169,8 +171,67 @@ static void shifts(void)
     printf("shifts %" PRIu64 " %" PRIu64 "\n", visited, wrong);
 }
 
+/* 2^-u in 2^-29, u in 2^-24. */
+static int64_t power(const uint64_t *table, uint64_t u)
+{
+    const uint64_t v = 1557473452U - 64U * (u % 262144U);
+    const uint64_t square = (v * v) / 4294967296U + 558709134U;
+    return (u < 536870912U) ? (int64_t)(((table[(u / 262144U) % 64U] * square) / 4294967296U) >> (u / 16777216U)) : 0;
+}
+
+static int64_t one_bell(const uint64_t *table, int64_t d, int64_t gain)
+{
+    const int64_t product = d * gain;
+    const int64_t argument = product / 4096 - ((product % 4096) < 0);
+    if ((argument >= 1610612736) || (argument <= -1610612736)) { /* 6 in 2^-28 */
+        return 0;
+    }
+    return power(table, (uint64_t)(argument * argument) / 4294967296U);
+}
+
+/* Every reading of a channel, with Gaussians of a usual, the smallest and the largest gain. */
+static void curve(uint64_t every)
+{
+    static const int32_t records[3][5] = {
+        { 3355443, 786432, 400000000, 819200, -300000000 }, /* gain 0.2 for each unit, centers 12 and 12.5 */
+        { 2147483647, -65536, 536870912, 1073741823, 536870912 },
+        { 15000, -1073741823, -536870912, 1000, 123456789 },
+    };
+    uint64_t wrong = 0, visited = 0, table[64];
+    double worst = 0.0;
+    int i, k;
+    for (i = 0; i < 64; i++) {
+        table[i] = (uint64_t)llrint(2052389455.0 * exp2(-i / 64.0));
+    }
+    for (k = 0; k < 3; k++) {
+        const int32_t *const r = records[k];
+        gtc_word_t words[5];
+        int64_t reading;
+        for (i = 0; i < 5; i++) {
+            words[i].integer = r[i];
+        }
+        for (reading = -2147483647; reading <= 2147483647; reading += (int64_t)every) {
+            const int64_t x = reading > 1073741824 ? 1073741824 : reading < -1073741824 ? -1073741824 : reading;
+            const int64_t found = gtc_q31_bells((int32_t)gtc_q31_limited(reading), words);
+            const int64_t sum = r[2] * one_bell(table, x - r[1], r[0]) + r[4] * one_bell(table, x - r[3], r[0]);
+            wrong += (found != sum / 536870912 - ((sum % 536870912) < 0));
+            if (visited % 16U == 0U) {
+                const double a = (double)(x - r[1]) * r[0] / 1099511627776.0; /* 2^-40 */
+                const double b = (double)(x - r[3]) * r[0] / 1099511627776.0;
+                worst = fmax(worst, fabs((double)found - r[2] * exp2(-a * a) - r[4] * exp2(-b * b)));
+            }
+            visited++;
+        }
+    }
+    printf("curve %" PRIu64 " %" PRIu64 " %.6e\n", visited, wrong, worst / 1073741824.0);
+}
+
 int main(int argc, char **argv)
 {
+    if ((argc > 2) && (strcmp(argv[1], "curve") == 0)) {
+        curve(strtoull(argv[2], NULL, 10));
+        return 0;
+    }
     const uint64_t every = (argc > 1) ? strtoull(argv[1], NULL, 10) : 1U;
     gauss(every);
     if (every == 1U) {

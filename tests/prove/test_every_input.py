@@ -13,7 +13,7 @@ from gyrotc.emit.files import emitted_tables
 from gyrotc.model import Model, load_model
 from gyrotc.verify.exhaustive import visit_all
 from results import Results
-from test_primitives import F32_GAUSS_ERROR, _run
+from test_primitives import CURVE_ERROR, F32_CURVE_ERROR, F32_GAUSS_ERROR, _run
 
 Progress = Callable[[str], None]
 
@@ -99,6 +99,24 @@ def test_every_argument_of_the_fixed_point_gaussian(half: int, tmp_path: Path, r
         _add(results, f"{kind}: {name}", visited, wrong, *(float(units) * 2.0**-29 for units in worst))
     assert {words[1] for words in found.values()} == {"0"}
     assert int(found["gauss"][0]) == 2**29
+
+
+@pytest.mark.parametrize("half", [0, 1], ids=["long multiply", "16-bit halves"])
+def test_every_reading_of_a_channel_in_fixed_point(half: int, tmp_path: Path, results: Results) -> None:
+    """The two Gaussians of a curve, for three records with the ends of their ranges among them."""
+    visited, wrong, worst = _run("primitives_q31", tmp_path, "curve", "1", half=half)["curve"]
+    kind = f"fixed point, {'16-bit halves' if half else 'long multiply'}"
+    _add(results, f"{kind}: curve", visited, wrong, float(worst))
+    assert (int(visited), wrong) == (3 * (2**32 - 1), "0")
+    assert float(worst) <= CURVE_ERROR
+
+
+def test_every_reading_of_a_channel_in_float32(tmp_path: Path, results: Results) -> None:
+    """NaN and infinity among them: the sum is a number all the same."""
+    visited, wrong, worst = _run("primitives_f32", tmp_path, "curve", "1")["curve"]
+    _add(results, "float32: curve", visited, wrong, float(worst))
+    assert (int(visited), wrong) == (3 * 2**32, "0")
+    assert float(worst) <= F32_CURVE_ERROR
 
 
 def _add(results: Results, name: str, visited: str, wrong: str, worst: float | None = None) -> None:

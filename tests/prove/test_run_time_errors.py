@@ -72,6 +72,8 @@ PARTS = {
     "map of any bank": Part("map", precision=7, contracts=_RELATED, checks=1, left=3, shape=(2, "warm_up")),
     "terms of any table": Part("terms", precision=7, contracts=_TERMS, shape=(1, "warm_up")),
     "channels of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "auxiliary")),
+    "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "curve")),
+    "product of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "product")),
 }
 
 

@@ -18,7 +18,7 @@ _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing
 FLAGS = ["-std=c99", "-pedantic", "-ffp-contract=off", *(f"-W{name}" for name in _WARNINGS.split())]
 
 
-TERMS = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary"}
+TERMS = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary", 6: "curve", 7: "product"}
 ALL = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")
 
 

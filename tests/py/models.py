@@ -150,7 +150,34 @@ def random_terms(seed: int) -> tuple[Term, ...]:
         ),
     )
     chosen = rng.permutation(len(every))[: int(rng.integers(1, 5))]
-    return tuple(every[k] for k in chosen)
+    return tuple(_of_channel(every[k], np.random.default_rng([seed, 5, k])) for k in chosen)
+
+
+def _of_channel(term: Term, rng: np.random.Generator) -> Term:
+    """A term of a channel as a line, a curve or a product; others as they are."""
+    kind = int(rng.integers(0, 3))
+    if term.channel is None or kind == 0:
+        return term
+    if kind == 1:
+        return Term(
+            id="auxiliary_curve", parameters=_random_curve(rng), channel=term.channel, stand_in=term.stand_in
+        )
+    growth = {"slope_dph_per_unit_per_c": float(rng.normal(0.0, 1e-4))}
+    middle = {"reference_c": float(rng.uniform(-40.0, 60.0))}
+    parameters = term.parameters | growth | middle
+    return term.model_copy(update={"id": "auxiliary_product", "parameters": parameters})
+
+
+def _random_curve(rng: np.random.Generator) -> dict[str, float]:
+    """A bent line about 12, as narrow as two steps of a channel or as wide as all that it shows."""
+    return {
+        "slope_dph_per_unit": float(rng.normal(0.0, 0.01)),
+        "reference": float(rng.normal(12.0, 1.0)),
+        "second_center": float(rng.normal(12.0, 1.0)),
+        "width": float(10.0 ** rng.uniform(-1.9, 2.0)),
+        "first_dph": float(rng.normal(0.0, 0.01)),
+        "second_dph": float(rng.normal(0.0, 0.01)),
+    }
 
 
 def bank_of(model: Model) -> Model:

@@ -16,7 +16,7 @@ from gyrotc.model import load_model
 from gyrotc.pages.plan_page import write_plan
 from gyrotc.plan import plan
 from gyrotc.simulate import simulate
-from gyrotc.terms import CATALOGUE, Cause, History, Scene, register, separate_by
+from gyrotc.terms import CATALOGUE, Cause, History, Parameter, Scene, register, separate_by
 from gyrotc.terms.recursion import Course, CourseChannel, TermOutcome
 from gyrotc.terms.search import Reach
 from gyrotc.train.fitting import FitOptions
@@ -94,9 +94,11 @@ WAVE = 20.0 + 30.0 * np.sin(TIME / 3000.0)
 
 def _values(term: Cause) -> dict[str, float]:
     """Every parameter in the middle of its range, at the default where it has one."""
-    return {
-        p.name: float(np.sqrt(p.low * p.high)) if p.default is None else p.default for p in term.parameters
-    }
+
+    def middle(p: Parameter) -> float:
+        return float(np.sqrt(p.low * p.high)) if p.logarithmic else 0.5 * (p.low + p.high)
+
+    return {p.name: middle(p) if p.default is None else p.default for p in term.parameters}
 
 
 @pytest.mark.parametrize("id", CATALOGUE)

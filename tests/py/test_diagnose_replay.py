@@ -30,7 +30,7 @@ VALUES: dict[str, dict[str, float]] = {
     "path_length_periodicity": {"period_c": 9.0, "amplitude_dph": 5e-4, "phase_rad": 0.4},
     "auxiliary": {"slope_dph_per_unit": 1e-2, "reference": 27.9},
 }
-HELD = [id for id, term in CATALOGUE.items() if term.table is not None]
+HELD = [id for id, term in CATALOGUE.items() if term.table is not None and term.search is not None]
 BLOCK_S, ROW_S = 40.0, 10.0
 TIME = np.arange(0.0, 8000.0, ROW_S)
 ERROR_DPH = 2e-8  # float32 of the target: 2^-23 of 60 C, kept by a memory of 10 blocks, at 2e-4 deg/h/C

@@ -7,16 +7,25 @@ from __future__ import annotations
 
 import random
 import re
+import secrets
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
 from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.errors import CheckFailed
-from gyrotc.model import Envelope, Model, Network, Scale
+from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
 from gyrotc.quantise import NUMERICS, quantise
+from gyrotc.quantise.channel_error import channel_error_dph
+from gyrotc.reference.operations import recursions
+from gyrotc.reference.table import Numeric
+from gyrotc.terms.recursion import Course, CourseChannel, Recursion, TermOutcome
 from models import bank_of, random_model
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 _MODELS = 12
 
@@ -36,6 +45,65 @@ def test_the_bound_holds_for_any_legal_model(make: Callable[[int], Model]) -> No
             tables += 1
             assert worst_error_dph(model, table, seed) <= table.error_bound_dph, (seed, numeric)
     assert tables >= _MODELS // 2
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+@pytest.mark.parametrize("id", ["auxiliary_curve", "auxiliary_product"])
+def test_the_bound_of_curves_and_products_holds(id: str, numeric: Numeric) -> None:
+    """Against float64, for readings all over the guard and temperatures all over the envelope."""
+    seed = secrets.randbits(32)
+    print(f"seed {seed}")
+    rng, close = np.random.default_rng(seed), 0
+    for k in range(20):
+        model = _with_channel(id, rng)
+        try:
+            table = quantise(model, numeric)
+        except CheckFailed:  # a reading, or a width of less than 2^-6 units, that fixed point does not hold
+            continue
+        recursion, guard = recursions(table)[0], model.guards["supply_v"]
+        reading = np.concatenate([rng.uniform(guard.low, guard.high, 1000), [guard.low, guard.high]])
+        t = rng.uniform(*model.envelope.temperature_c, len(reading))
+        numbers = [_as_seen(x, numeric) for x in (reading, t)]
+        exact = [x / 65536.0 if numeric == "q31" else x.astype(np.float64) for x in numbers]
+        term = model.terms[0]
+        want = term.table.recursion(term.parameters, model.block_s)
+        found = _added(recursion, *numbers) * (2.0**-table.bias_frac_bits if numeric == "q31" else 1.0)
+        worst = float(np.abs(found - _added(want, *exact)).max())
+        bound = channel_error_dph(model, numeric, table.bias_frac_bits)
+        assert worst <= bound, (k, model.terms)
+        close += worst > bound / 20.0
+    assert close > 3, "a bound that is never met says nothing"
+
+
+def _with_channel(id: str, rng: np.random.Generator) -> Model:
+    """A model with one term of a channel, of any unit and sign."""
+    scale = float(10.0 ** rng.uniform(-1.0, 3.0))
+    middle, size = float(rng.normal(0.0, 3.0 * scale)), float(10.0 ** rng.uniform(-4.0, -1.0))
+    draw = rng.normal(0.0, 1.0, 3)
+    shape: dict[str, float] = {"reference": middle, "slope_dph_per_unit": size * draw[0] / scale}
+    if id == "auxiliary_curve":
+        shape |= {"second_center": middle + scale * draw[1], "width": scale * float(rng.uniform(0.2, 3.0))}
+        shape |= {"first_dph": size * draw[2], "second_dph": size * draw[1]}
+    else:
+        shape |= {"slope_dph_per_unit_per_c": 0.02 * size * draw[1] / scale, "reference_c": 10.0 * draw[2]}
+    guard = Guard(
+        low=middle - 3.0 * scale, high=middle + 2.0 * scale, fallback=middle, max_step=1e9,
+        max_rate_per_min=0.0, agree_s=0.0, stuck_s=0.0, missing_s=100.0,
+    )  # fmt: skip
+    term = Term(id=id, parameters=shape, channel="supply_v")
+    return random_model(3, terms=(term,), guards={"supply_v": guard})
+
+
+def _as_seen(x: Array, numeric: str) -> NDArray[Any]:
+    return np.rint(x * 65536.0).astype(np.int64) if numeric == "q31" else x.astype(np.float32)
+
+
+def _added(recursion: Recursion, mean: NDArray[Any], t: NDArray[Any]) -> Array:
+    course = Course(t, np.ones(len(t), dtype=bool), np.arange(len(t)))
+    none = np.zeros(len(t), dtype=np.int32)
+    outcome = TermOutcome(t, np.zeros_like(t), np.zeros_like(t), none)
+    recursion.apply(course, CourseChannel(mean, none, none.astype(bool)), outcome)
+    return np.asarray(outcome.added, dtype=np.float64)
 
 
 def _two(overlap: float, *, first: float = 0.0, last: float = 1.0, apart: float = 1.0) -> Model:

@@ -20,7 +20,7 @@ int main(void)
     return (gtc_q31_init(&state, &{table}_q31, 2500000UL) == 0) && (gtc_q31_sample(&state, channels) >= 0) ? 0 : 1;
 }}
 """
-ALL = {"memory", "play", "warm_up", "harmonic", "auxiliary"}
+ALL = {"memory", "play", "warm_up", "harmonic", "auxiliary", "curve", "product"}
 
 
 @pytest.fixture(scope="module")

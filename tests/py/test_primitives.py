@@ -14,6 +14,10 @@ from gyrotc.reference.q31 import GAUSS_ERROR
 ROOT = Path(__file__).resolve().parents[2]
 #: Largest departure of the float32 Gaussian from the exact one that docs/numerics.md allows.
 F32_GAUSS_ERROR = 1.9e-7
+#: Of the two Gaussians of a curve, of the weights: that, and what (x - center) gain and its square lose. Fixed point
+#: also rounds its sum down by a unit in a weight of 2^30.
+CURVE_ERROR = GAUSS_ERROR + 0.715 * 2.0**-28 + 2.0**-30
+F32_CURVE_ERROR = F32_GAUSS_ERROR + (3.5 * 0.736 + 2.0) * 2.0**-24
 
 
 def _run(
@@ -45,6 +49,24 @@ def test_float32_gaussian_over_every_seventh_argument(tmp_path: Path) -> None:
     visited, wrong, worst = _run("primitives_f32", tmp_path, "7")["gauss"]
     assert int(visited) > 1.6e8 and wrong == "0"
     assert float(worst) <= F32_GAUSS_ERROR
+
+
+@pytest.mark.parametrize(
+    ("name", "bound"), [("primitives_q31", CURVE_ERROR), ("primitives_f32", F32_CURVE_ERROR)]
+)
+def test_the_gaussians_of_a_channel_over_every_97th_reading(name: str, bound: float, tmp_path: Path) -> None:
+    """`make prove` takes every one."""
+    visited, wrong, worst = _run(name, tmp_path, "curve", "97")["curve"]
+    assert int(visited) > 1.3e8 and wrong == "0"
+    assert float(worst) <= bound
+
+
+def test_a_curve_with_one_wrong_bit_is_seen(tmp_path: Path) -> None:
+    libc = Path(shutil.copytree(ROOT / "libc", tmp_path / "libc"))
+    spoil(libc / "gtc_num_q31.h", r"\(whole << 20\)", "(whole << 19)")
+    spoil(libc / "gtc_num_f32.h", r"u = x - bell\[0\]\.value;", "u = x + bell[0].value;")
+    for name in ("primitives_q31", "primitives_f32"):
+        assert int(_run(name, tmp_path, "curve", "997", libc=libc)["curve"][1]) > 0
 
 
 @pytest.mark.parametrize(

@@ -182,6 +182,10 @@ SWITCHED_ON: dict[str, dict[str, float | str]] = {
     "map_too_coarse": {"amplitude_dph": 1e-3, "at_c": 15.0},
     "path_length_periodicity": {"period_c": 11.0, "amplitude_dph": 1e-3},
     "auxiliary": {"channel": "supply_v", "slope_dph_per_unit": 0.1, "reference": 28.0},
+    "auxiliary_curve": {"channel": "supply_v", "reference": 28.0, "second_center": 28.2, "width": 0.1}
+    | {"slope_dph_per_unit": 0.1, "first_dph": 0.01, "second_dph": -0.01},
+    "auxiliary_product": {"channel": "supply_v", "reference": 28.0, "reference_c": 20.0}
+    | {"slope_dph_per_unit": 0.1, "slope_dph_per_unit_per_c": 0.002},
     "sensor_lag": {"tau_s": 120.0},
     "earth_rate_tilt": {"twist_arcsec_per_c": 2.0},
 }

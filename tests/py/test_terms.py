@@ -29,6 +29,8 @@ INTERFACE = {
     "map_too_coarse": ("static_map", []),
     "path_length_periodicity": ("static_map", ["period_c", "amplitude_dph"]),
     "auxiliary": ("auxiliary", ["slope_dph_per_unit"]),
+    "auxiliary_curve": ("auxiliary", ["slope_dph_per_unit", "reference", "width"]),
+    "auxiliary_product": ("auxiliary", ["slope_dph_per_unit", "slope_dph_per_unit_per_c", "reference_c"]),
 }
 
 
@@ -131,9 +133,13 @@ def test_columns_hold_what_the_simulation_adds_and_give_its_amplitudes_back(
         assert value == pytest.approx(values[name], rel=1e-6)
 
 
+CURVE = {"slope_dph_per_unit": 0.01, "first_dph": 2e-3, "second_dph": -1e-3}
+PRODUCT = {"slope_dph_per_unit": 0.01, "slope_dph_per_unit_per_c": -3e-4}
 REFERENCES = {
     **LINEAR,
     "auxiliary": {"slope_dph_per_unit": 0.01, "reference": 28.0},
+    "auxiliary_curve": CURVE | {"reference": 28.0, "second_center": 28.3, "width": 0.2},
+    "auxiliary_product": PRODUCT | {"reference": 28.0, "reference_c": 15.0},
 }
 
 

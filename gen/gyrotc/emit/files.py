@@ -23,6 +23,7 @@ from ..model import Model
 from ..outputs import result_folder
 from ..quantise import NUMERICS, Table, quantise
 from ..quantise.authority import MARGIN
+from ..quantise.channel_error import channel_error_dph
 from ..quantise.terms import channel_names
 from ..reference import answers
 from ..reference.runtime import runtime_folders
@@ -220,7 +221,7 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "facts": list(_facts(model)),
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
-        "sizes": list(_sizes(emission)),
+        "sizes": list(_sizes(model, emission)),
         "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
         **example_values(model),
@@ -257,12 +258,14 @@ def _valid(model: Model) -> str:
     return f"{t0:.2f} ... {t1:.2f} C, {r0:.3f} ... {r1:.3f} C/min"
 
 
-def _sizes(emission: Emission) -> Iterator[str]:
+def _sizes(model: Model, emission: Emission) -> Iterator[str]:
     for numeric, table in emission.tables.items():
+        of_channels = channel_error_dph(model, table.numeric, table.bias_frac_bits)
+        beside = f", curves and products of channels: {_upwards(of_channels)}" if of_channels else ""
         yield (
             f"{numeric + ':':<12} {table.read_only_bytes} bytes of read-only data, "
             f"{table.table_bytes} of them parameters; "
-            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded)"
+            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded{beside})"
         )
         if table.n_stand_ins:
             yield (

@@ -2,8 +2,9 @@
 
 Stage 5 of the house (… → model → **tables** → C → proof). After it only 32-bit words exist. The bound
 that a table carries covers arithmetic, rounded parameters and rounded inputs against the model in
-float64; extension terms are not part of it. A format that would cost more than 1 % of the noise floor
-is refused, with the reason; where the recordings show no noise at all, there is nothing to hold it against.
+float64; extension terms are not part of it, curves and products of channels have a bound of their own. A
+format that would cost more than 1 % of the noise floor is refused, with the reason; where the recordings show no
+noise at all, there is nothing to hold it against.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..model import Model
 from ..reference.table import Numeric, Table
 from . import f32, q31
 from .authority import with_authority
+from .channel_error import channel_error_dph
 from .legal import outside
 from .probes import with_probes
 
@@ -72,5 +74,11 @@ def _quantised(known: _Known, numeric: str) -> Table:
             f"{numeric}: rounding could cost {table.error_bound_dph:.2e} deg/h, more than 1 % of the noise "
             f"floor of {floor:.2e} deg/h (most of it: {worst}, {table.bound_parts_dph[worst]:.2e}; sum of "
             f"|weights| {model.sum_abs_weights_dph:.3g} deg/h)"
+        )
+    of_channels = channel_error_dph(model, table.numeric, table.bias_frac_bits)
+    if floor and of_channels > _SHARE_OF_FLOOR * floor:
+        raise CheckFailed(
+            f"{numeric}: rounding in the terms of channels could cost {of_channels:.2e} deg/h, more than 1 % of "
+            f"the noise floor of {floor:.2e} deg/h"
         )
     return table

@@ -8,6 +8,7 @@ is no correction.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict
 
@@ -93,11 +94,10 @@ def _effects(model: Model) -> Range:
 def _effect(model: Model, term: Term) -> Range:
     """What the parameters of a term allow within the envelope and the guard of its channel, deg/h."""
     kind, values = term.table.kind, term.table.parameters(term.parameters, model.block_s)
-    if kind == TableKind.AUXILIARY:
-        guard = guard_of(model, term.channel)
-        ends = [values[0] * (x - values[1]) for x in (guard.low, guard.high)]
-        return min(0.0, *ends), max(0.0, *ends)
     low, high = model.envelope.temperature_c
+    if kind.reads_channel:
+        guard = guard_of(model, term.channel)
+        return _of_channel(kind, values, (low, high), (guard.low, guard.high))
     size = {
         TableKind.MEMORY: abs(values[1]) * (high - low),
         TableKind.PLAY: abs(values[1]) * values[0],
@@ -105,6 +105,18 @@ def _effect(model: Model, term: Term) -> Range:
         TableKind.HARMONIC: abs(values[-1]),
     }[kind]
     return -size, size
+
+
+def _of_channel(kind: TableKind, values: Sequence[float], temperature_c: Range, readings: Range) -> Range:
+    """What a term of a channel can add at these temperatures and readings, 0 among it, deg/h."""
+    slopes, reference, bells = [values[0]], values[1], (0.0, 0.0)
+    if kind == TableKind.CURVE:
+        reference, bells = values[2], (values[3], values[5])
+    elif kind == TableKind.PRODUCT:
+        slopes = [values[0] + values[2] * (t - values[3]) for t in temperature_c]
+    ends = [slope * (x - reference) for slope in slopes for x in readings]
+    low, high = (math.fsum(pick(0.0, weight) for weight in bells) for pick in (min, max))
+    return min(0.0, *ends) + low, max(0.0, *ends) + high
 
 
 def _words(bounds: Range, numeric: Numeric, frac_bits: int) -> tuple[int, ...]:

@@ -107,7 +107,7 @@ def _terms(table: Table, limits: Limits) -> Iterator[str]:
             yield f"stand-in of a term is network {stand_in}"
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
-        elif channel >= table.n_channels or (channel != 0) != (kind == TableKind.AUXILIARY):
+        elif channel >= table.n_channels or (channel != 0) != TableKind(kind).reads_channel:
             yield f"channel of a term is {channel}"
         else:
             yield from _beyond(table.numbers(record[2:]), limits[(kind - 1) * width : kind * width])
@@ -168,8 +168,9 @@ def _limits(numeric: str) -> tuple[Limits, ...]:
         if match := _ROW.search(line):
             values = [_number(text, names) for text in match[1].split(",")]
             rows.append((match[2] or "what a term does not use", values[first], values[first + 1]))
+    of_terms = len(TableKind) * (ARRAYS["terms"] - 2)
     sizes = [
-        _N_WHOLE, _N_NUMBERS, ARRAYS["networks"] - 1, ARRAYS["centers"], 4, 3, 5 * (ARRAYS["terms"] - 2), 1,
+        _N_WHOLE, _N_NUMBERS, ARRAYS["networks"] - 1, ARRAYS["centers"], 4, 3, of_terms, 1,
     ]  # fmt: skip
     ends = np.cumsum(sizes).tolist()
     assert ends[-1] == len(rows), "libc/gtc_limits.inl has other rows than a table has words"

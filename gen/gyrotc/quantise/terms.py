@@ -20,7 +20,9 @@ _PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, sec
 _LIMIT = 2**30  # of parameters in fixed point that are multiplied
 
 _PER_C = {TableKind.MEMORY: 1, TableKind.PLAY: 1}  # which parameter is an amplitude in deg/h/C
-_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}  # ... in deg/h; what a channel adds has no bound
+_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}  # ... in deg/h; the line of a channel has no bound
+_BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
+"""What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
 
 Record = tuple[TableKind, int, list[float]]
 
@@ -39,6 +41,11 @@ def term_size_dph(model: Model) -> float:
             sizes.append(abs(values[_PER_C[kind]]) * (high - low))
         elif kind in _ALONE:
             sizes.append(abs(values[_ALONE[kind]]))
+        elif kind == TableKind.CURVE:  # each weight has half a word; a slope, whatever the unit, one
+            sizes.append(max(2.0 * abs(values[3]), 2.0 * abs(values[5]), abs(values[0])))
+        elif kind == TableKind.PRODUCT:
+            slopes = [values[0] + values[2] * (t - values[3]) for t in (low, high)]
+            sizes.append(max(map(abs, (values[0], values[2], *slopes))))
     return math.fsum(sizes)
 
 
@@ -48,7 +55,7 @@ def f32_terms(model: Model) -> Words:
     words = np.zeros((len(records), 2 + _PARAMETERS), dtype=np.uint32)
     heads = _heads(model)
     for row, head, (kind, _, values) in zip(words, heads, records, strict=True):
-        scaled = [64.0 * values[0], *values[1:]] if kind == TableKind.WARM_UP else values
+        scaled = [_BY.get((kind, k), 1.0) * value for k, value in enumerate(values)]
         row[:2] = kind, head
         row[2 : 2 + len(values)] = f32_words(scaled)
     return words.reshape(-1)
@@ -67,24 +74,26 @@ def q31_terms(model: Model, frac_bits: int) -> Words:
         TableKind.WARM_UP: (2.0**28, unit),
         TableKind.HARMONIC: (2.0**32, 2.0**32, unit),
         TableKind.AUXILIARY: (unit, 2.0**16),
+        TableKind.CURVE: (unit, 2.0**24, 2.0**16, unit, 2.0**16, unit),
+        TableKind.PRODUCT: (unit, 2.0**16, unit, 2.0**16),
     }
     words = np.zeros((len(model.terms), 2 + _PARAMETERS), dtype=np.uint32)
     for row, head, term in zip(words, _heads(model), model.terms, strict=True):
         kind, _, values = _record(model, term)
         row[:2] = kind, head
         for k, (value, scale) in enumerate(zip(values, scales[kind], strict=True)):
-            wraps = kind == TableKind.HARMONIC and k == 1
-            row[2 + k] = _whole(kind, term.id, value * scale, wraps=wraps)
+            row[2 + k] = _whole(kind, k, term.id, value * scale)
     return words.reshape(-1)
 
 
-def _whole(kind: TableKind, id: str, value: float, *, wraps: bool) -> int:
+def _whole(kind: TableKind, k: int, id: str, value: float) -> int:
     whole = round(value)
-    if wraps:
+    if (kind, k) == (TableKind.HARMONIC, 1):
         return whole & 0xFFFFFFFF
     if whole == 2**31:  # a gain of 1
         whole -= 1
-    if abs(whole) >= 2**31 or (abs(whole) >= _LIMIT and kind == TableKind.AUXILIARY):
+    half = kind.reads_channel and (kind, k) != (TableKind.CURVE, 1)
+    if abs(whole) >= (_LIMIT if half else 2**31):
         raise CheckFailed(f"q31: a parameter of term {id} leaves the range of 32 bits")
     return whole & 0xFFFFFFFF
 

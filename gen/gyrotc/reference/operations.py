@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms.arithmetic import Floating, Operations
+from ..terms.arithmetic import Bells, Floating, Operations
 from ..terms.recursion import Recursion, TableKind, recursion_of
 from . import f32, q31
 from .table import ARRAYS, Table
@@ -28,6 +28,8 @@ _SINE_Q31 = (161942, -5016767, 85564854, -693597876, 1686629674)  # 2^-30
 _ROUND = np.float32(1.5 * 2**23)  # added and subtracted again: rounds to an integer
 _ONE, _FOUR = np.float32(1.0), np.float32(4.0)  # a turn has four quarters
 _LARGEST = 2**31 - 1  # a signed 32-bit word
+_PART = 2**30  # of a factor of products that keep to 63 bits
+_FAR = 6 * 2**28  # an argument whose square is 36 octaves: a Gaussian ends at 32
 
 
 class _F32(Floating):
@@ -58,6 +60,16 @@ class _F32(Floating):
             h = h + coefficient
         h = h * t
         return np.asarray(amplitude * h)
+
+    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+        first, second = (self._bell(x, gain, center, weight) for center, weight in bells)
+        return np.asarray(first + second)
+
+    def _bell(self, x: Numbers, gain: Any, center: Any, weight: Any) -> Numbers:
+        u = x - center
+        u = u * gain
+        u = u * u
+        return np.asarray(weight * f32.gauss(u))
 
 
 class _Q31:
@@ -99,6 +111,21 @@ class _Q31:
             h = ((h * s) >> 30) + coefficient
         h = (h * t) >> 30
         return np.asarray((amplitude * h) >> 30)
+
+    def limited(self, x: Numbers) -> Numbers:
+        return np.clip(x, -_PART, _PART)
+
+    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+        first, second = (weight * self._bell(x, gain, center) for center, weight in bells)
+        return np.asarray((first + second) >> 29)
+
+    def _bell(self, x: Numbers, gain: Any, center: Any) -> Numbers:
+        """2^-((x - center) gain)^2 in 2^-29."""
+        argument = ((x - center) * gain) >> 12
+        far = np.abs(argument) > _FAR
+        u = (np.where(far, 0, argument) ** 2) >> 32
+        power = q31.exp2(np.minimum(u, q31.CUT - 1).astype(np.uint64)).astype(np.int64)
+        return np.where(far | (u >= q31.CUT), 0, power)
 
 
 _OPERATIONS: dict[str, Operations] = {"f32": _F32(), "q31": _Q31()}

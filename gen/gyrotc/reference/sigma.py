@@ -188,7 +188,7 @@ def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
     words = _rules(table)[RULES:]
     for i, record in enumerate(table.terms.reshape(-1, ARRAYS["terms"])):
         first, word, kind = table.numbers(record[2:])[0], words[i], int(record[0])
-        if kind == TableKind.AUXILIARY:
+        if TableKind(kind).reads_channel:
             yield np.where(
                 (evidence.status & CHANNEL_LOST) != 0, do.squared(word), np.zeros_like(do.squared(word))
             )

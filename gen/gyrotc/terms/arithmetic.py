@@ -11,9 +11,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FLOAT64", "Floating", "Operations"]
+__all__ = ["FLOAT64", "Bells", "Floating", "Operations"]
 
 Numbers = NDArray[Any]
+Bells = tuple[tuple[Any, Any], tuple[Any, Any]]
 
 
 class Operations(Protocol):
@@ -43,6 +44,12 @@ class Operations(Protocol):
 
     def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
         """amplitude cos(2 pi (x frequency + phase))."""
+
+    def limited(self, x: Numbers) -> Numbers:
+        """The nearest number that may be multiplied."""
+
+    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+        """Sum of weight 2^-((x - center) gain)^2 over two (center, weight)."""
 
 
 class Floating:
@@ -74,6 +81,13 @@ class Floating:
 
     def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
         return np.asarray(amplitude * np.cos(2.0 * np.pi * (x * frequency + phase)))
+
+    def limited(self, x: Numbers) -> Numbers:
+        return x
+
+    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+        first, second = (weight * np.exp2(-(((x - center) * gain) ** 2)) for center, weight in bells)
+        return np.asarray(first + second)
 
 
 FLOAT64: Operations = Floating()

@@ -14,23 +14,28 @@ from .search import SearchRule, anywhere
 from .tabled import Tabled
 from .words import Telling, Wording
 
-__all__ = ["CAUSE"]
+__all__ = ["CAUSE", "channel_of"]
 
 
-def _channel(channel: Array | None) -> Array:
+def channel_of(channel: Array | None) -> Array:
+    """The channel that a term names.
+
+    Raises:
+        InputError: It names none.
+    """
     if channel is None:
         raise InputError("auxiliary", "no channel is named", '"channel", the name of a recorded column')
     return channel
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
-    departure = _channel(scene.channel) - values["reference"]
+    departure = channel_of(scene.channel) - values["reference"]
     return np.asarray(values["slope_dph_per_unit"] * departure)
 
 
 def _features(history: History, values: Values) -> Features:
     """The channel as it is; its reference is a constant that the map holds."""
-    channel = _channel(history.channel)
+    channel = channel_of(history.channel)
     return Features(channel[:, None], np.isfinite(channel))
 
 

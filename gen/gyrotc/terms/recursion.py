@@ -33,6 +33,13 @@ class TableKind(IntEnum):
     WARM_UP = 3
     HARMONIC = 4
     AUXILIARY = 5
+    CURVE = 6
+    PRODUCT = 7
+
+    @property
+    def reads_channel(self) -> bool:
+        """Whether it reads an auxiliary channel."""
+        return self >= TableKind.AUXILIARY
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,16 +141,45 @@ class _Harmonic(Recursion):
         outcome.added = outcome.added + self.do.wave(course.temperature, *self.p[:3])
 
 
-class _Auxiliary(Recursion):
-    """Adds slope (mean - reference)."""
+class _OfChannel(Recursion):
+    """Adds a function of what a channel shows, and of the temperature."""
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         if channel is None:
             raise ValueError("a term of a channel without its channel")
-        slope, reference = self.p[:2]
-        added = self.do.scaled_difference(channel.mean, reference, slope)
+        added = self._added(channel.mean, course.temperature)
         outcome.added = outcome.added + np.where(np.isnan(added), added.dtype.type(0), added)
         outcome.remarks = outcome.remarks | channel.remarks
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        raise NotImplementedError
+
+
+class _Auxiliary(_OfChannel):
+    """Adds slope (mean - reference)."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, reference = self.p[:2]
+        return self.do.scaled_difference(mean, reference, slope)
+
+
+class _Curve(_OfChannel):
+    """Adds slope (mean - reference) and two Gaussians of one gain, the first of them at the reference."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, gain, reference, first, center, second = self.p[:6]
+        x = self.do.limited(mean)
+        line = self.do.scaled_difference(x, reference, slope)
+        return np.asarray(line + self.do.bells(x, gain, ((reference, first), (center, second))))
+
+
+class _Product(_OfChannel):
+    """Adds (slope + growth (T - middle)) (mean - reference)."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, reference, growth, middle = self.p[:4]
+        here = self.do.limited(slope + self.do.scaled_difference(temperature, middle, growth))
+        return self.do.scaled_difference(mean, reference, here)
 
 
 _RECURSIONS: dict[TableKind, type[Recursion]] = {
@@ -152,6 +188,8 @@ _RECURSIONS: dict[TableKind, type[Recursion]] = {
     TableKind.WARM_UP: _WarmUp,
     TableKind.HARMONIC: _Harmonic,
     TableKind.AUXILIARY: _Auxiliary,
+    TableKind.CURVE: _Curve,
+    TableKind.PRODUCT: _Product,
 }
 
 

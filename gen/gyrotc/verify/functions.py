@@ -30,7 +30,7 @@ _EDGE = re.compile(
     r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
 )
 _INDIRECT = "__indirect_call"
-_CODES = "memory|play|warm_up|harmonic|auxiliary"  # of terms in gtc_terms.inl
+_CODES = "memory|play|warm_up|harmonic|auxiliary|curve|product"  # of terms in gtc_terms.inl
 TERM_CODES = tuple(_CODES.split("|"))  # by the kind of a term, from 1 on
 _HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{_CODES})_(?:begin|take|step|apply))$")
 

@@ -92,7 +92,7 @@ static void any_record(unsigned i, const struct NAME(term_code) *code)
 {
     any_terms[i * GTC_TERM_WORDS].bits = code->kind;
     any_terms[(i * GTC_TERM_WORDS) + 1U].bits = 0U;
-    if (code->kind == GTC_TERM_AUXILIARY) {
+    if (READS_CHANNEL(code->kind)) {
         any.n_stand_ins = (Frama_C_interval(0, 1) != 0) ? 1U : 0U;
         any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (any.n_stand_ins != 0U) ? (1U + (ALL_NETWORKS * 65536UL)) : 1U;
     }

@@ -53,7 +53,7 @@ static void any_term(unsigned i)
     state.term[i][0] = (int_least32_t)Frama_C_long_interval(LOWEST - width, HIGHEST + width);
     state.term[i][1] = (int_least32_t)Frama_C_long_interval(0, 65535);
 #endif
-    if (kind == GTC_TERM_AUXILIARY) {
+    if (READS_CHANNEL(kind)) {
         NAME(input_t) *const in = &state.input[THE_TABLE.terms[(i * GTC_TERM_WORDS) + 1U].bits & 0xFFFFU];
         in->gap_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
         in->held_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);

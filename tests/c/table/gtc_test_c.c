@@ -1,0 +1,216 @@
+/* gtc_test_c.c - bias table of gyro TEST-C. Written by gyrotc; do not edit.
+ *
+ * Make again:  gyrotc emit model.json --out .
+ * Model:       sha256 4c32da67ac31e58cc72a06b76fef5ea5c9930215ae810dd1868e2ce94d4363dc
+ *
+ * The numbers in this file belong to the owner of the gyro's recordings.
+ */
+#include "gtc_test_c.h"
+
+#include <stddef.h>
+
+#if GTC_TABLE_LAYOUT != 2
+#error "gtc_test_c.c was written for table layout 2: emit it again with the gyrotc of this runtime"
+#endif
+
+#define V(x) { .value = (x) } /* a float32 number */
+#define B(x) { .bits = (x) }  /* an integer */
+
+/* ---- float32 ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t f32_serial[16] = {
+    B(0x54534554UL), B(0x432dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t f32_networks[8] = {
+    B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t f32_centers[15] = {
+    V(-0.75F), V(24.0224476F), V(0.166666985F), V(9.60897923F), V(0.75F), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    V(0.0F), V(16.0149651F), V(0.0F), V(0.0F), V(-1.25F), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    V(0.0F), V(0.0F), V(-0.5F), V(13.7271128F), V(0.3125F), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t f32_guards[16] = {
+    V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x0UL), B(0x2UL), V(0.0F), /* temperature_c */
+    V(9.0F), V(15.0F), V(2.0F), V(0.0F), B(0x0UL), B(0x0UL), B(0x4UL), V(12.5F), /* supply_v */
+};
+
+/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+static const gtc_word_t f32_terms[16] = {
+    B(0x6UL), B(0x1UL), V(0.125F), V(19.2179585F), V(11.0F), V(0.25F), V(13.0F), V(-0.0625F), /* auxiliary_curve */
+    B(0x7UL), B(0x1UL), V(0.0625F), V(12.0F), V(0.03125F), V(15.0F), V(0.0F), V(0.0F), /* auxiliary_product */
+};
+
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t f32_sigma[17] = {
+    V(0.00800000038F), V(0.0190787837F),
+    V(0.0293938778F), V(0.0395474397F),
+    V(0.00100000005F), V(9.99999975e-05F),
+    V(0.0179999992F), V(0.00400000019F),
+    V(0.00200000009F), V(0.0299999993F),
+    V(0.0500000007F), V(0.150000006F),
+    V(0.00600000005F), V(0.0599999987F),
+    V(900.0F), V(0.0299999993F),
+    V(0.0199999996F),
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t f32_probes[32] = {
+    V(0.774153054F), V(0.456940234F), V(-0.723808289F), B(0x0UL),
+    V(47.31493F), V(0.38882038F), V(-0.0590648577F), B(0x0UL),
+    V(-19.3186951F), V(-0.298464566F), V(0.302154005F), B(0x0UL),
+    V(-13.0752821F), V(-0.181019917F), V(0.462099791F), B(0x0UL),
+    V(48.6775398F), V(-0.208108783F), V(0.595777869F), B(0x0UL),
+    V(49.3588448F), V(-0.00657336134F), V(0.408011675F), B(0x0UL),
+    V(-40.0F), V(-0.75F), V(0.115000188F), B(0x2UL),
+    V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
+};
+
+extern const struct gtc_f32_term_code gtc_f32_term_curve;
+
+extern const struct gtc_f32_term_code gtc_f32_term_product;
+
+const gtc_f32_table_t gtc_test_c_f32 = {
+    .layout = 2,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0xb349a8ceUL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
+    .slope_blocks = 4UL,
+    .lead_blocks = 0UL,
+    .bias_frac_bits = 0UL,
+    .fallback = V(0.375F),
+    .authority = { V(-9.18306351F), V(9.26056099F) },
+    .effect = { V(-7.18750048F), V(7.62500048F) },
+    .rezero = V(0.0299999993F),
+    .scale = { V(20.0F), V(0.0250000004F), V(2.0F) },
+    .envelope = { V(-20.0F), V(60.0F), V(-0.5F), V(0.5F) },
+    .n_networks = 1UL,
+    .n_centers = 3UL,
+    .n_channels = 2UL,
+    .n_terms = 2UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 17UL,
+    .n_probes = 8UL,
+    .n_stand_ins = 0UL,
+    .serial = f32_serial,
+    .networks = f32_networks,
+    .centers = f32_centers,
+    .guards = f32_guards,
+    .terms = f32_terms,
+    .coverage = NULL,
+    .sigma = f32_sigma,
+    .probes = f32_probes,
+    .crc = 0x68adc95cUL,
+    .term_code = { &gtc_f32_term_curve, &gtc_f32_term_product },
+};
+
+/* ---- fixed point ---- */
+
+/* four characters of the serial a word, the first one lowest */
+static const gtc_word_t q31_serial[16] = {
+    B(0x54534554UL), B(0x432dUL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+    B(0x0UL), B(0x0UL), B(0x0UL), B(0x0UL),
+};
+
+/* centers, w0, linear in T and slope, region: T min, max, slope min, max */
+static const gtc_word_t q31_networks[8] = {
+    B(0x3UL), B(0xff001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+};
+
+/* T: center, gain; slope: center, gain; weight */
+static const gtc_word_t q31_centers[15] = {
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+};
+
+/* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
+static const gtc_word_t q31_guards[16] = {
+    B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x0UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
+    B(0x00090000UL), B(0x000f0000UL), B(0x00020000UL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x4UL), B(0x000c8000UL), /* supply_v */
+};
+
+/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+static const gtc_word_t q31_terms[16] = {
+    B(0x6UL), B(0x1UL), B(0x01000000UL), B(0x0266f984UL), B(0x000b0000UL), B(0x02000000UL), B(0x000d0000UL), B(0xff800000UL), /* auxiliary_curve */
+    B(0x7UL), B(0x1UL), B(0x00800000UL), B(0x000c0000UL), B(0x00400000UL), B(0x000f0000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary_product */
+};
+
+/* 1 sigma of the compensated bias, a row for each cell of slope */
+static const gtc_word_t q31_sigma[17] = {
+    B(0x0010624eUL), B(0x002712c7UL),
+    B(0x003c32dbUL), B(0x0050fe40UL),
+    B(0x00020c4aUL), B(0x0000346eUL),
+    B(0x0024dd2fUL), B(0x00083127UL),
+    B(0x00041893UL), B(0x003d70a4UL),
+    B(0x00666666UL), B(0x01333333UL),
+    B(0x000c49baUL), B(0x007ae148UL),
+    B(0x00000384UL), B(0x003d70a4UL),
+    B(0x0028f5c3UL),
+};
+
+/* known answers: T, slope, bias, status */
+static const gtc_word_t q31_probes[32] = {
+    B(0x002863e5UL), B(0x000011e1UL), B(0xfefc59f0UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xfadc692bUL), B(0x0UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xfcc79590UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x02e42bb1UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xfd9990f1UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xf9b91ecbUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x00eb92e2UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x02675091UL), B(0x2UL),
+};
+
+extern const struct gtc_q31_term_code gtc_q31_term_curve;
+
+extern const struct gtc_q31_term_code gtc_q31_term_product;
+
+const gtc_q31_table_t gtc_test_c_q31 = {
+    .layout = 2,
+    .quantity = 0UL,
+    .unit = 0UL,
+    .id = 0xb349a8ceUL,
+    .calibrated = 0UL,
+    .block_us = 10000000UL,
+    .slope_blocks = 4UL,
+    .lead_blocks = 0UL,
+    .bias_frac_bits = 27UL,
+    .fallback = 50331648L,
+    .authority = { -1232527861L, 1242930504L },
+    .effect = { -964689920L, 1023410176L },
+    .rezero = 4026532L,
+    .scale = { 1677721L, 134217727L, 0L },
+    .envelope = { -1310720L, 3932160L, -32768L, 32768L },
+    .n_networks = 1UL,
+    .n_centers = 3UL,
+    .n_channels = 2UL,
+    .n_terms = 2UL,
+    .coverage_cells = { 0UL, 0UL },
+    .sigma_cells = { 2UL, 1UL },
+    .n_sigma = 17UL,
+    .n_probes = 8UL,
+    .n_stand_ins = 0UL,
+    .serial = q31_serial,
+    .networks = q31_networks,
+    .centers = q31_centers,
+    .guards = q31_guards,
+    .terms = q31_terms,
+    .coverage = NULL,
+    .sigma = q31_sigma,
+    .probes = q31_probes,
+    .crc = 0x6288e110UL,
+    .term_code = { &gtc_q31_term_curve, &gtc_q31_term_product },
+};
+
