@@ -120,7 +120,7 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
     yield f"### {name}\n"
     if inspect.isclass(thing) or inspect.isroutine(thing):
         if inspect.isroutine(thing):
-            signature = re.sub(r"<(\w+) [^<>]*>", r"<\1>", str(inspect.signature(thing)))
+            signature = re.sub(r"<(\w+) (?:<\w+>|[^<>])*>", r"<\1>", str(inspect.signature(thing)))
             yield f"```python\n{name}{signature}\n```\n"
         text = inspect.cleandoc(thing.__doc__ or "")
         if text and not text.startswith(f"{name}("):  # a dataclass without words of its own
