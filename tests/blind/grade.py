@@ -107,11 +107,15 @@ def _gain(
         return None
     exam = [k for k, role in enumerate(campaign.roles) if role == "exam"]
     noise = np.concatenate([mean_of(hidden.noise_rows[k], _AVERAGE) for k in exam])
+    shipped = result["extended"]["gain"] if result["extended"] else None
     return {
         "before2": physical[0]["gain"]["exam_rms_before_dph"] ** 2,
         "after2": physical[-1]["gain"]["exam_rms_after_dph"] ** 2,
         "noise2": float(np.mean(noise**2)),
-        "shipped": float(result["extended"] is not None),
+        "shipped": float(shipped is not None),
+        "worse": float(
+            shipped is not None and shipped["exam_rms_after_dph"] > shipped["exam_rms_before_dph"]
+        ),
     }
 
 

@@ -260,7 +260,7 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
         name = "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"
         out += _value(name, "≥ 85 %", got / best, got / best >= 0.85, len(chosen))
     shipped = [r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]]
-    worse = [g["after2"] > g["before2"] for g in shipped]
+    worse = [bool(g["worse"]) for g in shipped]
     return out + proportion("shipped although worse on the exam", "0", worse, 0.0, "max")
 
 
