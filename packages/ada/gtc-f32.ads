@@ -86,7 +86,7 @@ private
    type Addresses is array (Positive range <>) of System.Address with Convention => C;
 
    type Table is limited record
-      Head      : Words (1 .. 32);
+      Head      : Words (1 .. 33);
       Arrays    : Addresses (1 .. 8);
       Crc       : Word;
       Term_Code : Addresses (1 .. Max_Terms);

@@ -1,8 +1,9 @@
 """The smallest and largest correction that a table may give, and that its terms may add.
 
-The range of the map over the envelope, seen by the reference on a grid and at every center, and of the terms, as
-training saw it or as their parameters allow; each with a margin. 0 belongs to it: before anything is believed there
-is no correction.
+The range of the map over the envelope, seen by the reference on a grid, at every center and where lines through two
+centers cross (a Gaussian may be a ridge, narrower than the grid, whose highest place lies in another one), and of the
+terms, as training saw it or as their parameters allow; each with a margin. 0 belongs to it: before anything is believed
+there is no correction.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ MARGIN = 0.25
 _LARGEST_DPH = 1.5e7  # twice the largest rate that anything here takes for one
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 _CELLS = (96, 48)  # of the grid, T and slope
+_CROSSING = 64  # centers of which all lines are crossed: 4096 places, as many as the grid has
 
 Range = tuple[float, float]
 
@@ -48,9 +50,7 @@ def unbounded(numeric: Numeric) -> Bounds:
 
 def with_authority(model: Model, table: Table) -> Table:
     """The table with the bounds of its corrections."""
-    low, high = _map_range(model, table)
-    floor = model.noise_floor_dph or 0.0
-    low, high = _wider((low, high), floor)
+    low, high = _granted(model, table)
     effect = _effects(model)
     least = min(low + effect[0], model.fallback_dph, 0.0) - model.rezero_dph
     most = max(high + effect[1], model.fallback_dph, 0.0) + model.rezero_dph
@@ -67,14 +67,28 @@ def _wider(bounds: Range, least: float = 0.0) -> Range:
     return bounds[0] - margin, bounds[1] + margin
 
 
-def _map_range(model: Model, table: Table) -> Range:
-    """Smallest and largest of the map, deg/h."""
+def _granted(model: Model, table: Table) -> Range:
+    """What the map may give, deg/h: its range with the margin."""
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    grid = np.stack(
-        np.meshgrid(np.linspace(t0, t1, _CELLS[0] + 1), np.linspace(r0, r1, _CELLS[1] + 1)), axis=-1
-    ).reshape(-1, 2)
-    centers = [center for network in model.networks for center in network.centers]
-    points: NDArray[np.float64] = np.concatenate([grid, np.array(centers).reshape(-1, 2)])
+    grid = _lattice(np.linspace(t0, t1, _CELLS[0] + 1), np.linspace(r0, r1, _CELLS[1] + 1))
+    centers = np.array([center for network in model.networks for center in network.centers]).reshape(-1, 2)
+    floor = model.noise_floor_dph or 0.0
+    seen = _map_range(model, table, np.concatenate([grid, centers]))
+    granted = _wider(seen, floor)
+    if 0 < len(centers) <= _CROSSING:
+        crossed = _map_range(model, table, _lattice(*centers.T))
+        if crossed[0] < granted[0] or crossed[1] > granted[1]:
+            return _wider((min(seen[0], crossed[0]), max(seen[1], crossed[1])), floor)
+    return granted
+
+
+def _lattice(temperature_c: NDArray[np.float64], slope_c_per_min: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Every temperature with every slope, shape (n, 2)."""
+    return np.stack(np.meshgrid(temperature_c, slope_c_per_min), axis=-1).reshape(-1, 2)
+
+
+def _map_range(model: Model, table: Table, points: NDArray[np.float64]) -> Range:
+    """Smallest and largest of the map at points (C, C/min), deg/h."""
     inputs = table.encode_inputs(points * np.array([1.0, model.block_s / 60.0]))
     _, bits = evaluate_map(table, inputs)
     biases = table.decode_bias(bits)

@@ -92,7 +92,7 @@ macro_rules! arithmetic {
             /// A table: constant data that an emitted C file holds, or an image that was opened.
             #[repr(C)]
             pub struct Table {
-                head: [Word; 32],
+                head: [Word; 33],
                 arrays: [*const Word; 8],
                 crc: Word,
                 term_code: [*const c_void; MAX_TERMS],
@@ -215,7 +215,7 @@ macro_rules! arithmetic {
                 pub fn new(words: &'w [Word], expected_id: u32) -> Result<Self, Error> {
                     let count = u32::try_from(words.len()).map_err(|_| Error::Image)?;
                     let mut table = Table {
-                        head: [0; 32],
+                        head: [0; 33],
                         arrays: [ptr::null(); 8],
                         crc: 0,
                         term_code: [ptr::null(); MAX_TERMS],
