@@ -134,4 +134,4 @@ def _trim() -> None:
 
 
 def _files(kind: str = "*") -> list[Path]:
-    return [path for path in folder().glob(f"*.{kind}") if path.name != _LIMIT]
+    return list(folder().glob(f"*.{kind}"))

@@ -22,7 +22,7 @@ from ..frontend import F32, Blocks, Guarded, channel_at, with_missing
 from ..model import Model
 from ..results.training import ChannelTried
 from ..terms import CATALOGUE
-from ..terms.recursion import CourseChannel
+from ..terms.recursion import CourseChannel, TableKind
 from .data import Scaling, TrainingData, scaling_of
 from .guards import channel_guard
 from .parts import Parts, PartsTrial, chosen_parts
@@ -234,7 +234,7 @@ def with_channels(
 
     `samples`: those that the map was trained on, without what the channels add.
     """
-    cause = next(c for c in CATALOGUE.values() if c.needs.channel and c.table is not None)
+    cause = next(c for c in CATALOGUE.values() if c.table and c.table.kind == TableKind.AUXILIARY)
     assert cause.amplitudes is not None
     terms: list[dict[str, Any]] = []
     sigmas, stood = [], np.zeros(len(samples))
