@@ -143,7 +143,7 @@ typedef struct {
     float high;            /* ... and highest temperature that the terms saw since they began, C */
     float plain;           /* correction without the shift, deg/h */
     uint_least32_t begun;  /* blocks since init when the terms began */
-    uint_least32_t known;  /* one bit a term: it went on from where it was */
+    uint_least32_t known;  /* one bit a term: it went on from where it was, or its channel is believed */
     uint_least32_t sure;   /* 0: there was no correction yet, 1: nothing is known of the slope, 2: drift is known */
 } gtc_f32_doubt_t;
 

@@ -106,6 +106,7 @@ static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32
     effect.temp = temp;
     effect.slope = slope;
     effect.added = NUM_ZERO;
+    effect.known = state->doubt.known;
     effect.remarks = (FN(bits)(seen) != FN(bits)(temp)) ? (remarks | GTC_CLAMPED) : remarks;
     for (i = 0U; i < table->n_terms; i++) {
         table->term_code[i]->apply(state, i, seen, &effect);

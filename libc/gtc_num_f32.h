@@ -531,6 +531,12 @@ static inline float FN(plus)(float a, float b)
     return FN(add)(a, b);
 }
 
+/* A square, or what stands for it where a state was overwritten so that it is none; the sum of two is one */
+static inline float FN(square_or)(float square, float other)
+{
+    return (square <= 1.0e38F) ? square : other;
+}
+
 /* square / n */
 static inline float FN(shared_out)(float square, uint_least32_t n)
 {

@@ -643,6 +643,13 @@ static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
     return a + b;
 }
 
+/* Every number of a state has a square */
+static inline uint_least64_t FN(square_or)(uint_least64_t square, uint_least64_t other)
+{
+    (void)other;
+    return square;
+}
+
 /* square / n */
 static inline uint_least64_t FN(shared_out)(uint_least64_t square, uint_least32_t n)
 {

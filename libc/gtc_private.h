@@ -49,6 +49,7 @@ typedef struct {
     float slope;
     float added;
     int_least32_t remarks;
+    uint_least32_t known; /* as of a doubt */
 } gtc_f32_effect_t;
 
 typedef struct {
@@ -56,6 +57,7 @@ typedef struct {
     int_least32_t slope;
     int_least64_t added;
     int_least32_t remarks;
+    uint_least32_t known;
 } gtc_q31_effect_t;
 
 /* Functions of one kind of term; i is the number of the term in its table.

@@ -19,7 +19,7 @@ static int FN(run_snapshot)(const STATE *state, SNAPSHOT *snapshot)
         return GTC_E_LAYOUT;
     }
     status = FN(run_bias)(state, &snapshot->bias);
-    snapshot->sigma = FN(root)(FN(plus)(FN(variance)(state), FN(squared)(state->constant)));
+    snapshot->sigma = FN(root)(FN(plus)(FN(variance)(state), FN(variance_of_constant)(state)));
     snapshot->correlation_s = FN(rule)(state->table, RULE_CORRELATION);
     snapshot->age_blocks = (state->doubt.sure == 0U) ? 0U : state->input[0].held_blocks;
     snapshot->status = (int_least32_t)status;
@@ -56,7 +56,7 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
     if ((!FN(has_sigma)(state->table)) || (!(MEMBER(state->table->rezero) > NUM_ZERO))) {
         return GTC_E_LAYOUT;
     }
-    prior = FN(squared)(state->constant);
+    prior = FN(variance_of_constant)(state);
     rest = FN(plus)(FN(variance)(state), FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
     share = FN(share_of)(prior, rest);
     shift = FN(add)(state->shift, FN(part)(share, mean_rate));

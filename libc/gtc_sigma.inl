@@ -87,6 +87,7 @@ static void FN(doubt_input)(STATE *state, const EFFECT *effect, NUM slope)
 {
     const uint_least32_t filled = state->filled;
 
+    state->doubt.known = effect->known;
     state->doubt.at[0] = effect->temp;
     state->doubt.at[1] = effect->slope;
     state->doubt.sure = 2U;
@@ -113,7 +114,7 @@ static SQUARE FN(variance_of_map)(const STATE *state)
     POINT in;
 
     if (FN(locate)(table, state->doubt.at[0], state->doubt.at[1], &in) < 0) {
-        return NO_SQUARE;
+        return FN(squared)(FN(rule)(table, RULE_NONE));
     }
     FN(cells)(table, &in, table->sigma_cells, cell);
     index = (cell[1] * table->sigma_cells[0]) + cell[0];
@@ -167,7 +168,7 @@ static SQUARE FN(variance_beyond)(const STATE *state)
     return sum;
 }
 
-/* Of what terms do not know of the time before they began, or of a channel that is lost. */
+/* Of what terms do not know of the time before they began, or of a channel of which nothing is believed. */
 static SQUARE FN(variance_of_terms)(const STATE *state)
 {
     const TABLE *const table = state->table;
@@ -179,12 +180,10 @@ static SQUARE FN(variance_of_terms)(const STATE *state)
         const NUM word = FN(rule)(table, GTC_SIGMA_RULES + i);
         const NUM first = FN(parameter)(state, i, 0U);
 
-        if (READS_CHANNEL(kind)) {
-            if ((state->status & GTC_CHANNEL_LOST) != 0) {
-                sum = FN(plus)(sum, FN(squared)(word));
-            }
-        } else if (((state->doubt.known >> i) & 1U) != 0U) {
-            /* it went on from where it was */
+        if (((state->doubt.known >> i) & 1U) != 0U) {
+            /* it went on from where it was, or its channel is believed */
+        } else if (READS_CHANNEL(kind)) {
+            sum = FN(plus)(sum, FN(squared)(word));
         } else if (kind == GTC_TERM_MEMORY) {
             sum = FN(plus)(sum, FN(squared)(FN(remaining)(word, first, state->elapsed - state->doubt.begun)));
         } else if (kind == GTC_TERM_PLAY) {
@@ -196,22 +195,24 @@ static SQUARE FN(variance_of_terms)(const STATE *state)
     return sum;
 }
 
-/* Of the correction in force, but for the constant from power-on to power-on. */
+/* Of the correction in force, but for the constant from power-on to power-on. Of a state that was overwritten nothing is
+ * known. */
 static SQUARE FN(variance)(const STATE *state)
 {
+    const SQUARE unknown = FN(squared)(FN(rule)(state->table, RULE_NONE));
     SQUARE sum;
 
     if ((state->status & GTC_FALLBACK) != 0) {
         sum = FN(squared)(FN(rule)(state->table, RULE_FALLBACK));
     } else if (state->doubt.sure == 0U) {
-        sum = FN(squared)(FN(rule)(state->table, RULE_NONE));
+        sum = unknown;
     } else {
         sum = FN(plus)(FN(variance_of_map)(state), FN(variance_of_age)(state));
         sum = FN(plus)(sum, FN(variance_of_start)(state));
         sum = FN(plus)(sum, FN(variance_beyond)(state));
         sum = FN(plus)(sum, FN(variance_of_terms)(state));
     }
-    return sum;
+    return FN(square_or)(sum, unknown);
 }
 
 /* ---- the constant of a power-on ------------------------------------------------------------------- */
@@ -223,12 +224,18 @@ static void FN(rezero_clear)(STATE *state)
     state->constant = FN(has_sigma)(state->table) ? FN(rule)(state->table, RULE_BETWEEN) : NUM_ZERO;
 }
 
+/* Variance of the constant. */
+static SQUARE FN(variance_of_constant)(const STATE *state)
+{
+    return FN(square_or)(FN(squared)(state->constant), FN(squared)(FN(rule)(state->table, RULE_BETWEEN)));
+}
+
 /* A shift goes on; the constant of the next power-on differs from that of the last one by twice the variance. */
 static void FN(rezero_outlast)(STATE *state)
 {
     if (FN(has_sigma)(state->table) && ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO))) {
         const SQUARE between = FN(squared)(FN(rule)(state->table, RULE_BETWEEN));
 
-        state->constant = FN(root)(FN(plus)(FN(squared)(state->constant), FN(plus)(between, between)));
+        state->constant = FN(root)(FN(plus)(FN(variance_of_constant)(state), FN(plus)(between, between)));
     }
 }

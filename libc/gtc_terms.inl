@@ -165,7 +165,12 @@ static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NU
     const uint_least32_t channel = FN(channel_of)(term);
     const uint_least32_t stand_in = FN(stand_in_of)(term);
     const INPUT *const in = &state->input[channel];
+    const uint_least32_t bit = (uint_least32_t)1U << i;
 
+    effect->known &= ~bit;
+    if (in->gap_us != 0U) {
+        effect->known |= bit;
+    }
     if ((in->gap_us == 0U) || (in->held_blocks != 0U)) {
         effect->remarks |= GTC_HELD;
     }

@@ -360,15 +360,6 @@ TEST(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no
     snapshot_t snapshot;
 
     rest(&state, C(15), 100);
-#if !TEST_Q31
-    {
-        const num_t before = bias_of(&state);
-
-        state.constant = MUCH; /* its square is none: nothing is known of the share */
-        CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
-        CHECK(same(bias_of(&state), before));
-    }
-#endif
     state.constant = MUCH;
     state.doubt.at[0] = MISSING;
     snapshot = snapshot_of(&state);
@@ -376,6 +367,40 @@ TEST(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no
     state.bias = MISSING;
     CHECK(bias_of(&state) >= VALUE(TABLE.authority[0]));
     CHECK(bias_of(&state) <= VALUE(TABLE.authority[1]));
+}
+
+/* No number that is none makes a correction sure: a filter would follow it alone. */
+TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
+{
+    const state_t right = started();
+    const num_t unknown = snapshot_of(&right).sigma;
+    num_t none[2];
+    int k;
+
+    none[0] = MISSING;
+    none[1] = MUCH;
+    for (k = 0; k < 2; k++) {
+        state_t rested = right;
+        state_t map;
+        state_t drift;
+        state_t constant;
+        num_t before;
+
+        rest(&rested, C(15), 100);
+        CHECK(snapshot_of(&rested).sigma < unknown);
+        map = drift = constant = rested;
+        map.doubt.at[0] = none[k];
+        CHECK(snapshot_of(&map).sigma >= unknown);
+        drift.doubt.drift = none[k];
+        drift.input[0].held_blocks = 2U;
+        CHECK(snapshot_of(&drift).sigma >= unknown);
+        constant.constant = none[k];
+        before = snapshot_of(&constant).sigma;
+        CHECK(before >= snapshot_of(&rested).sigma);
+        CHECK(FN(rezero)(&constant, DPH(0.004), 3600U) >= 0);
+        CHECK(snapshot_of(&constant).sigma > 0);
+        CHECK(snapshot_of(&constant).sigma <= before);
+    }
 }
 
 /* Without noise and without an uncertain constant a rest says nothing. */
@@ -436,6 +461,7 @@ int main(void)
     RUN(words_of_uncertainty_are_all_there_or_none);
     RUN(the_largest_words_give_a_sigma);
     RUN(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no_shift);
+    RUN(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing);
     RUN(a_table_that_is_sure_of_everything_takes_no_rest);
     RUN(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does);
     RUN(a_state_without_uncertainties_outlasts_a_time_without_power);

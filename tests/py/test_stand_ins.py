@@ -115,6 +115,25 @@ def test_while_channels_are_lost_the_correction_is_that_of_map_and_stand_ins(num
         assert found[at] == pytest.approx(of_map + np.clip(added, low_effect, high_effect), abs=room), at
 
 
+def test_sigma_counts_the_channels_that_are_lost_and_no_other() -> None:
+    model = with_two_channels(11, lead_blocks=0, stuck_s=0.0)
+    table = quantise(model, "f32")
+    rows = 900
+    readings = np.full((rows, 2), 12.0)
+    readings[200:400, 0] = np.nan
+    readings[500:700] = np.nan
+    low, high = model.envelope.temperature_c
+    channels = table.encode_inputs(np.column_stack([np.full(rows, 0.3 * low + 0.7 * high), readings]))
+    bits = replayed(table, channels, _SAMPLES_PER_BLOCK).sigma
+    assert bits is not None
+    variance = table.decode_bias(bits) ** 2
+    words = table.decode_bias(table.sigma[-len(model.terms) :]) ** 2
+    of_first = words[[k for k, term in enumerate(model.terms) if term.channel == "magnetic_ut"]].sum()
+    assert variance[399] - variance[199] == pytest.approx(of_first, rel=1e-3)
+    assert variance[699] - variance[499] == pytest.approx(words.sum(), rel=1e-3)
+    assert variance[899] == variance[499] == variance[199]
+
+
 @pytest.mark.parametrize("numeric", NUMERICS)
 def test_a_stand_in_keeps_to_its_bound(numeric: str) -> None:
     seed = secrets.randbelow(2**20)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..frontend import FALLBACK as FALLEN
 from ..frontend import MAP, Steps
-from ..status import CHANNEL_LOST, FALLBACK, UNCOVERED, WARMING
+from ..status import FALLBACK, UNCOVERED, WARMING
 from ..terms.recursion import Course, TableKind, TermOutcome
 from . import f32, q31
 from .squares import RULES, SQUARES
@@ -43,6 +43,7 @@ class SigmaEvidence:
         age: Blocks for which the correction is held.
         since: Blocks since the terms began.
         low, high: Of the temperatures that they saw since then.
+        away: Of each term that reads a channel, where nothing of the channel was believed.
     """
 
     status: NDArray[np.int32]
@@ -54,6 +55,7 @@ class SigmaEvidence:
     since: Whole
     low: Numbers
     high: Numbers
+    away: tuple[NDArray[np.bool_], ...]
 
     def __len__(self) -> int:
         return int(self.status.size)
@@ -91,6 +93,7 @@ def evidence_of(
         since=course.elapsed - course.elapsed[began],
         low=_extremes(np.minimum, course, steps.is_restart),
         high=_extremes(np.maximum, course, steps.is_restart),
+        away=tuple(of_term[made] for of_term in outcome.away),
     )
 
 
@@ -183,15 +186,13 @@ def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> Numbers:
 
 
 def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
-    """What each term does not know of the time before it began, or of a channel that is lost."""
+    """What each term does not know of the time before it began, or of a channel of which nothing is believed."""
     do = SQUARES[table.numeric]
-    words = _rules(table)[RULES:]
+    words, away = _rules(table)[RULES:], iter(evidence.away)
     for i, record in enumerate(table.terms.reshape(-1, ARRAYS["terms"])):
         first, word, kind = table.numbers(record[2:])[0], words[i], int(record[0])
         if TableKind(kind).reads_channel:
-            yield np.where(
-                (evidence.status & CHANNEL_LOST) != 0, do.squared(word), np.zeros_like(do.squared(word))
-            )
+            yield np.where(next(away), do.squared(word), np.zeros_like(do.squared(word)))
         elif kind == TableKind.MEMORY:
             yield do.squared(do.remaining(word, first, evidence.since))
         elif kind == TableKind.PLAY:

@@ -10,7 +10,7 @@ Only what depends on the order is done one correction after the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -75,12 +75,16 @@ class CourseChannel:
 
 @dataclass(slots=True)
 class TermOutcome:
-    """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits."""
+    """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits.
+
+    `away`: of each term that reads a channel, where nothing of the channel is believed.
+    """
 
     temperature: Numbers
     slope: Numbers
     added: Numbers
     remarks: NDArray[np.int32]
+    away: list[NDArray[np.bool_]] = field(default_factory=list)
 
 
 class Recursion:
@@ -150,6 +154,7 @@ class _OfChannel(Recursion):
         added = self._added(channel.mean, course.temperature)
         outcome.added = outcome.added + np.where(np.isnan(added), added.dtype.type(0), added)
         outcome.remarks = outcome.remarks | channel.remarks
+        outcome.away.append(channel.is_away)
 
     def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
         raise NotImplementedError
