@@ -607,7 +607,7 @@ static inline float FN(remaining)(float word, float gain, uint_least32_t blocks)
     return left;
 }
 
-/* word (2 width - (high - low)), 0 where that is negative */
+/* word (2 width - (high - low)), 0 where that is negative; no number where low or high is none */
 static inline float FN(unsettled)(float width, float low, float high, float word)
 {
     float range;
@@ -617,7 +617,7 @@ static inline float FN(unsettled)(float width, float low, float high, float word
     left = width + width;
     left = left - range;
     left = word * left;
-    return (left > 0.0F) ? left : 0.0F;
+    return (left <= 0.0F) ? 0.0F : left;
 }
 
 #endif /* GTC_NUM_F32_H_INCLUDED */

@@ -59,7 +59,7 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
     prior = FN(variance_of_constant)(state);
     rest = FN(plus)(FN(variance)(state), FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
     share = FN(share_of)(prior, rest);
-    shift = FN(add)(state->shift, FN(part)(share, mean_rate));
+    shift = FN(add)((FN(is_missing)(state->shift) != 0) ? NUM_ZERO : state->shift, FN(part)(share, mean_rate));
     state->shift = FN(granted)(state->table, shift);
     if ((shift > state->shift) || (shift < state->shift)) {
         status = GTC_CLAMPED;

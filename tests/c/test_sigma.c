@@ -5,12 +5,18 @@
 typedef gtc_q31_snapshot_t snapshot_t;
 #define DPH(x) ((int_least32_t)((x) * (double)(1L << TABLE.bias_frac_bits)))
 #define MUCH 2147483647L
+#define INFINITE (-MUCH)
+#define HIGHEST 2147483647L
 #define VALUE(member) (member)
+#define NUMBER(word) ((word).integer)
 #else
 typedef gtc_f32_snapshot_t snapshot_t;
 #define DPH(x) ((float)(x))
 #define MUCH 1.0e30F
+#define INFINITE (MUCH * MUCH)
+#define HIGHEST 3.4e38F
 #define VALUE(member) ((member).value)
+#define NUMBER(word) ((word).value)
 #endif
 
 static const snapshot_t nothing;
@@ -403,6 +409,43 @@ TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
     }
 }
 
+/* Each number that the uncertainty goes by, in turn. */
+static num_t *number_of(state_t *state, int k)
+{
+    num_t *const numbers[10] = {&state->doubt.at[0], &state->doubt.at[1], &state->doubt.drift, &state->doubt.start,
+                                &state->doubt.low,   &state->doubt.high,  &state->doubt.plain, &state->bias,
+                                &state->constant,    &state->shift};
+
+    return numbers[k];
+}
+
+/* What no call leaves, in a number that the uncertainty goes by, while the correction is held and terms are not sure of
+ * their past: a filter would believe a sigma of 0 for ever, and fail at one that is none. */
+TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
+{
+    const num_t wrong[4] = {MISSING, MUCH, (num_t)-MUCH, INFINITE};
+    state_t whole;
+    num_t temp = C(15);
+    num_t sure;
+    int k;
+
+    CHECK_INT(GTC_OK, FN(init)(&whole, &TERMS, PERIOD));
+    terms_ramp(&whole, &temp, C(1) / 64, C(12), 10);
+    CHECK(FN(missed)(&whole, 2U * N) >= 0);
+    sure = NUMBER(TERMS.sigma[(2U * TERMS.sigma_cells[0] * TERMS.sigma_cells[1]) + 8U]); /* of the constant alone */
+    for (k = 0; k < 40; k++) {
+        state_t state = whole;
+        num_t shift;
+
+        *number_of(&state, k / 4) = wrong[k % 4];
+        CHECK((snapshot_of(&state).sigma > sure) && (snapshot_of(&state).sigma <= HIGHEST));
+        CHECK(FN(rezero)(&state, DPH(0.001), 60U) >= 0);
+        CHECK((snapshot_of(&state).sigma > 0) && (snapshot_of(&state).sigma <= HIGHEST));
+        shift = state.shift;
+        CHECK((shift >= -VALUE(TERMS.rezero)) && (shift <= VALUE(TERMS.rezero)));
+    }
+}
+
 /* Without noise and without an uncertain constant a rest says nothing. */
 TEST(a_table_that_is_sure_of_everything_takes_no_rest)
 {
@@ -462,6 +505,7 @@ int main(void)
     RUN(the_largest_words_give_a_sigma);
     RUN(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no_shift);
     RUN(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing);
+    RUN(a_number_that_was_overwritten_never_makes_the_correction_sure);
     RUN(a_table_that_is_sure_of_everything_takes_no_rest);
     RUN(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does);
     RUN(a_state_without_uncertainties_outlasts_a_time_without_power);
