@@ -21,7 +21,7 @@ from .contest import Contest, contest
 from .gains import Gains, Point
 from .misfit import misfit
 from .pairs import best_of, clear_pair, makes_sense
-from .refine import Refined, model_columns, refine
+from .refine import Refined, model_columns, refine, sized
 from .rivals import Rival, near_of, probabilities_of, ranked_rivals
 from .simulated_odds import calibrated
 
@@ -143,9 +143,14 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
     third = _third(two.found, pair) if two.remains else None
     if third is not None:
         three = _stage(search, gains, (*pair, third))
-        if three.misfit_p >= _WELL > two.misfit_p:
+        if three.misfit_p >= _WELL > two.misfit_p and _believed(gains, three.refined):
             return three
     return two if two.well else one
+
+
+def _believed(gains: Gains, causes: tuple[Refined, ...]) -> bool:
+    """Whether no cause is larger than is believed: the third one comes from the search, which asks for no size."""
+    return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate))
 
 
 def choose(search: Search, count: int) -> tuple[Refined, ...]:

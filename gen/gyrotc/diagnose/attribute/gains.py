@@ -2,7 +2,8 @@
 
 All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
 change of the map's input the same number of map functions is fitted before and after (equal flexibility),
-on the blocks where the changed input is known.
+on the blocks where the changed input is known. A cause that would have to be larger than is believed (`size_limit`)
+gains nothing.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..noise_colour.whitener import Whitener
 from ..orthonormal import orthonormal
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, searched
+from .size_limit import SizeLimit
 
 __all__ = ["CauseSet", "Gains", "Point"]
 
@@ -54,6 +56,27 @@ class _Base:
     gain: float
     gram: Array
     a: Array
+    taken: _Taken | None = None
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """Columns that a model holds beside its map.
+
+    Attributes:
+        weights: Theirs, shape (k,).
+        less: What each other column takes off these weights for a weight of 1, shape (k, K).
+        shares: Of the largest effect for a weight of 1, shape (k,).
+    """
+
+    weights: Array
+    less: Array
+    shares: Array
+
+    def allows(self, at: slice, weights: Array) -> bool:
+        """Whether they are still believed beside other columns with these weights."""
+        left = self.weights - self.less[:, at] @ weights
+        return float(((self.shares * left) ** 2).sum()) <= 1.0
 
 
 class Gains:
@@ -63,6 +86,7 @@ class Gains:
         target: Whitened data over the noise scale, shape (N,).
         map, beside: Whitened map functions, and columns that are in every model beside them.
         whole: Whitened bank and channel columns, nothing projected out.
+        limit: How large a cause may be.
         size: Number of blocks.
     """
 
@@ -77,6 +101,8 @@ class Gains:
         on_map = np.column_stack([bank.on_map, joined.on_map[:, :own]])
         self._columns = self.whiten(columns)
         self.whole = self._columns + self.whiten(bank.map) @ on_map
+        self.limit = SizeLimit(search)
+        self._shares = self.limit.shares(columns + bank.map @ on_map)
         self.target = self.whiten(search.y) / self.scale
         self.beside = self.whiten(joined.beside)
         self.map = self.whiten(bank.map)
@@ -153,33 +179,45 @@ class Gains:
     def pairs(self) -> Iterator[Point]:
         """All models of two candidates of which at most one changes the input."""
         for candidate, at in self.plain:
-            taken = _take(self.base, at)
+            taken = _take(self.base, at, self._shares[at])
             if taken is not None:
                 yield from self._on(taken, (candidate,))
         for base in self.bases():
             assert base.candidate is not None
             yield from self._on(base, (base.candidate,))
 
+    def _gain(self, base: _Base, at: slice, before: Array) -> float:
+        """What one column or two add; 0 where they have nothing of their own, or no size that is believed."""
+        own, a = base.gram[at, at], base.a[at]
+        if a.size == 1:
+            if own[0, 0] <= _INDEPENDENT * before[0]:
+                return 0.0
+            weights = a / own[0, 0]
+        else:
+            det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
+            if det <= _INDEPENDENT * before[0] * before[1]:
+                return 0.0
+            weights = (
+                np.array([own[1, 1] * a[0] - own[0, 1] * a[1], own[0, 0] * a[1] - own[0, 1] * a[0]]) / det
+            )
+        if float(((self._shares[at] * weights) ** 2).sum()) > 1.0:
+            return 0.0
+        if base.taken is not None and not base.taken.allows(at, weights):
+            return 0.0
+        return float(a @ weights)
+
     def _on(self, base: _Base, members: CauseSet) -> Iterator[Point]:
         """Every candidate with columns of its own, added to what `base` holds already."""
         before = np.diag(self._gram)
         for candidate, at in self.plain:
-            own = base.gram[at, at]
-            a = base.a[at]
-            if a.size == 1:
-                gain = float(a[0] ** 2 / own[0, 0]) if own[0, 0] > _INDEPENDENT * before[at][0] else 0.0
-            else:
-                det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
-                flat = det <= _INDEPENDENT * before[at][0] * before[at][1]
-                raw = own[1, 1] * a[0] ** 2 - 2 * own[0, 1] * a[0] * a[1] + own[0, 0] * a[1] ** 2
-                gain = 0.0 if flat else float(raw / det)
+            gain = self._gain(base, at, before[at])
             yield Point((*members, candidate), base.gain + gain)
         for candidate, at in self.random:
             gain = float(variance_ratio_of(base.gram[at, at], base.a[at], float(before[at].max()))[0])
             yield Point((*members, candidate), base.gain + gain)
 
 
-def _take(base: _Base, at: slice) -> _Base | None:
+def _take(base: _Base, at: slice, shares: Array) -> _Base | None:
     """`base` with further columns projected out; None if they have nothing of their own."""
     own = base.gram[at, at]
     values, vectors = np.linalg.eigh(own)
@@ -187,4 +225,7 @@ def _take(base: _Base, at: slice) -> _Base | None:
         return None
     half = vectors / np.sqrt(values)
     cross, c = half.T @ base.gram[at], half.T @ base.a[at]
-    return _Base(base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c)
+    taken = _Taken(half @ c, half @ cross, shares)
+    return _Base(
+        base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c, taken
+    )

@@ -19,7 +19,7 @@ from ..signatures.static_map import fine_columns
 from .gains import Gains
 from .intervals import Interval, parabola_top, profile_interval, random_size
 
-__all__ = ["Refined", "model_columns", "refine"]
+__all__ = ["Refined", "model_columns", "refine", "sized"]
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,18 @@ def _moved(candidate: Candidate, value: float) -> Candidate:
     return replace(candidate, values={**candidate.values, parameter.name: value})
 
 
+_Key = tuple[str, tuple[tuple[str, float], ...], str | None]
+
+
+def _key(candidate: Candidate) -> _Key:
+    return candidate.id, tuple(sorted(candidate.values.items())), candidate.channel
+
+
+def sized(candidate: Candidate) -> bool:
+    """Whether a cause has amplitudes, which are believed up to a size."""
+    return candidate.role == "columns" and terms.CATALOGUE[candidate.id].kind != "static"
+
+
 class _Fit:
     """Generalised least squares at the likeliest colour for models made of whole candidates."""
 
@@ -88,20 +100,36 @@ class _Fit:
         self.q = orthonormal(*held)
         y = gains.whiten(search.y) / gains.scale
         self.y = y - self.q @ (self.q.T @ y)
-        self._cache: dict[tuple[str, tuple[tuple[str, float], ...], str | None], Array] = {}
+        self._cache: dict[_Key, Array] = {}
+        self._shares: dict[_Key, Array] = {}
 
     def white(self, candidate: Candidate) -> Array:
         """Whitened columns of a candidate less what the map (or the masked edges) explain."""
-        key = (candidate.id, tuple(sorted(candidate.values.items())), candidate.channel)
+        key = _key(candidate)
         if key not in self._cache:
-            columns = self.gains.whiten(_columns(self.search, candidate))
+            plain = _columns(self.search, candidate)
+            self._shares[key] = self.gains.limit.shares(plain)
+            columns = self.gains.whiten(plain)
             self._cache[key] = columns - self.q @ (self.q.T @ columns)
         return self._cache[key]
 
     def energy(self, members: list[Candidate]) -> float:
-        """Energy of the data that the members explain beyond the map."""
-        q = orthonormal(*(self.white(m) for m in members))
+        """Energy of the data that the members explain beyond the map; 0 where one would be larger than is believed."""
+        white = [self.white(m) for m in members]
+        q = orthonormal(*white)
+        if not self._believed(members, white):
+            return 0.0
         return float(((q.T @ self.y) ** 2).sum())
+
+    def _believed(self, members: list[Candidate], white: list[Array]) -> bool:
+        weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=1e-10)[0]
+        at = 0
+        for member, own in zip(members, white, strict=True):
+            part = weights[at : at + own.shape[1]]
+            at += own.shape[1]
+            if sized(member) and np.linalg.norm(self._shares[_key(member)] * part) > 1.0:
+                return False
+        return True
 
 
 def _unseen_s(candidate: Candidate) -> float:
