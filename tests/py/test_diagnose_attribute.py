@@ -16,6 +16,7 @@ from gyrotc.diagnose.attribute.overlap import overlap
 from gyrotc.diagnose.attribute.pairs import best_of, clear_pair, makes_sense
 from gyrotc.diagnose.attribute.refine import Refined, model_columns, refine
 from gyrotc.diagnose.attribute.rivals import EQUIVALENT, Rival, near_of, probabilities_of, ranked_rivals
+from gyrotc.diagnose.attribute.size_limit import SizeLimit
 from gyrotc.diagnose.detect.search import Search
 from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
 from numpy.typing import NDArray
@@ -114,6 +115,16 @@ def test_what_the_map_imitates_gets_neither_credit_nor_a_size_beyond_that_of_the
     [right] = choose(search, 1)
     assert right.candidate.values["period_c"] == pytest.approx(13.0, rel=0.02)
     assert right.parameters["amplitude_dph"].value == pytest.approx(1e-3, rel=0.15)
+
+
+def test_the_largest_size_does_not_hang_on_a_constant_nor_on_blocks_without_a_rate(case: Case) -> None:
+    y = case.search.y
+    limit = SizeLimit(case.search)
+    assert limit.spread_dph == pytest.approx(2.0 * y.std())
+    assert limit.allows(1.9 * y) and not limit.allows(2.1 * y)
+    empty = np.arange(y.size) % 50 == 0  # such blocks have a rate of 0, and a column each
+    moved = case.campaign.search(np.where(empty, 0.0, y + 10.0), beside=np.eye(y.size)[:, empty])
+    assert SizeLimit(moved).spread_dph == pytest.approx(limit.spread_dph, rel=0.05)
 
 
 def test_the_planted_cause_is_named_with_its_parameters(case: Case) -> None:
