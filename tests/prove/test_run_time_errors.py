@@ -62,7 +62,7 @@ PARTS = {
         "sigma",
         precision=7,
         contracts={"f32": "gtc_f32_cell,gtc_f32_is_missing", "q31": "gtc_q31_position"},
-        checks=4,
+        checks=5,
         shape=(1, "auxiliary"),
     ),
     "memory": Part("follow", "terms", left=2),

@@ -87,6 +87,7 @@ int main(void)
         any_state();
         status = NAME(snapshot)(&state, &snapshot);
         //@ check status >= 0;
+        //@ check snapshot.sigma >= 0;
         status = NAME(rezero)(&state, any_number(kind), Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
         //@ check status == -1 || status == 0 || status == 2;
         //@ check -BOUND <= state.shift <= BOUND;

@@ -86,6 +86,7 @@ static void one_hook(unsigned i, unsigned hook)
         effect.temp = ANY_PLAUSIBLE();
         effect.slope = any_number(0);
         effect.remarks = Frama_C_interval(0, 63);
+        effect.known = Frama_C_unsigned_long_interval(0, 15);
 #if defined(F32)
         effect.added = any_number(0);
 #else
