@@ -11,6 +11,7 @@ import pytest
 from gyrotc.dataset import Dataset, Rows, load
 from gyrotc.quantise.applied import applied_of
 from gyrotc.simulate import read_truth, simulate
+from gyrotc.terms import History
 from gyrotc.train import TrainingData
 from gyrotc.train.channels import chosen_channels
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
@@ -104,6 +105,35 @@ def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.
     assert row.left_out_rms_before_dph is not None
     assert row.left_out_rms_after_dph < 0.7 * row.left_out_rms_before_dph
     assert choice.added == pytest.approx(row.slope_dph_per_unit * (supply - supply.mean()))
+
+
+def _effect(shape: str, u: Array, t: Array) -> Array:
+    """What a channel of mean 0 and variance 1 adds, deg/h."""
+    slope = 1.0 + (0.02 * (t - 20.0) if shape == "product" else 0.0)
+    return np.asarray(1e-3 * (slope * u + (0.4 * u**2 if shape == "curve" else 0.0)))
+
+
+@pytest.mark.parametrize("shape", ["line", "curve", "product"])
+def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, rng: np.random.Generator) -> None:
+    """And nine tenths of what it adds are removed in a run that the choice has not seen."""
+    samples, u = history(rng), wander(rng, 30.0)
+    effect = _effect(shape, u, samples.temperature_c)
+    made = replace(samples, bias_dph=samples.bias_dph + effect)
+    seen, supply = made.run < _RUNS - 1, 28.0 + 0.1 * u
+    choice = chosen_channels(
+        named("supply_v"), made.select(seen), {"supply_v": supply[seen]}, np.arange(_RUNS), 100.0
+    )
+    assert choice is not None
+    (row,) = choice.rows
+    assert (row.verdict, row.shape) == ("taken", shape)
+    form, weights = choice.shapes["supply_v"], choice.trial.weights["supply_v"]
+    assert form.cause.features is not None
+    assert choice.added == pytest.approx(form.columns @ weights)
+    low, high = np.quantile(u[seen], [0.01, 0.99])
+    there = ~seen & (low < u) & (u < high)
+    record = History(made.time_s[there], made.temperature_c[there], channel=supply[there])
+    left = form.cause.features(record, form.values).columns @ weights - effect[there]
+    assert np.var(left) < 0.1 * np.var(effect[there])
 
 
 def test_a_useless_channel_is_seldom_taken_and_does_no_harm() -> None:

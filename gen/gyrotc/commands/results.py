@@ -76,6 +76,13 @@ def ladder_lines(training: Training) -> Iterator[str]:
         yield f"  left-out RMS, deg/h: {', '.join(tried)}"
 
 
+_SHAPES = {
+    "line": "",
+    "product": " with a slope that depends on temperature",
+    "curve": " along a bent line, of two Gaussians beside a straight one",
+}
+
+
 def channel_lines(training: Training) -> Iterator[str]:
     """What became of every channel that was tried as an input."""
     for tried in training.channels or ():
@@ -83,8 +90,11 @@ def channel_lines(training: Training) -> Iterator[str]:
             yield f"channel {tried.name}: {tried.verdict}: {tried.reason}"
             continue
         before, after = tried.left_out_rms_before_dph, tried.left_out_rms_after_dph
+        slope = (
+            f"{tried.slope_dph_per_unit:.4g} deg/h per unit{'' if tried.shape == 'line' else ' on average'}"
+        )
         yield (
-            f"channel {tried.name}: taken, {tried.slope_dph_per_unit:.4g} deg/h per unit; left-out RMS {before:.4g} -> "
+            f"channel {tried.name}: taken{_SHAPES[tried.shape or 'line']}, {slope}; left-out RMS {before:.4g} -> "
             f"{after:.4g} deg/h, {tried.share_of_variance:.0%} of the variance of the bias"
         )
 

@@ -90,8 +90,13 @@ class ChannelTried(Part):
     name: str = Field(description='its column; "a - b": a difference, of "temperature_c" the gyro\'s own')
     verdict: Literal["taken", "not earned", "collinear", "refused"] = Field(description="what became of it")
     reason: str = Field(description="why, in words")
+    shape: Literal["line", "product", "curve"] | None = Field(
+        default=None,
+        description="what it adds: a straight line, a line whose slope depends on temperature, a line with two "
+        "Gaussians; where taken",
+    )
     slope_dph_per_unit: float | None = Field(
-        default=None, description="of what it adds, deg/h per unit; where taken"
+        default=None, description="of the straight line through what it adds, deg/h per unit; where taken"
     )
     left_out_rms_before_dph: Figure = Field(
         default=None, description="RMS on history left out with those taken before it, deg/h; where taken"

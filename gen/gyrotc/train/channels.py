@@ -1,8 +1,9 @@
 """Recorded channels as inputs: what the target would see of each, which may be one, which earn their place.
 
-A table holds slope · (channel − reference) for up to four channels. Candidates are the recorded channels as they are,
-and of thermometers their differences: to the gyro's own, and between any two of them, for what one thermometer shows
-the map holds already. Of a difference the firmware passes the difference. `parts` chooses.
+A table holds functions of up to four channels: straight lines, and where they are earned bent ones or a slope that
+depends on the temperature (`shapes`). Candidates are the recorded channels as they are, and of thermometers their
+differences: to the gyro's own, and between any two of them, for what one thermometer shows the map holds already. Of a
+difference the firmware passes the difference. `parts` chooses.
 """
 
 from __future__ import annotations
@@ -21,13 +22,12 @@ from ..dataset.units import channel_kind
 from ..frontend import F32, Blocks, Guarded, channel_at, with_missing
 from ..model import Model
 from ..results.training import ChannelTried
-from ..terms import CATALOGUE
-from ..terms.recursion import CourseChannel, TableKind
+from ..terms.recursion import CourseChannel
 from .data import Scaling, TrainingData, scaling_of
 from .guards import channel_guard
-from .parts import Parts, PartsTrial, chosen_parts
+from .parts import Parts, PartsTrial, bent_parts, chosen_parts
 from .process import Process, TrainingFailed, conditioned, fit_process
-from .rules import start_sigma
+from .shapes import SHAPES, ChannelShape, shape_of
 from .stand_ins import stand_in_of
 
 __all__ = ["ChannelChoice", "channel_shown", "chosen_channels", "seen_by_target", "with_channels"]
@@ -52,14 +52,14 @@ class ChannelChoice:
 
     Attributes:
         trial: What was tried on history left out.
-        references: Mean of each chosen channel in training, in its unit.
+        shapes: What each chosen channel adds, by its name.
         added: What the chosen ones add at every training sample, deg/h.
         effects: The same of each alone; NaN where the channel is not known.
         rows: Every candidate and every channel that is none.
     """
 
     trial: PartsTrial
-    references: Mapping[str, float]
+    shapes: Mapping[str, ChannelShape]
     added: Floats
     effects: Mapping[str, Floats]
     rows: tuple[ChannelTried, ...]
@@ -125,16 +125,55 @@ def chosen_channels(
     able = {n: v for n, v in columns.items() if not against[n]}
     known = np.all([np.isfinite(v) for v in able.values()], axis=0) if able else np.ones(len(samples), bool)
     references = {n: float(v[known].mean()) for n, v in able.items()}
-    inputs = {n: np.where(np.isfinite(v), v - references[n], 0.0)[:, None] for n, v in able.items()}
-    seen, of = {n: v[known] for n, v in inputs.items()}, samples.select(known)
+    lines = {n: shape_of("line", v, references[n], samples) for n, v in able.items()}
+    seen, of = {n: line.columns[known] for n, line in lines.items()}, samples.select(known)
     alike = _alike(seen, of, process, scaling)
     part = Parts(seen, rivals={n: frozenset(others) for n, others in alike.items()})
     trial = chosen_parts(of, scaling, part, power_on, average_s, _MOST)
-    parts = {n: inputs[n] @ trial.weights[n] for n in trial.chosen}
+    trial, shapes = _bent(trial, {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}, of, known,
+                          scaling, power_on, average_s)  # fmt: skip
+    parts = {n: shapes[n].columns @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
-    rows = [_row(n, trial, parts, samples, against[n], alike.get(n, {})) for n in columns]
+    rows = [_row(n, trial, shapes, parts, samples, against[n], alike.get(n, {})) for n in columns]
     effects = {n: np.where(np.isfinite(columns[n]), part, np.nan) for n, part in parts.items()}
-    return ChannelChoice(trial, {n: references[n] for n in trial.chosen}, added, effects, tuple(rows))
+    return ChannelChoice(trial, shapes, added, effects, tuple(rows))
+
+
+def _shapes(line: ChannelShape, values: Floats, samples: TrainingData) -> tuple[ChannelShape, ...]:
+    """The line of a channel and what may take its place."""
+    reference = line.values["reference"]
+    others = [shape_of(id, values, reference, samples) for id in SHAPES if id != line.id]
+    return (line, *others)
+
+
+def _bent(
+    plain: PartsTrial,
+    shapes: Mapping[str, tuple[ChannelShape, ...]],
+    of: TrainingData,
+    known: NDArray[np.bool_],
+    scaling: Scaling,
+    power_on: NDArray[np.int64],
+    average_s: float,
+) -> tuple[PartsTrial, dict[str, ChannelShape]]:
+    """What the taken channels add, by channel: lines, or what is earned in their place.
+
+    Every richer shape is the line and columns behind it, so of each these alone are tried.
+    """
+    found = {name: line for name, (line, *_) in shapes.items()}
+    if not found:
+        return plain, found
+    behind = {f"{s.id} of {name}": (name, s) for name, (_, *others) in shapes.items() for s in others}
+    columns = {name: line.columns[known] for name, line in found.items()}
+    columns |= {part: shape.columns[known, 1:] for part, (_, shape) in behind.items()}
+    richer = {name: [part for part, (n, _) in behind.items() if n == name] for name in shapes}
+    trial = bent_parts(of, scaling, Parts(columns), plain, richer, power_on, average_s)
+    weights, rms = dict(trial.weights), list(trial.left_out_rms_dph)
+    for part in (p for p in trial.chosen if p in behind):
+        name, found[name] = behind[part]
+        weights[name] = np.concatenate([weights[name], weights.pop(part)])
+        rms[trial.chosen.index(part)] = np.nan  # between the line and what stands behind it
+    path = tuple(x for x in rms if not np.isnan(x))
+    return replace(trial, chosen=plain.chosen, weights=weights, left_out_rms_dph=path), found
 
 
 def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingData, scaling: Scaling) -> str:
@@ -201,6 +240,7 @@ def _alike(
 def _row(
     name: str,
     trial: PartsTrial,
+    shapes: Mapping[str, ChannelShape],
     parts: Mapping[str, Floats],
     samples: TrainingData,
     against: str,
@@ -220,7 +260,8 @@ def _row(
         name=name,
         verdict="taken",
         reason="it earns its place on history left out",
-        slope_dph_per_unit=float(trial.weights[name][0]),
+        shape=shapes[name].id,
+        slope_dph_per_unit=shapes[name].slope(parts[name]),
         left_out_rms_before_dph=before,
         left_out_rms_after_dph=after,
         share_of_variance=float(np.var(parts[name]) / np.var(samples.bias_dph)),
@@ -234,19 +275,16 @@ def with_channels(
 
     `samples`: those that the map was trained on, without what the channels add.
     """
-    cause = next(c for c in CATALOGUE.values() if c.table and c.table.kind == TableKind.AUXILIARY)
-    assert cause.amplitudes is not None
     terms: list[dict[str, Any]] = []
     sigmas, stood = [], np.zeros(len(samples))
     content = model.to_dict()
     rules = content["uncertainty_dph"]["rules"] if content["uncertainty_dph"] else {}
     for name in choice.trial.chosen:
-        values = cause.amplitudes(choice.trial.weights[name]) | {"reference": choice.references[name]}
-        terms.append({"id": cause.id, "parameters": values, "channel": name})
+        shape, weights = choice.shapes[name], choice.trial.weights[name]
+        terms.append({"id": shape.cause.id, "parameters": shape.parameters(weights), "channel": name})
         stand_in = stand_in_of(model, samples, choice.effects[name])
         if stand_in is None:
-            readings = np.concatenate([run.rows().channel(name) for run in runs])
-            sigmas.append(start_sigma(cause.id, values, rules, samples, readings))
+            sigmas.append(shape.doubt_dph(weights))
             continue
         terms[-1]["stand_in"] = stand_in.network
         sigmas.append(stand_in.sigma_dph)

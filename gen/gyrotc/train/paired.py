@@ -33,7 +33,7 @@ def t_statistic(gains: Floats) -> tuple[float, int]:
     return float(gains.mean()) / max(error, 1e-12), len(gains) - 1
 
 
-def surely_above_0(gains: Floats) -> bool:
-    """Whether the mean is above 0 by a t test at 5 %, one-sided."""
+def surely_above_0(gains: Floats, tried: int = 1) -> bool:
+    """Whether the mean is above 0 by a t test, one-sided, at 5 % for all that are `tried` alike (Bonferroni)."""
     t, freedom = t_statistic(gains)
-    return freedom > 0 and bool(t > stdtrit(freedom, 1.0 - _SIGNIFICANCE))
+    return freedom > 0 and bool(t > stdtrit(freedom, 1.0 - _SIGNIFICANCE / tried))
