@@ -199,8 +199,8 @@ site:
 	@build/site-tools/bin/mkdocs build -q -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
-packages: setup
-	@$(PYTHON) tools/packages.py build/packages
+packages:
+	@python3 tools/packages.py build/packages
 
 ## remove what was built (not .venv)
 clean:

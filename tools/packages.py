@@ -2,12 +2,13 @@
 
 Writes into OUT: `gyrotc-<version>-arduino.zip`, `gyrotc-<version>-esp-idf.zip`, `gyrotc-<version>-crate.zip` and
 `gyrotc.gtc.<version>.pack`, each beside the folder that it was made of. Equal sources give equal bytes.
-CMake, Meson, Zephyr and PlatformIO take the sources as they are: packages/README.md.
+CMake, Meson, Zephyr and PlatformIO take the sources as they are: packages/README.md. Standard library only.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import shutil
 import sys
 import zipfile
@@ -15,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import version
-from gyrotc.emit.amalgamate import amalgamate
 
 ROOT = version.ROOT
 PACKAGES = ROOT / "packages"
@@ -23,6 +23,16 @@ PACKAGES = ROOT / "packages"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 #: Regular file, rw-r--r--, in the high half of a zip entry's attributes.
 MODE = 0o100644 << 16
+
+
+def _amalgamated() -> tuple[str, str]:
+    """Header and source by the generator that lies beside this file, whichever is installed."""
+    spec = importlib.util.spec_from_file_location("amalgamate", ROOT / "gen/gyrotc/emit/amalgamate.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    header, source = module.amalgamate(ROOT / "include", ROOT / "libc")
+    return header, source
 
 
 def _runtime(out: Path) -> None:
@@ -38,7 +48,7 @@ def _copy(out: Path, *paths: Path) -> None:
 
 def arduino(out: Path) -> None:
     """A library in the 1.5 layout: the runtime as one source, which keeps to C99 arithmetic without a flag."""
-    header, source = amalgamate(ROOT / "include", ROOT / "libc")
+    header, source = _amalgamated()
     _copy(out / "src", ROOT / "include" / "gtc.hpp")
     (out / "src" / "gtc.h").write_text(header, "ascii")
     # The builder compiles as gnu11 with its own flags, which let GCC fuse products into sums.

@@ -11,10 +11,12 @@ cd "$(dirname "$0")/.."
 fail() { echo "release: $*" >&2; exit 2; }
 number='[0-9]+\.[0-9]+\.[0-9]+'
 python=${PYTHON:-$PWD/.venv/bin/python}
+[ -x "$python" ] || python=python3 # enough for all but the wheel and the bill of materials of the generator
 
 prepare() {
   [[ $1 =~ ^$number$ ]] || fail "'$1' is no version; expected three numbers, as 0.2.0"
   [ -z "$(git status --porcelain)" ] || fail "there are changes that are not committed"
+  ! git rev-parse -q --verify "refs/tags/v$1" >/dev/null || fail "there is a tag v$1 already"
   grep -qE "^## $number \(unreleased\)$" CHANGELOG.md || fail "CHANGELOG.md has nothing that is unreleased"
   "$python" tools/version.py --set "$1"
   sed -i -E "0,/^## $number \(unreleased\)$/s//## $1 ($(date -u +%F))/" CHANGELOG.md
@@ -27,6 +29,7 @@ archive() {
   shift
   [[ $tag =~ ^v$number$ ]] || fail "'$tag' is no tag of a release; expected v and three numbers, as v0.2.0"
   git rev-parse -q --verify "refs/tags/$tag" >/dev/null || fail "there is no tag $tag"
+  [ "$python" != python3 ] || fail "there is no .venv here: make setup"
   out=$PWD/build/release/$version
   sources=$(mktemp -d)
   trap 'rm -rf "$sources"' EXIT
@@ -42,6 +45,7 @@ archive() {
   )
   rm -rf "$out" && mkdir -p "$out"
   (cd "$sources" && "$python" tools/archives.py "$out" "$@" && "$python" tools/packages.py "$out/packages")
+  find "$out/packages" -mindepth 1 -maxdepth 1 -type d -exec rm -r {} + # what the archives were made of
   (cd "$out" && find . -type f ! -name 'SHA256SUMS*' -printf '%P\n' | LC_ALL=C sort | xargs -d '\n' sha256sum >SHA256SUMS.all && mv SHA256SUMS.all SHA256SUMS)
   echo "release: $out"
 }

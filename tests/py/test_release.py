@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,9 @@ from conftest import ROOT
 TOOLS = ("release.sh", "version.py", "archives.py", "packages.py")
 
 
-def _run(*command: str, cwd: Path, status: int = 0) -> str:
+def _run(*command: str, cwd: Path, status: int = 0, python: str = sys.executable) -> str:
     environment = os.environ | {
-        "PYTHON": sys.executable,
+        "PYTHON": python,
         "GIT_AUTHOR_NAME": "a", "GIT_AUTHOR_EMAIL": "a@b", "GIT_COMMITTER_NAME": "a", "GIT_COMMITTER_EMAIL": "a@b",
     }  # fmt: skip
     done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
@@ -46,9 +47,12 @@ def clone(tmp_path: Path) -> Path:
 
 
 def test_from_tag_to_archives(clone: Path) -> None:
-    told = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone)
+    """Prepared where nothing is set up yet; archives of the tag, packages by the tag's own generator."""
+    told = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
     assert "git tag -a v0.2.0" in told
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
+    emitter = clone / "gen" / "gyrotc" / "emit" / "amalgamate.py"
+    emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
@@ -57,8 +61,21 @@ def test_from_tag_to_archives(clone: Path) -> None:
     assert {"gyrotc-0.2.0.tar.gz", "sbom-c.cdx.json", "SHA256SUMS", "packages"} <= {
         p.name for p in made.iterdir()
     }
-    assert any("0.2.0" in p.name for p in (made / "packages").iterdir())
+    packages = list((made / "packages").iterdir())
+    assert len(packages) == 4 and all(p.is_file() and "0.2.0" in p.name for p in packages)
+    (arduino,) = (p for p in packages if "arduino" in p.name)
+    with zipfile.ZipFile(arduino) as archive:
+        source = archive.read("gyrotc/src/gtc.c").decode()
+    assert "in one file of the tag;" in source and "not of the tag" not in source
     _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
+    listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
+    files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}
+    assert listed == files - {"SHA256SUMS"}
+    (clone / "libc" / "gtc_crc.c").unlink()
+    _run("git", "checkout", "-q", ".", cwd=clone)
+    assert "there is a tag v0.2.0 already" in _run(
+        "tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2
+    )
 
 
 @pytest.mark.parametrize(
@@ -72,6 +89,12 @@ def test_from_tag_to_archives(clone: Path) -> None:
 )
 def test_what_is_no_release_is_refused(clone: Path, words: tuple[str, ...], why: str) -> None:
     assert why in _run("tools/release.sh", *words, cwd=clone, status=2)
+
+
+def test_archives_need_what_make_setup_makes_and_say_so(clone: Path) -> None:
+    _run("git", "tag", "v9.9.9", cwd=clone)
+    told = _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2, python="")
+    assert "there is no .venv here: make setup" in told
 
 
 def test_a_tag_of_another_version_is_refused(clone: Path) -> None:
