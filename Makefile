@@ -196,7 +196,7 @@ offline: dist
 site:
 	@[ -x build/site-tools/bin/mkdocs ] || { python3 -m venv build/site-tools && \
 	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
-	@build/site-tools/bin/mkdocs build -q -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
+	@build/site-tools/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
 ## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
 packages:

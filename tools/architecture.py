@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import ast
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -75,12 +76,17 @@ def reach(graph: dict[str, set[str]], name: str) -> set[str]:
     return found
 
 
+def arrows(graph: dict[str, set[str]]) -> Iterator[tuple[str, str]]:
+    """From each room to those that import it, but for what a longer way implies."""
+    for name, direct in graph.items():
+        implied = set().union(*(reach(graph, other) for other in direct)) if direct else set()
+        yield from ((other, name) for other in sorted(direct - implied))
+
+
 def page(graph: dict[str, set[str]]) -> str:
     """The whole page."""
     lines = ["```mermaid", "flowchart LR"]
-    for name, direct in graph.items():
-        implied = set().union(*(reach(graph, other) for other in direct)) if direct else set()
-        lines += [f"  {other} --> {name}" for other in sorted(direct - implied)]
+    lines += [f"  {other} --> {name}" for other, name in arrows(graph)]
     lines += ["```", "", "| room | imports |", "| --- | --- |"]
     depth = {name: len(reach(graph, name)) for name in graph}
     for name in sorted(graph, key=lambda n: (depth[n], n)):

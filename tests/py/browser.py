@@ -20,7 +20,6 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 _OPTIONS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
     "--disable-extensions", "--disable-background-networking", "--no-first-run", "--remote-debugging-pipe",
-    "--allow-file-access-from-files",
 )  # fmt: skip
 _AS_3_AND_4 = """
 import fcntl, os, sys
@@ -109,8 +108,8 @@ class Browser:
 
 
 @contextmanager
-def browser(folder: Path) -> Iterator[Browser]:
-    """A browser with its profile in `folder`, ended afterwards."""
+def browser(folder: Path, *, trusting: bool = True) -> Iterator[Browser]:
+    """A browser with its profile in `folder`, ended afterwards; `trusting`: a page of the disk may read other files."""
     assert CHROMIUM is not None
     to_browser, writing = os.pipe()
     reading, from_browser = os.pipe()
@@ -118,7 +117,7 @@ def browser(folder: Path) -> Iterator[Browser]:
     # 3 and 4 are the protocol's own numbers of files.
     process = subprocess.Popen(
         [sys.executable, "-c", _AS_3_AND_4, str(to_browser), str(from_browser), CHROMIUM, *_OPTIONS,
-         f"--user-data-dir={folder / 'profile'}"],
+         *(["--allow-file-access-from-files"] if trusting else []), f"--user-data-dir={folder / 'profile'}"],
         pass_fds=(to_browser, from_browser), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         env=os.environ | {"HOME": str(folder)},
     )  # fmt: skip

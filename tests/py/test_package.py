@@ -32,10 +32,13 @@ int main(void)
     return ((gtc_q31_bias(&state, &bias) >= 0) && (bias != 0)) ? 0 : 3;
 }
 """
-PROJECT = """
+_HEADER = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
+VERSION = re.findall(r"#define GTC_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", _HEADER)
+FOUND = f"find_package(gyrotc {VERSION[0]}.{VERSION[1]} REQUIRED)"
+PROJECT = f"""
 cmake_minimum_required(VERSION 3.18)
 project(user C)
-find_package(gyrotc 0.1 REQUIRED)
+{FOUND}
 add_executable(user user.c gtc_rlg_0042.c)
 set_target_properties(user PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
 target_link_libraries(user PRIVATE gyrotc::gtc)
@@ -94,7 +97,7 @@ def test_a_project_takes_the_sources_in(user: Path) -> None:
 set(GTC_MAX_TERMS 2)
 FetchContent_Declare(gyrotc SOURCE_DIR "{ROOT}")
 FetchContent_MakeAvailable(gyrotc)"""
-    (user / "CMakeLists.txt").write_text(PROJECT.replace("find_package(gyrotc 0.1 REQUIRED)", taken))
+    (user / "CMakeLists.txt").write_text(PROJECT.replace(FOUND, taken))
     _run("cmake", "-S", user, "-B", user / "build", "-DGTC_MAX_TERMS=2")
     _run("cmake", "--build", user / "build")
     _run(user / "build" / "user")
@@ -103,9 +106,7 @@ FetchContent_MakeAvailable(gyrotc)"""
 def test_pkg_config_finds_it(prefix: Path, user: Path) -> None:
     (folder,) = prefix.glob("lib*/**/pkgconfig")
     found = ["env", f"PKG_CONFIG_PATH={folder}", "pkg-config"]
-    header = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
-    version = ".".join(re.findall(r"#define GTC_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header))
-    assert _run(*found, "--modversion", "gyrotc").strip() == version
+    assert _run(*found, "--modversion", "gyrotc").strip() == ".".join(VERSION)
     flags = _run(*found, "--cflags", "--libs", "gyrotc").split()
     _run("gcc", "-std=c99", "-ffp-contract=off", "user.c", "gtc_rlg_0042.c", *flags, "-o", "user", cwd=user)
     _run(user / "user")
