@@ -21,6 +21,7 @@ sys.path.insert(0, str(ROOT))
 
 from bench.bounds import bounds_of, model_of
 from bench.bounds_page import section
+from bench.gaussian_part import gaussian_instructions
 
 COUNTS = Counts({"n_terms": 3, "slope_blocks": 10}, 4, False, 5, 100, ())
 TEXT = [
@@ -116,6 +117,15 @@ def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None
     assert max(quotients.values()) <= 1.35
     page = section({"rows": [r | {"model": "filter", "core": "cortex-m4f"} for r in rows]})
     assert "No count exceeds its bound" in page
+
+
+def test_a_gaussian_of_a_channel_takes_no_more_than_26_instructions() -> None:
+    target = all_targets()["cortex-m4f"]
+    if target.missing():
+        pytest.skip(f"{target.missing()} is not installed")
+    found = gaussian_instructions()
+    assert set(found) == {"f32", "q31"}
+    assert all(20.0 <= count <= 26.0 for count in found.values())  # fewer: its code was not found
 
 
 def test_a_target_whose_code_has_no_bound_is_verified_without_one(
