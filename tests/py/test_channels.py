@@ -15,6 +15,7 @@ from gyrotc.terms import History
 from gyrotc.train import TrainingData
 from gyrotc.train.channels import chosen_channels
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from gyrotc.train.shapes import SHAPES, shape_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -134,6 +135,16 @@ def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, rng: np.random
     record = History(made.time_s[there], made.temperature_c[there], channel=supply[there])
     left = form.cause.features(record, form.values).columns @ weights - effect[there]
     assert np.var(left) < 0.1 * np.var(effect[there])
+
+
+def test_a_gaussian_too_narrow_for_a_word_of_fixed_point_is_not_tried(rng: np.random.Generator) -> None:
+    """A current of half a milliampere about 1 A, in A."""
+    samples, u = history(rng), wander(rng)
+    held = {
+        size: {id for id in SHAPES if shape_of(id, 1.0 + size * u, 1.0, samples).is_held}
+        for size in (5e-4, 5e-2)
+    }
+    assert held == {5e-4: {"line", "product"}, 5e-2: {"line", "product", "curve"}}
 
 
 def test_a_useless_channel_is_seldom_taken_and_does_no_harm() -> None:

@@ -143,7 +143,7 @@ def _shapes(line: ChannelShape, values: Floats, samples: TrainingData) -> tuple[
     """The line of a channel and what may take its place."""
     reference = line.values["reference"]
     others = [shape_of(id, values, reference, samples) for id in SHAPES if id != line.id]
-    return (line, *others)
+    return (line, *(shape for shape in others if shape.is_held))
 
 
 def _bent(

@@ -33,6 +33,7 @@ SHAPES: dict[ShapeId, TableKind] = {
 _SHOWN = (0.002, 0.998)  # quantiles of a channel between which its range is taken: spikes are none of it
 # In half ranges: least of what is left of bent functions, among 0.25 to 1.2 and 0.4 to 1.5.
 _CENTER, _WIDTH = 0.5, 0.9
+_NARROWEST = 0.01  # in the unit of the channel: 1.2/width in 2^-24 fits a word of fixed point from 0.0094 on
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,11 @@ class ChannelShape:
     values: Mapping[str, float]
     columns: Floats
     lost: Floats
+
+    @property
+    def is_held(self) -> bool:
+        """Whether tables of both arithmetics can hold it."""
+        return self.values.get("width", _NARROWEST) >= _NARROWEST
 
     def parameters(self, weights: Floats) -> dict[str, float]:
         """Parameters of the term with these weights."""
