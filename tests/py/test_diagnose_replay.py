@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,22 @@ import numpy as np
 import pytest
 from gyrotc.dataset import Rows, Run, load
 from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.extend.refit import Effect, Played, play_runs, samples
+from gyrotc.diagnose.extend.channel_terms import stand_ins_of
+from gyrotc.diagnose.extend.refit import Effect, Played, added_range, play_runs, samples
 from gyrotc.frontend import missed_before
 from gyrotc.model import Model
 from gyrotc.quantise import quantise
 from gyrotc.reference import evaluate_map
 from gyrotc.simulate import simulate
 from gyrotc.terms import CATALOGUE
-from gyrotc.train.fitting import FrontEnd, front_end
+from gyrotc.train.data import joined
+from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
 from gyrotc.verify.replay import history_of
+from libc_build import ROOT
 from numpy.typing import NDArray
+
+sys.path.insert(0, str(ROOT))
+from bench.signals import rms_of, without
 
 Array = NDArray[np.float64]
 
@@ -191,3 +198,39 @@ def test_a_gap_in_every_run_costs_an_extension_next_to_nothing(tmp_path: Path) -
         assert (result["verdict"], result["extended"]["terms"]) == ("explained", ["auxiliary"])
         left.append(result["extended"]["gain"]["exam_rms_after_dph"])
     assert left[1] < 1.02 * left[0]
+
+
+def test_a_lost_channel_costs_an_extension_no_more_than_2_percent_over_one_thermometer(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "short.toml").write_text(SCENARIO)
+    simulate(tmp_path / "short.toml", seed=3, out=tmp_path / "data")
+    dataset = load(tmp_path / "data")
+    model = diagnose(dataset).model
+    assert model is not None and [t.channel for t in model.terms] == ["supply_v"]
+    assert model.terms[0].stand_in is not None
+    plain = fit_dataset(dataset, FitOptions("mrbf", centers=model.n_centers)).model
+    exam = [run.rows() for run in dataset.runs if run.role == "exam"]
+    lost = rms_of(model, [without(rows, "supply_v") for rows in exam], tmp_path)
+    assert rms_of(model, exam, tmp_path) < lost <= 1.02 * rms_of(plain, exam, tmp_path)
+
+
+def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alone(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(SCENARIO)
+    simulate(tmp_path / "short.toml", seed=4, out=tmp_path / "data")
+    dataset = load(tmp_path / "data")
+    runs = [run for run in dataset.runs if run.role == "train"]
+    played = play_runs(dataset, runs, front_end(runs, 10.0))
+    effects = [Effect(id, VALUES[id], "supply_v" if id == "auxiliary" else None) for id in VALUES]
+    effects = [e for e in effects if e.id in ("hysteresis", "auxiliary")]
+    plain = fit_dataset(dataset, FitOptions("linear")).model
+    found = stand_ins_of(plain, joined([samples(run, effects) for run in played]), played, effects)
+    assert list(found) == ["supply_v"]
+    stand_in = found["supply_v"]
+    beside = joined([samples(run, effects[:1]) for run in played])
+    left = beside.bias_dph - plain.map_dph(beside.temperature_c, beside.slope_c_per_min)
+    assert stand_in.sigma_dph > 0.0 and np.ptp(stand_in.added) > 0.0
+    assert np.sqrt(np.mean((left - stand_in.added) ** 2)) < left.std(), "better than any constant"
+    low, high = added_range(played, effects[:1], stand_in.added)
+    alone = added_range(played, effects[:1])
+    assert low >= alone[0] + stand_in.added.min() - 1e-12 and high <= alone[1] + stand_in.added.max() + 1e-12

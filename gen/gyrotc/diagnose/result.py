@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,15 +13,16 @@ from ..metrics import LEAST_SPAN_C
 from ..model import Model
 from ..results.diagnosed import Diagnosed
 from ..results.training import Training
-from ..terms import CATALOGUE
 from ..train.data import TrainingData
 from ..train.fitting import HOLD_S, FitOptions, front_end, map_method, model_of, training_of
 from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.rules import start_sigma
 from ..train.spans import training_spans
+from ..train.stand_ins import StandIn
 from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
+from .extend.channel_terms import stand_ins_of
 from .extend.extension import Extension, extend
-from .extend.refit import added_range, play_runs
+from .extend.refit import Effect, added_range, play_runs
 from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
 from .screen.events import Event, accepted, events_of
@@ -154,32 +155,45 @@ def _extended_model(
         return None, None
     runs = [r for r in dataset.runs if r.role == "train"]
     front = front_end(runs, options.block_s)
+    played = play_runs(dataset, runs, front)
     longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
     front = replace(front, stuck_s=stuck_after_s(longest_s))
     bumps = extension.bumps
     plain = model_of(
         dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps
     )
-    entries = []
-    for effect in extension.shipped:
-        if CATALOGUE[effect.id].table is None:
-            continue
-        names = [p.name for p in CATALOGUE[effect.id].parameters]
-        entries.append(
-            {
-                "id": effect.id,
-                "parameters": {n: effect.values[n] for n in names},
-                "channel": effect.channel,
-            }
-        )
+    stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
+    entries = _entries(extension.shipped, stand_ins)
     left_out = extension.after if extension.measured_on == "left out" else None
     spans = training_spans(runs, extension.samples)
     training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
     training = _of_whole_map(training, plain)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
-    told = {"guards": guards, "effects_dph": added_range(play_runs(dataset, runs, front), extension.shipped)}
-    return Model.from_dict({**_with_terms(plain, entries, extension.samples, runs), **told}), training
+    low, high = added_range(play_runs(dataset, runs, front), extension.shipped)
+    own = [e for e in extension.shipped if e.channel is None]
+    lost = added_range(played, own, sum(s.added for s in stand_ins.values()))
+    told = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
+    content = _with_terms(plain, entries, extension.samples, runs, stand_ins)
+    return Model.from_dict({**content, **told}), training
+
+
+def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:
+    """Terms as a model has them, those of channels last: a stand-in is fitted to what all others leave of the input."""
+    entries = []
+    for effect in sorted(shipped, key=lambda e: e.channel is not None):
+        if effect.term.table is None:
+            continue
+        names = [p.name for p in effect.term.parameters]
+        entry = {
+            "id": effect.id,
+            "parameters": {n: effect.values[n] for n in names},
+            "channel": effect.channel,
+        }
+        if effect.channel is not None and effect.channel in stand_ins:
+            entry["stand_in"] = stand_ins[effect.channel].network
+        entries.append(entry)
+    return entries
 
 
 def _of_whole_map(training: Training, plain: Model) -> Training:
@@ -190,7 +204,11 @@ def _of_whole_map(training: Training, plain: Model) -> Training:
 
 
 def _with_terms(
-    plain: Model, entries: list[dict[str, Any]], samples: TrainingData, runs: Sequence[Run]
+    plain: Model,
+    entries: list[dict[str, Any]],
+    samples: TrainingData,
+    runs: Sequence[Run],
+    stand_ins: Mapping[str, StandIn],
 ) -> dict[str, Any]:
     """The model with its terms, and what its uncertainty says of each."""
     content = {**plain.to_dict(), "terms": entries}
@@ -201,7 +219,9 @@ def _with_terms(
             for e in entries
             if e["channel"] is not None
         }
-        rules["terms"] = [
+        at_start = [
             start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries
         ]
+        stood = {channel: stand_in.sigma_dph for channel, stand_in in stand_ins.items()}
+        rules["terms"] = [stood.get(e["channel"], s) for e, s in zip(entries, at_start, strict=True)]
     return content

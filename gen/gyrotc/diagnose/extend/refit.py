@@ -177,17 +177,24 @@ def with_bumps(
     return [replace(effect, bumps=found) if effect.term.finer_map else effect for effect in effects]
 
 
-def added_range(runs: Sequence[Played], effects: Sequence[Effect]) -> list[float]:
-    """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h."""
+def added_range(
+    runs: Sequence[Played], effects: Sequence[Effect], beside: Array | float = 0.0
+) -> list[float]:
+    """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h.
+
+    Args:
+        beside: What else was added at each sample of all runs, shape (n,).
+    """
     held = [effect for effect in effects if effect.term.table is not None]
-    low, high = 0.0, 0.0
-    for run in runs:
-        if run.in_force.size:
-            added = sum(
-                (run.outcome(effect).added[run.in_force] for effect in held), np.zeros(run.in_force.size)
-            )
-            low, high = min(low, float(added.min())), max(high, float(added.max()))
-    return [low, high]
+    none = [np.zeros(run.in_force.size) for run in runs]
+    added = np.concatenate(
+        [
+            sum((run.outcome(e).added[run.in_force] for e in held), n)
+            for run, n in zip(runs, none, strict=True)
+        ]
+    )
+    both = np.append(added + beside, 0.0)
+    return [float(both.min()), float(both.max())]
 
 
 def _simulated(run: Played, effect: Effect) -> Array:
