@@ -18,9 +18,9 @@ _HEAD = """## The most instructions of each function (`python -m bench docs --on
 *Bound*: that no call exceeds, from the object code: the graph of its blocks with all that it calls, loops bounded by
 the sizes of the table, solved as a linear program (`gen/gyrotc/verify/bounds.py`). *Counted*: the most of {calls} calls
 in QEMU that were made to take the longest ways (`bench/counted.c`). No count exceeds its bound; {within} of {all}
-bounds are within {aim} of the count, the others in bold. What separates them: ways that only a table which is then
-refused takes (`init`); the longest way through libgcc's 64-bit division, and a loop over 32 bits for uncertainties that
-no table has (`angle`, `rezero`); channels that are lost one after the other (`missed`, `sample_at`). Instructions are
+bounds are within {aim} of the count, the others in bold. What separates them: corrections in libgcc's 64-bit division
+that its divisor never needs (`angle`); a loop over 32 bits for uncertainties that no table has (`rezero`); channels
+that are lost one after the other, and blocks that end in the same call (`missed`, `sample`, `sample_at`). Instructions are
 not cycles: what an instruction costs is the core's and its memory's. float32 on the M3 is software and has no bound
 here.
 

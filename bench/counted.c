@@ -1,6 +1,6 @@
 /* counted.c - instructions of every public function on an emulated core: the most of many calls, among them those
  * that lead to the longest ways: blocks that close and restart in one sample, every block until a channel is lost,
- * states after a long time without power. Prints, for each function, its name, calls and ticks, an empty call taken
+ * channels that never show anything, increments that do not fit, states after a long time without power. Prints, for each function, its name, calls and ticks, an empty call taken
  * off. Bounds are held against these (bench/bounds.py). */
 #include "board.h"
 
@@ -26,6 +26,7 @@ static NUM temp, slope, bias, rate, dt;
 static uint_least32_t period = PERIOD_BLOCK, count, time_us, off, seconds;
 static uint_least32_t seed = 2463534242UL; /* Marsaglia, "Xorshift RNGs", 2003 */
 static volatile int said;
+static int alone; /* 1: further channels show nothing, so that stand-ins do */
 
 typedef struct {
     uint_least32_t calls, most, empty;
@@ -128,17 +129,17 @@ static void all_somewhere(uint_least32_t beyond)
 {
     uint_least32_t c;
     for (c = 0U; c < N_CHANNELS; c++) {
-        channels[c] = somewhere(c, beyond);
+        channels[c] = ((alone != 0) && (c != 0U)) ? none() : somewhere(c, beyond);
     }
 }
 
 static void wander(uint_least32_t c)
 {
     const uint_least32_t how = draw(64U);
-    if (how == 0U) {
-        channels[c] = somewhere(c, 64U);
-    } else if (how == 1U) {
+    if ((how == 1U) || ((alone != 0) && (c != 0U))) {
         channels[c] = none();
+    } else if (how == 0U) {
+        channels[c] = somewhere(c, 64U);
     } else {
         channels[c] += between(0, (c == 0U) ? EDGE(table->envelope[1]) : 0, 1) / (NUM)(16 + (int)draw(64U));
     }
@@ -290,22 +291,26 @@ int main(void)
         go_angle();
         bias = (NUM)draw(0x7FFFFFFFUL); /* beyond what an increment holds */
         go_angle();
+        dt = (NUM)(1000000000 - (int_least32_t)draw(1000000UL)); /* and far beyond it */
+        go_angle();
     }
-    for (k = 0U; k < 4U; k++) {
+    for (k = 0U; k < 8U; k++) {
         uint_least32_t n;
-        history(blocks[k]);
+        alone = (k >= 4U) ? 1 : 0;
+        history(blocks[k % 4U]);
         for (n = 0U; n < 6U; n++) {
-            jump(blocks[k]);
+            jump(blocks[k % 4U]);
         }
-        power(0U, blocks[k]);
-        power(0x80000000UL, blocks[k]);
-        power(0x7FFFFFFFUL, blocks[k]);
+        power(0U, blocks[k % 4U]);
+        power(0x80000000UL, blocks[k % 4U]);
+        power(0x7FFFFFFFUL, blocks[k % 4U]);
         for (n = 0U; n < 400U; n += 27U) {
-            outage(blocks[k], 1U + n, (int)(n & 1U));
+            outage(blocks[k % 4U], 1U + n, (int)(n & 1U));
         }
-        outage(blocks[k], 0x0FFFFFFFUL / PERIOD_BLOCK, 1);
-        outage(blocks[k], 0x0FFFFFFFUL, 0);
+        outage(blocks[k % 4U], 0x0FFFFFFFUL / PERIOD_BLOCK, 1);
+        outage(blocks[k % 4U], 0x0FFFFFFFUL, 0);
     }
+    alone = 0;
     late(0x7FFFFFUL);
     late(0x800000UL);
     late(0x00FFFFUL);

@@ -71,6 +71,15 @@ def test_a_loop_that_is_tested_first_is_tested_once_more() -> None:
     assert most(*rows) == 1 + 3 * 4 + 2 + 1
 
 
+def test_a_loop_that_goes_round_behind_its_test_is_tested_last_if_its_body_stands_before() -> None:
+    rows = (
+        "0 f:", "0 movs r1, #0", ":4", "2 cmp r2, #0", "4 beq.n 8 <f+0x8>", "6 adds r3, #1",
+        ":1", "8 adds r1, #1", "a cmp r1, #3", "c beq.n 12 <f+0x12>", ":4", "e movs r2, #1", "10 b.n 2 <f+0x2>",
+        ":0", "12 bx lr",
+    )  # fmt: skip
+    assert most(*rows) == 1 + 3 * 6 + 2 * 2 + 1
+
+
 def test_what_is_called_counts_each_time_and_a_jump_to_a_function_ends() -> None:
     called = ("20 g:", "20 adds r0, #1", "22 bx lr")
     assert most("0 f:", "0 push {lr}", "2 bl 20 <g>", "6 bl 20 <g>", "a pop {pc}", *called) == 4 + 2 * 2
@@ -105,7 +114,7 @@ def test_code_without_a_bound_is_refused(rows: tuple[str, ...], why: str) -> Non
 
 
 def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None:
-    """1.2 is the goal; fixed point divides by libgcc, whose longest way no call here takes."""
+    """1.2 is the goal; an increment is divided by libgcc, whose longest way its divisor never takes."""
     target = all_targets()["cortex-m4f"]
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
@@ -113,8 +122,8 @@ def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None
     assert [(r["numeric"], r["function"]) for r in rows] == [(n, f) for n in ("f32", "q31") for f in PUBLIC]
     quotients = {(r["numeric"], r["function"]): r["bound"] / r["counted"] for r in rows}
     assert min(quotients.values()) >= 1.0
-    assert max(q for (n, _), q in quotients.items() if n == "f32") <= 1.2
-    assert max(quotients.values()) <= 1.35
+    assert max(q for key, q in quotients.items() if key != ("q31", "angle")) <= 1.2
+    assert max(quotients.values()) <= 1.26
     page = section({"rows": [r | {"model": "filter", "core": "cortex-m4f"} for r in rows]})
     assert "No count exceeds its bound" in page
 

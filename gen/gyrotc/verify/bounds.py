@@ -104,6 +104,9 @@ def _bound(program: Program, numeric: str, function: str, address: int, table: T
         paths.limit(paths.turns.get(text, []), most)
     _of_blocks(paths, function, table.n_channels, int(table.guards[6]))
     _of_memories(paths, function, program.text.counts.kinds.count(MEMORY))
+    if function == "angle":  # an increment with more than 32 bits is refused
+        long = [{e: 1.0} for e in paths.long_quotients]
+        paths.limit([*long, *paths.stores("*increment = (int_least32_t)out;")], 1)
     return paths.most()
 
 

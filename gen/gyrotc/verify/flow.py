@@ -67,6 +67,17 @@ class Block:
     def last(self) -> Instruction:
         return self.instructions[-1]
 
+    def ends_with(self, before: tuple[str, str], name: str) -> bool:
+        """Whether the last two instructions are `before`, with these operands, and one whose name begins so."""
+        tests = [(i.name, i.operands) for i in self.instructions[-2:]]
+        return tests[0] == before and self.last.name.startswith(name)
+
+    def shifts_by(self, n: int) -> bool:
+        """Whether a branch at its end asks if what a word has above its lowest n bits is 0."""
+        moved = self.instructions[-2:][0]
+        shifted = moved.name.startswith("lsrs") or (moved.name.startswith("movs") and "lsr" in moved.operands)
+        return shifted and moved.operands.endswith(f"#{n}") and self.last.name.startswith(("beq", "bne"))
+
 
 @dataclass(frozen=True, slots=True)
 class Loop:

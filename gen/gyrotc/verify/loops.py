@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import CheckFailed
 from ..reference.table import ARRAYS, Table
 
-__all__ = ["MEMORY", "POWER", "Counts", "LoopText", "counts_of", "totals"]
+__all__ = ["MEMORY", "POWER", "SHORT_QUOTIENTS", "Counts", "LoopText", "counts_of", "totals"]
 
 _STATEMENT = re.compile(r"^\s*(?:for|while) \(")
 _FOR = re.compile(
@@ -29,12 +29,15 @@ class Counts:
     missing_blocks: int  # most of any channel
     words: int  # of the image
     kinds: tuple[int, ...]  # of the terms
+    stand_ins: int = 0
+    stand_in_centers: int = 0  # of the largest of their networks
 
 
 def counts_of(table: Table) -> Counts:
     sizes = {name: getattr(table, name).size // (record or 1) for name, record in ARRAYS.items()}
     named = {f"n_{name}": sizes[name] for name in ("networks", "centers", "terms", "sigma", "probes")}
     named |= {"n_channels": table.n_channels, "slope_blocks": table.slope_blocks}
+    n_map = len(table.networks) // ARRAYS["networks"] - table.n_stand_ins
     return Counts(
         named,
         int(table.networks.reshape(-1, ARRAYS["networks"])[:, 0].max()),
@@ -42,6 +45,8 @@ def counts_of(table: Table) -> Counts:
         int(table.guards.reshape(-1, ARRAYS["guards"])[:, 6].max()),
         len(table.words),
         tuple(int(k) for k in table.terms.reshape(-1, ARRAYS["terms"])[:, 0]),
+        table.n_stand_ins,
+        int(max(table.networks.reshape(-1, ARRAYS["networks"])[n_map:, 0], default=0)),
     )
 
 
@@ -51,6 +56,14 @@ _NUMBERS = "for (i = 0U; i < n; i++) {"  # of numbers_fit(); n is that of the re
 #: Words of a record that are numbers with a range, by what the loop over the records is bounded by: docs/FORMAT.md,
 #: section 3.
 _RECORDS = {"n_sigma": 1, "network[0].bits": 5, "n_networks": 7, "n_terms": 6, "n_channels": 4}
+#: Lines whose quotient has 32 bits: of means and slopes, which fit a word (GTC_ASSERT_RANGE of `mean` and `quotient`),
+#: and of a part by its whole, in 2^-31.
+SHORT_QUOTIENTS = (
+    "const uint_least64_t q = (magnitude + (den / 2U)) / den;",
+    "part = (part << 31) / whole;",
+)
+#: Whole numbers of the header are looked at from the counts on before they are looked at from the first on.
+_WHOLES = "for (i = first; i < N_WHOLE; i++) {"
 POWER = ("while (rest != 0U) {", "for (rest = blocks; rest != 0U; rest >>= 1) {")
 
 #: Loops that are no plain count, by their text; docs/numerics.md says why each ends.
@@ -89,8 +102,12 @@ class LoopText:
     def at(self, line: int) -> str:
         return self.lines[line - 1].strip()
 
-    def most(self, line: int, around: str) -> int:
+    def most(self, line: int, around: str, of_stand_in: bool = False) -> int:
         """The most turns of a loop, in the loop with the text `around`, for each time that it is come to.
+
+        Args:
+            line, around: The loop's line; the text of the loop around it.
+            of_stand_in: In a function that asks no network of the map.
 
         Raises:
             CheckFailed: Its text gives no bound.
@@ -99,7 +116,8 @@ class LoopText:
         if text == _NUMBERS:
             return next((n for name, n in _RECORDS.items() if name in around), self.macros["N_NUMBERS"])
         if text in _OTHER:
-            return _OTHER[text](self.counts, 1 + self.macros.get("GTC_UNROLL", 1))
+            centers = self.counts.stand_in_centers if of_stand_in else self.counts.centers
+            return _OTHER[text](replace(self.counts, centers=centers), 1 + self.macros.get("GTC_UNROLL", 1))
         found = _FOR.match(text)
         end = self._number(found["end"]) if found else None
         if found is None or end is None:
@@ -124,4 +142,6 @@ def totals(macros: Mapping[str, int], function: str, table: Table) -> dict[str, 
         + size["sigma"]
     )  # fmt: skip
     words = macros["GTC_SAVE_WORDS"] if function in ("save", "restore") else len(table.words)
-    return {_NUMBERS: numbers, _WORDS: words}
+    counts = macros["N_WHOLE"] - macros["FIRST_COUNT"]
+    wholes = macros["N_WHOLE"] + (2 if function == "check" else 1) * counts
+    return {_NUMBERS: numbers, _WORDS: words, _WHOLES: wholes}

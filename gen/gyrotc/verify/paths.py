@@ -13,10 +13,11 @@ import numpy as np
 from ..errors import CheckFailed
 from .flow import Block, Flow, Loop
 from .functions import TERM_CODES
-from .loops import LoopText
+from .loops import SHORT_QUOTIENTS, LoopText
 
 __all__ = ["Paths", "Program"]
 
+STAND_IN = "is_shown"  # the function that asks the network of a stand-in
 _ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
 
 
@@ -74,6 +75,7 @@ class _Copy:
 
     flow: Flow
     around: str  # text of the loop that it is called in
+    line: str  # text of the line that calls it, or what it is called by in the compiler's library
     node: dict[int, int]
     ways: dict[tuple[int, int], list[int]] = field(default_factory=dict)
     hooks: list[tuple[int, int, int]] = field(default_factory=list)  # block, edge to it, terms that have it
@@ -93,6 +95,12 @@ class Paths:
     entered: list[tuple[str, str, int]] = field(default_factory=list)  # caller, function, edge into it
     turns: dict[str, list[dict[int, float]]] = field(default_factory=dict)  # of loops, by text
     begun: dict[str, list[int]] = field(default_factory=dict)  # edges into loops from outside, by text
+    stored: dict[str, list[int]] = field(
+        default_factory=dict
+    )  # nodes that write to memory for a line, by text
+    long_quotients: list[int] = field(
+        default_factory=list
+    )  # edges into the way of libgcc's division for these
 
     def whole(self, address: int) -> None:
         """Makes the graph of a function from its first instruction (edge 0) to its end (node 0)."""
@@ -101,7 +109,9 @@ class Paths:
         self.edges[0] = (-1, first)
         self.edges += [(node, 0) for node in exits]
 
-    def function(self, address: int, above: tuple[int, ...] = (), around: str = "") -> tuple[int, list[int]]:
+    def function(
+        self, address: int, above: tuple[int, ...] = (), around: str = "", line: str = ""
+    ) -> tuple[int, list[int]]:
         """A copy of a function for one place where it is called: its first node, and those at which it ends.
 
         Raises:
@@ -110,7 +120,7 @@ class Paths:
         if address in above or address not in self.program.flows:
             raise CheckFailed(f"a call to {address:x} cannot be followed: no bound on the instructions")
         flow = self.program.flows[address]
-        copy = _Copy(flow, around, {start: self._node(block) for start, block in flow.blocks.items()})
+        copy = _Copy(flow, around, line, {start: self._node(block) for start, block in flow.blocks.items()})
         exits: list[int] = []
         for start, block in flow.blocks.items():
             done = self._called(copy, start, (*above, address))
@@ -122,12 +132,15 @@ class Paths:
                 ways = [self._edge(a, copy.node[after]) for a in from_here]
                 copy.ways.setdefault((start, after), []).extend(ways)
         self._divided(copy)
-        for loop, line in self.program.loops_of(flow):
-            self._bounded(copy, loop, line)
+        self._without_stand_ins(copy)
+        for loop, at in self.program.loops_of(flow):
+            self._bounded(copy, loop, at)
         return copy.node[address], exits
 
     def _node(self, block: Block) -> int:
         self.cost.append(len(block.instructions))
+        for line in {i.line for i in block.instructions if i.line and i.name.startswith("str")}:
+            self.stored.setdefault(self.program.text.at(line), []).append(len(self.cost) - 1)
         return len(self.cost) - 1
 
     def _edge(self, a: int, b: int) -> int:
@@ -150,7 +163,10 @@ class Paths:
             return []
         ends: list[int] = []
         for callee, terms in callees:
-            first, exits = self.function(callee, above, self._around(copy, start))
+            line = self.program.text.at(block.last.line) if block.last.line else copy.line
+            if copy.flow.name.endswith("_angle"):
+                line = ""  # an increment that does not fit is refused behind the division
+            first, exits = self.function(callee, above, self._around(copy, start), line)
             way = self._edge(copy.node[start], first)
             self.entered.append((copy.flow.name, self.program.flows[callee].name, way))
             if terms:
@@ -159,16 +175,35 @@ class Paths:
         return ends
 
     def _divided(self, copy: _Copy) -> None:
-        """Divisors of the runtime have 32 bits: libgcc's way for longer ones, behind its first test, is not taken."""
+        """Ways through libgcc's division that no call takes: divisors of the runtime have 32 bits, and so have the
+        quotients of most of its lines; then the upper word of what is divided is below the divisor."""
+        if copy.flow.name != "__udivmoddi4":
+            return
         first = copy.flow.blocks[copy.flow.entry]
-        tests = [(i.name, i.operands) for i in first.instructions[-2:]]
-        if (
-            copy.flow.name == "__udivmoddi4"
-            and tests[0] == ("cmp", "r3, #0")
-            and tests[1][0].startswith("bne")
-        ):
-            ways = copy.ways[copy.flow.entry, first.successors[0]]
-            self.limits.append((dict.fromkeys(ways, 1.0), 0.0))
+        if not first.ends_with(("cmp", "r3, #0"), "bne"):
+            return
+        self._not_taken(copy, first)
+        second = copy.flow.blocks[first.successors[1]]
+        compared = [i.operands for i in second.instructions if i.name == "cmp"]
+        if not (second.last.name.startswith("bls") and compared and compared[0].endswith(", r1")):
+            return
+        if copy.line in SHORT_QUOTIENTS:
+            self._not_taken(copy, second)
+        else:
+            self.long_quotients += copy.ways[second.start, second.successors[0]]
+
+    def _without_stand_ins(self, copy: _Copy) -> None:
+        """A table without stand-ins has 0 in the upper half of the word of a term's channel."""
+        if self.program.text.counts.stand_ins:
+            return
+        for block in copy.flow.blocks.values():
+            line = self.program.text.at(block.last.line) if block.last.line else ""
+            if "(stand_in != 0U)" in line and block.shifts_by(16) and len(block.successors) == 2:
+                self._not_taken(copy, block, 0 if block.last.name.startswith("bne") else 1)
+
+    def _not_taken(self, copy: _Copy, block: Block, k: int = 0) -> None:
+        """What comes behind the branch at the end of a block never runs: k = 0 where it is taken, 1 where it is not."""
+        self.limits.append((dict.fromkeys(copy.ways[block.start, block.successors[k]], 1.0), 0.0))
 
     def _around(self, copy: _Copy, start: int) -> str:
         """The text of the innermost loop around a block; where there is none, of the loop that calls the function."""
@@ -181,7 +216,7 @@ class Paths:
         """Limits how often a loop goes round, and which terms it meets."""
         text = self.program.text
         outer = [(len(o.body), n) for o, n in self.program.loops_of(copy.flow) if o.body > loop.body]
-        most = text.most(line, text.at(min(outer)[1]) if outer else copy.around)
+        most = text.most(line, text.at(min(outer)[1]) if outer else copy.around, STAND_IN in copy.flow.name)
         back = [e for b in loop.latches for e in copy.ways[b, loop.header]]
         entries = [
             e for (a, b), es in copy.ways.items() for e in es if b == loop.header and a not in loop.body
@@ -205,11 +240,29 @@ class Paths:
             return leaves and self.program.text.is_loop(line) and self.program.text.at(line) == text
 
         one_block = loop.latches == {loop.header} and len(loop.body) == 1
-        return all(tests(b) for b in loop.latches) and (one_block or not tests(loop.header))
+        if all(tests(b) for b in loop.latches) and (one_block or not tests(loop.header)):
+            return True
+        # What is tested first is tested without a branch before: the conditions of the text are comparisons.
+        return not tests(self._straight(flow, loop)) and any(tests(b) for b in loop.body)
+
+    def _straight(self, flow: Flow, loop: Loop) -> int:
+        """The block at which what always runs from the first block of a loop on ends with a branch or a call."""
+        start = loop.header
+        for _ in flow.blocks:
+            block = flow.blocks[start]
+            if len(block.successors) != 1 or block.call is not None or block.hook:
+                break
+            (start,) = block.successors
+        return start
 
     def calls(self, caller: str, callee: str) -> list[dict[int, float]]:
         """Edges of calls, by patterns of the names' beginnings."""
         return [{e: 1.0} for a, b, e in self.entered if re.match(caller, a) and re.match(callee, b)]
+
+    def stores(self, text: str) -> list[dict[int, float]]:
+        """Edges into blocks that write to memory for a line with this text."""
+        nodes = set(self.stored.get(text, []))
+        return [{e: 1.0} for e, (_, to) in enumerate(self.edges) if to in nodes]
 
     def limit(self, flows: list[dict[int, float]], most: float) -> None:
         """The sum of flows is at most so much."""
