@@ -7,9 +7,12 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+if TYPE_CHECKING:
+    from click.testing import Result
 
 # As `make test` does: matrices of a few hundred rows are ten times slower on two threads that wait for each other.
 # Whoever imports numpy first decides, so it stands above everything else.
@@ -32,12 +35,17 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
     )
 
 
-def run_here(*args: str | Path) -> str:
-    """What the command prints, in this process, which has all modules already; what it raises is raised."""
+def invoked(*args: object) -> Result:
+    """The command in this process, which has all modules already."""
     from gyrotc.commands import app
     from typer.testing import CliRunner
 
-    done = CliRunner().invoke(app, [str(a) for a in args])
+    return CliRunner().invoke(app, [str(a) for a in args])
+
+
+def run_here(*args: str | Path) -> str:
+    """What the command prints, in this process; what it raises is raised."""
+    done = invoked(*args)
     if isinstance(done.exception, Exception):
         raise done.exception
     assert done.exit_code == 0, done.output

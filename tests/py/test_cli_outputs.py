@@ -13,13 +13,11 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import Command
+from conftest import Command, invoked
 from gyrotc import cli
-from gyrotc.commands import app
 from gyrotc.errors import GyrotcError
 from gyrotc.outputs import MARKER, Lock, faults
 from recordings import columns, toml, write_csv
-from typer.testing import CliRunner
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +34,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def here(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command in this process, which has all modules already; errors are told as `gyrotc.cli` does."""
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    """What the command says in this process; errors are told as `gyrotc.cli` does."""
+    done = invoked(*arguments)
     if isinstance(done.exception, GyrotcError):
         return subprocess.CompletedProcess((), done.exception.exit_status, "", f"gyrotc: {done.exception}\n")
     return subprocess.CompletedProcess((), done.exit_code, done.stdout, repr(done.exception))

@@ -9,15 +9,13 @@ from typing import Any
 
 import pytest
 from campaigns import scenario, simulated
-from conftest import Command
-from gyrotc.commands import app
+from conftest import Command, invoked
 from gyrotc.commands.plan_lines import limits_of, pair_of
 from gyrotc.errors import InputError
 from gyrotc.plan import plan
 from gyrotc.plan.programme import programme_of
 from gyrotc.plan.sensitivity import Sensitivity
 from gyrotc.plan.shortest import shortest
-from typer.testing import CliRunner
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +121,7 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
 )
 def test_bad_options_are_told(folder: Path, options: tuple[str, str], told: str) -> None:
     """In this process: what is refused costs less than a start of the program."""
-    done = CliRunner().invoke(app, ["plan", str(scenario(folder)), *options])
+    done = invoked("plan", scenario(folder), *options)
     assert isinstance(done.exception, InputError) and told in str(done.exception)
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import invoked
 from gyrotc.dataset import load
 from gyrotc.errors import InputError
 from gyrotc.simulate import read_truth
 from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
 from gyrotc.simulate.scenario import read
 from numpy.typing import NDArray
-from typer.testing import CliRunner
 
 Array = NDArray[np.float64]
 
@@ -131,14 +131,11 @@ def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
 
 
 def test_the_command_asks_for_the_number_of_units(short: Path, tmp_path: Path) -> None:
-    from gyrotc.commands import app
-
-    run = CliRunner().invoke
-    done = run(app, ["simulate", "lot", "--units", "2", "--base", str(short), "--out", str(tmp_path / "lot")])
+    done = invoked("simulate", "lot", "--units", "2", "--base", short, "--out", tmp_path / "lot")
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in (tmp_path / "lot").iterdir()) == ["LOT-0001-001", "LOT-0001-002"]
-    missing = run(app, ["simulate", "lot", "--out", str(tmp_path / "none")])
+    missing = invoked("simulate", "lot", "--out", tmp_path / "none")
     assert isinstance(missing.exception, InputError) and "--units" in str(missing.exception)
-    other = run(app, ["simulate", "paper", "--family", "0.5", "--out", str(tmp_path / "none")])
+    other = invoked("simulate", "paper", "--family", "0.5", "--out", tmp_path / "none")
     assert isinstance(other.exception, InputError) and "--family" in str(other.exception)
     assert not (tmp_path / "none").exists()
