@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from .lot_checks import best_power, recalibrated, seen
 from .lot_peers import peers
 
-__all__ = ["CASES", "Case", "learnt", "measured", "recorded"]
+__all__ = ["CASES", "Case", "learnt", "measured", "ordered", "programmes", "recorded"]
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ def _rms(values: Floats) -> float:
 def measured(case: Case, seed: int) -> dict[str, Any]:
     """All figures of one case."""
     started = time.process_time()
-    units = draw_lot(with_noise(read("paper")[1], "paper"), _order(case), seed)
+    units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
     own = [u for u in units if u.lot and not u.lot.stranger]
     strange = [u for u in units if u.lot and u.lot.stranger]
     taught = [
@@ -108,13 +108,13 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     for k, (data, exam) in enumerate(recorded(own[_UNITS:], exam=True)):
         assert exam is not None
         rows.append(_unit(data, exam, prior, taught, longer=k < _LONGER))
-        checks.append((data, _programmes(data)[0][1]))
+        checks.append((data, programmes(data)[0][1]))
         print(f"{case.name}: unit {k + 1} of {_UNSEEN}, {time.process_time() - started:.0f} s", flush=True)
     refused: dict[str, list[bool]] = {"2.5 h": [], "8 h": [], "six runs": []}
     powers = []
     for data, _ in recorded(strange, exam=False):
-        powers.append(best_power(prior, seen(_programmes(data)[0][1]), seen(data)))
-        for name, part in _programmes(data):
+        powers.append(best_power(prior, seen(programmes(data)[0][1]), seen(data)))
+        for name, part in programmes(data):
             use = fit(part, method="auto", lot=prior).lot if name != "six runs" else None
             p = (
                 use.p_value
@@ -136,7 +136,8 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     }
 
 
-def _order(case: Case) -> LotOrder:
+def ordered(case: Case) -> LotOrder:
+    """The lot of a case."""
     return LotOrder(_UNITS + _UNSEEN + case.strangers, case.family, case.clusters, case.strangers)
 
 
@@ -182,7 +183,7 @@ def _exam(data: TrainingData, noise: Floats) -> Exam:
     return Exam(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.bias_dph - noise, index)
 
 
-def _programmes(data: TrainingData) -> list[tuple[str, TrainingData]]:
+def programmes(data: TrainingData) -> list[tuple[str, TrainingData]]:
     """What is recorded of a new unit."""
     last = data.run == _LAST_RUN
     first = float(data.time_s[last].min())
@@ -198,7 +199,7 @@ def _unit(
 ) -> dict[str, Any]:
     """Figures of one unseen unit: ratio and error of every way, coverage of sigma, p-value."""
     row: dict[str, Any] = {}
-    for name, part in _programmes(data)[: 3 if longer else 1]:
+    for name, part in programmes(data)[: 3 if longer else 1]:
         with_lot = fit(part, method="auto", lot=prior)
         ways: dict[str, Callable[[], Floats]] = {
             "lot": lambda f=with_lot: predict(f, exam.temperature_c, exam.slope_c_per_min),

@@ -32,6 +32,7 @@ _AGAIN = 6  # rounds of a model that starts from another of nearly the same unit
 _COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing
 _FOLDS = 5  # each leaves four fifths of the units, enough to stand for the lot
 _STARTS = 8  # of the search for clusters
+_REFINED = 2  # partitions whose units may change clusters: of many units every start gives another one
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +137,7 @@ def _chosen(sums: UnitSums, basis: LotBasis, say: Progress) -> LotState:
         parted = _clustered(sums, plain, number)
         if parted is None:
             break
-        split, its = _with_directions(sums, parted, parted.evidence - _told(parted.cluster), price, say)
+        split, its = _with_directions(sums, parted, _worth(parted), price, say)
         if its <= value:
             break
         best, value = split, its
@@ -167,9 +168,13 @@ def _freedom(sums: UnitSums, state: LotState) -> float:
 
 def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
     """The best model with so many clusters and no direction; None where no partition has enough units in each."""
+    tried = [
+        fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain)
+        for cluster in _partitions(sums, plain, number)
+    ]
+    tried.sort(key=_worth, reverse=True)
     found: list[LotState] = []
-    for cluster in _partitions(sums, plain, number):
-        state = fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain)
+    for state in tried[:_REFINED]:
         for _ in range(3):
             ways = predictive(state)
             nearest = np.argmax([evidence(sums, *way) for way in ways], axis=0)
@@ -177,7 +182,12 @@ def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
                 break
             state = fitted(sums, plain.basis, 0, nearest, _AGAIN, start=state)
         found.append(state)
-    return max(found, key=lambda s: s.evidence - _told(s.cluster), default=None)
+    return max(found, key=_worth, default=None)
+
+
+def _worth(state: LotState) -> float:
+    """Log evidence of a partition, what it costs to say it taken off."""
+    return state.evidence - _told(state.cluster)
 
 
 def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np.int64]]:

@@ -104,7 +104,7 @@ def fitted(
         state = replace(state, rest=start.rest, of_mean=start.of_mean, directions=start.directions)
     for number in range(rounds):
         state = _round(units, state, rank, fit=number % _EVERY == _EVERY - 1)
-    return _conditioned(units, state)[0]
+    return _weighed(units, *_conditioned(units, state)[:2])
 
 
 def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotState:
@@ -151,14 +151,20 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, Floats, Fl
     totals = np.array([inverse @ alone[g].sum(axis=0) for g in groups])
     means = np.einsum("cij,cj->ci", covariances, totals)
     moved = np.subtract(alone, _times(posterior, _times(units.precision, means[state.cluster])))
-    value = 0.5 * float(np.sum(units.moment * alone))
-    value -= 0.5 * float(np.linalg.slogdet(told)[1].sum()) + 0.5 * len(units) * float(
-        np.linalg.slogdet(spread)[1]
-    )
-    value += 0.5 * float(np.sum(totals * means)) + 0.5 * float(np.linalg.slogdet(covariances)[1].sum())
-    value -= 0.5 * len(means) * float(np.sum(np.log(known)))
-    known_now = replace(state, means=means, covariances=covariances, evidence=value)
-    return known_now, posterior, np.asarray(moved)
+    return replace(state, means=means, covariances=covariances), posterior, np.asarray(moved)
+
+
+def _weighed(units: UnitSums, state: LotState, posterior: Floats) -> LotState:
+    """The state with its log evidence, which no round of a fit asks for: a determinant for each unit."""
+    spread, known = state.spread(), state.basis.variance(state.of_mean)
+    totals = np.linalg.solve(state.covariances, state.means[..., None])[..., 0]
+    value = 0.5 * float(np.sum(units.moment * _times(posterior, units.moment)))
+    value += 0.5 * float(np.linalg.slogdet(posterior)[1].sum())
+    value -= 0.5 * len(units) * float(np.linalg.slogdet(spread)[1])
+    value += 0.5 * float(np.sum(totals * state.means))
+    value += 0.5 * float(np.linalg.slogdet(state.covariances)[1].sum())
+    value -= 0.5 * len(state.means) * float(np.sum(np.log(known)))
+    return replace(state, evidence=value)
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:

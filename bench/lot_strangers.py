@@ -1,0 +1,156 @@
+"""`python -m bench.lot_strangers docs [SEED ...]`: strangers in a lot, and what the best test there can be sees.
+
+Lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 strangers: gyros
+whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
+lot by one run of 2.5 h. Beside the test of `gyrotc.train.lot.surprise` stand two that no product can have: one that
+knows from what distribution strangers are drawn (the likelihood ratio of that against the lot's; the distribution is
+taken from the whole calibrations of the strangers of all other draws), and one that knows each stranger's map.
+Without seeds four new ones are drawn.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import secrets
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.simulate.campaign import SimulatedGyro, with_noise
+from gyrotc.simulate.lot import draw_lot
+from gyrotc.simulate.scenario import read
+from gyrotc.train.data import cleaned, scaling_of
+from gyrotc.train.lot import LotPrior, UnitMeans
+from gyrotc.train.lot.learn import sums_of
+from gyrotc.train.lot.means import unit_means
+from gyrotc.train.lot.model import UnitSums
+from gyrotc.train.lot.surprise import FALSE_ALARM
+from numpy.typing import NDArray
+
+from .lot_checks import best_power, seen
+from .lot_prior import CASES, learnt, ordered, programmes, recorded
+
+__all__ = ["ratio_test"]
+
+ROOT = Path(__file__).resolve().parents[1]
+Floats = NDArray[np.float64]
+
+_DRAWS = 4
+_TAUGHT = 60
+_TOLD = 8  # directions of which 2.5 h tell anything; in the next one signal is 1 % of noise
+_SIMULATED = 200_000  # units of the lot, for the quantile of 1 %
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """A lot and the units that are held against it: by a short run, and with all their runs."""
+
+    seed: int
+    prior: LotPrior
+    own: list[tuple[UnitMeans, UnitMeans]]
+    strange: list[tuple[UnitMeans, UnitMeans]]
+
+
+def drawn(seed: int) -> Draw:
+    """One lot."""
+    case = CASES[0]
+    units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
+    own = [u for u in units if u.lot and not u.lot.stranger]
+    strange = [u for u in units if u.lot and u.lot.stranger]
+    taught = [unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recorded(own[:_TAUGHT], exam=False)]
+    found = Draw(seed, learnt(taught), _held(own[_TAUGHT:]), _held(strange))
+    print(f"seed {seed}: drawn", flush=True)
+    return found
+
+
+def _held(units: list[SimulatedGyro]) -> list[tuple[UnitMeans, UnitMeans]]:
+    return [(seen(programmes(data)[0][1]), seen(data)) for data, _ in recorded(units, exam=False)]
+
+
+def ratio_test(
+    prior: LotPrior, own: list[UnitMeans], strange: list[UnitMeans], known: list[UnitMeans]
+) -> Any:
+    """Shares of own units and of strangers refused by the likelihood ratio of the strangers' distribution to the lot's.
+
+    Args:
+        prior: The lot; of clusters the first.
+        own, strange: Short runs.
+        known: Whole calibrations of other strangers, which tell the distribution of theirs.
+    """
+    mean, covariance = prior.means[0], prior.covariances[0]
+    short = [_sums(prior, units) for units in (own, strange)]
+    factor = np.linalg.cholesky(covariance)
+    ratio, vectors = np.linalg.eigh(factor.T @ short[1].precision.mean(axis=0) @ factor)
+    ratio, vectors = ratio[-_TOLD:], vectors[:, -_TOLD:]
+    scored = [_scores(sums, mean, vectors.T @ factor.T) / np.sqrt(ratio * (1.0 + ratio)) for sums in short]
+    rng = np.random.default_rng(1)
+    maps = np.linalg.solve(factor, (_maps(prior, known) - mean).T).T @ vectors
+    noise = rng.standard_normal(maps.shape)
+    others = maps * np.sqrt(ratio / (1.0 + ratio)) + noise / np.sqrt(1.0 + ratio)
+    center, inverse = others.mean(axis=0), np.linalg.inv(np.cov(others.T))
+    of_lot = _ratio(rng.standard_normal((_SIMULATED, _TOLD)), center, inverse)
+    limit = np.quantile(of_lot, 1.0 - FALSE_ALARM)
+    return [float(np.mean(_ratio(scores, center, inverse) > limit)) for scores in scored]
+
+
+def _sums(prior: LotPrior, units: list[UnitMeans]) -> UnitSums:
+    return sums_of(units, prior.basis, prior.center_dph, prior.unit_dph)
+
+
+def _scores(sums: UnitSums, mean: Floats, way: Floats) -> Floats:
+    return np.asarray([way @ (b - g @ mean) for g, b in zip(sums.precision, sums.moment, strict=True)])
+
+
+def _maps(prior: LotPrior, units: list[UnitMeans]) -> Floats:
+    """Coefficients of fully calibrated units, under a spread so wide that the lot says nothing of them."""
+    wide, mean = np.linalg.inv(100.0 * prior.covariances[0]), prior.means[0]
+    sums = _sums(prior, units)
+    moved = sums.moment - sums.precision @ mean
+    return np.asarray(mean + np.linalg.solve(wide + sums.precision, moved[..., None])[..., 0])
+
+
+def _ratio(scores: Floats, center: Floats, inverse: Floats) -> Floats:
+    """Twice the log likelihood ratio, up to a constant."""
+    away = scores - center
+    return np.asarray(np.sum(scores**2, axis=1) - np.einsum("ui,ij,uj->u", away, inverse, away))
+
+
+def figures(draw: Draw, others: list[Draw]) -> dict[str, Any]:
+    """What each test refuses of one lot."""
+    refused = [
+        float(np.mean([draw.prior.with_runs(short).p_value < FALSE_ALARM for short, _ in units]))
+        for units in (draw.own, draw.strange)
+    ]
+    known = [whole for other in others if other.seed != draw.seed for _, whole in other.strange]
+    told = ratio_test(draw.prior, [s for s, _ in draw.own], [s for s, _ in draw.strange], known)
+    powers = [best_power(draw.prior, short, whole) for short, whole in draw.strange]
+    return {
+        "seed": draw.seed,
+        "accused": refused[0],
+        "refused": refused[1],
+        "ratio_accused": told[0],
+        "ratio_refused": told[1],
+        "map_refused": float(np.mean(powers)),
+    }
+
+
+def main(arguments: list[str]) -> int:
+    from .lot_prior_page import write_page
+
+    docs = ROOT / arguments[0]
+    seeds = [int(a) for a in arguments[1:]] or [secrets.randbelow(9000) + 1000 for _ in range(_DRAWS)]
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        draws = pool.map(drawn, seeds, chunksize=1)
+    found = [figures(draw, draws) for draw in draws]
+    for row in found:
+        print(row)
+    (docs / "results" / "lot-strangers.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    write_page(docs)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
