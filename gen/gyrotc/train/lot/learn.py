@@ -174,7 +174,8 @@ def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
     ]
     tried.sort(key=_worth, reverse=True)
     found: list[LotState] = []
-    for state in tried[:_REFINED]:
+    for first in tried[:_REFINED]:
+        state = first
         for _ in range(3):
             ways = predictive(state)
             nearest = np.argmax([evidence(sums, *way) for way in ways], axis=0)
