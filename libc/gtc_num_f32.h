@@ -547,7 +547,7 @@ static inline float FN(shared_out)(float square, uint_least32_t n)
     return share;
 }
 
-/* a / (a + b), 0 where both are, and where they are more than a number says */
+/* a / (a + b), 0 where both are */
 static inline float FN(share_of)(float a, float b)
 {
     float whole;
@@ -557,7 +557,7 @@ static inline float FN(share_of)(float a, float b)
         return 0.0F;
     }
     whole = a / whole;
-    return (FN(is_missing)(whole) != 0) ? 0.0F : whole;
+    return whole;
 }
 
 static inline float FN(part)(float share, float x)

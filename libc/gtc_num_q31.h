@@ -598,7 +598,8 @@ GTC_IN_LOOP FN(sum_t) FN(bell)(FN(sum_t) sum, int_least32_t x, int_least32_t gai
                                   uint_least32_t g)
 {
     const int_least32_t d = x - bell[0].integer;
-    const uint_least64_t way = (uint_least64_t)((int_least64_t)d * gain);
+    const int_least64_t product = (int_least64_t)d * gain;
+    const uint_least64_t way = (uint_least64_t)product;
     const uint_least32_t whole = (uint_least32_t)(way >> 32);
     gtc_word_t argument; /* in 2^-28 */
 

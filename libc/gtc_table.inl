@@ -186,7 +186,7 @@ static int FN(terms_fit)(const TABLE *table)
             }
         }
     }
-    return ((last == FN(all_networks)(table)) && (table->n_stand_ins < last)) ? 1 : 0;
+    return (last == FN(all_networks)(table)) ? 1 : 0;
 }
 
 /* 1 if the table is of this layout and its counts say where its arrays end, else 0. */

@@ -39,6 +39,15 @@ static num_t map_with(const table_t *table, num_t temp)
     return bias;
 }
 
+static int within(const table_t *table, num_t bias)
+{
+#if TEST_Q31
+    return ((bias >= table->authority[0]) && (bias <= table->authority[1])) ? 1 : 0;
+#else
+    return ((bias >= table->authority[0].value) && (bias <= table->authority[1].value)) ? 1 : 0;
+#endif
+}
+
 TEST(tables_with_terms_pass_their_self_test)
 {
     CHECK_INT(GTC_OK, FN(check)(&TERMS));
@@ -411,6 +420,59 @@ TEST(a_stand_in_is_added_while_nothing_of_its_channel_is_believed)
     CHECK(same(map_with(&TERMS, C(40.0)) + map_with(&alone, C(40.0)), bias_of(&b)));
 }
 
+/* CURVED with two stand-ins, both the map's own network. */
+TEST(bent_lines_and_products_have_stand_ins_too)
+{
+    const uint_least32_t n = CURVED.networks[0].bits;
+    gtc_word_t networks[3U * GTC_NETWORK_WORDS];
+    gtc_word_t centers[3U * 64U * GTC_CENTER_WORDS];
+    gtc_word_t terms[2U * GTC_TERM_WORDS];
+    table_t table = CURVED;
+    state_t state;
+    num_t map;
+    uint_least32_t k;
+
+    CHECK((n <= 64U) && (CURVED.n_networks == 1U));
+    memcpy(terms, CURVED.terms, sizeof terms);
+    for (k = 0U; k < 3U; k++) {
+        memcpy(&networks[k * GTC_NETWORK_WORDS], CURVED.networks, GTC_NETWORK_WORDS * sizeof networks[0]);
+        memcpy(&centers[k * n * GTC_CENTER_WORDS], CURVED.centers, n * GTC_CENTER_WORDS * sizeof centers[0]);
+    }
+    terms[1].bits = 1U + (2UL << 16);
+    terms[GTC_TERM_WORDS + 1U].bits = 1U + (3UL << 16);
+    table.networks = networks;
+    table.centers = centers;
+    table.terms = terms;
+    table.n_stand_ins = 2U;
+    table.n_centers = 3U * n;
+    state = started_with(&table);
+    (void)samples(&state, C(15.0), MISSING, 2001);
+    CHECK((status_of(&state) & GTC_CHANNEL_LOST) != 0);
+    map = map_with(&CURVED, C(15.0));
+    CHECK(same((num_t)(map + map + map), bias_of(&state)) || ((status_of(&state) & GTC_CLAMPED) != 0));
+    CHECK(!same(map, bias_of(&state)));
+}
+
+/* A memory that was overwritten and never follows again gives the map no temperature, nor the stand-in. */
+TEST(a_memory_that_is_none_leaves_the_stand_in_out)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    table_t table = TERMS;
+    state_t state;
+    num_t bias = 0;
+
+    memcpy(terms, TERMS.terms, sizeof terms);
+    terms[2].bits = 0U; /* its gain */
+    table.terms = terms;
+    state = started_with(&table);
+    (void)samples(&state, C(15.0), MISSING, 2001);
+    state.term[0][0] = MISSING;
+    state.term[0][1] = 0;
+    (void)samples(&state, C(15.0), MISSING, (int)(2U * N));
+    CHECK(FN(bias)(&state, &bias) < 0);
+    CHECK(within(&TERMS, bias));
+}
+
 TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
@@ -439,6 +501,11 @@ TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
     table.n_stand_ins = 2U;
     CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
     table.n_networks = 0xFFFFFFFFUL;
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    head->bits = 1U + (1UL << 16); /* a stand-in, and no network of the map before it */
+    table.n_networks = 0U;
+    table.n_stand_ins = 1U;
+    table.n_centers = TERMS.networks[0].bits;
     CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
 }
 
@@ -714,6 +781,8 @@ int main(void)
     RUN(no_reading_makes_a_correction_that_is_no_number);
 #endif
     RUN(a_stand_in_is_added_while_nothing_of_its_channel_is_believed);
+    RUN(bent_lines_and_products_have_stand_ins_too);
+    RUN(a_memory_that_is_none_leaves_the_stand_in_out);
     RUN(networks_that_no_term_names_or_that_are_not_there_are_refused);
     RUN(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own);
     RUN(a_channel_that_never_came_is_taken_as_its_fallback);
