@@ -534,7 +534,7 @@ static inline float FN(plus)(float a, float b)
 /* A square, or what stands for it where a state was overwritten so that it is none; the sum of two is one */
 static inline float FN(square_or)(float square, float other)
 {
-    return (square <= 1.0e38F) ? square : other;
+    return ((square >= 0.0F) && (square <= 1.0e38F)) ? square : other;
 }
 
 /* square / n */
@@ -557,7 +557,7 @@ static inline float FN(share_of)(float a, float b)
         return 0.0F;
     }
     whole = a / whole;
-    return whole;
+    return (whole < 1.0F) ? whole : 1.0F;
 }
 
 static inline float FN(part)(float share, float x)

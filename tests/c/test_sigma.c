@@ -467,6 +467,32 @@ TEST(a_table_that_is_sure_of_everything_takes_no_rest)
     CHECK(snapshot_of(&state).sigma == 0);
 }
 
+/* ... but for the constant: the rest is it. */
+TEST(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest)
+{
+    gtc_word_t words[15];
+    table_t table = TABLE;
+    state_t state;
+    num_t before;
+    num_t moved;
+    uint_least32_t i;
+
+    for (i = 0U; i < 15U; i++) {
+        words[i].bits = 0U;
+    }
+    i = (2U * TABLE.sigma_cells[0] * TABLE.sigma_cells[1]) + 8U; /* from power-on to power-on */
+    words[i] = TABLE.sigma[i];
+    table.sigma = words;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    rest(&state, C(15), 100);
+    before = bias_of(&state);
+    CHECK(snapshot_of(&state).sigma > 0);
+    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.001), 3600U));
+    moved = (num_t)(bias_of(&state) - before);
+    CHECK((moved >= DPH(0.00099)) && (moved <= DPH(0.00101)));
+    CHECK(snapshot_of(&state).sigma == 0);
+}
+
 TEST(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does)
 {
     gtc_word_t words[GTC_SAVE_WORDS];
@@ -507,6 +533,7 @@ int main(void)
     RUN(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing);
     RUN(a_number_that_was_overwritten_never_makes_the_correction_sure);
     RUN(a_table_that_is_sure_of_everything_takes_no_rest);
+    RUN(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest);
     RUN(a_negative_shift_outlasts_a_time_without_power_as_a_positive_one_does);
     RUN(a_state_without_uncertainties_outlasts_a_time_without_power);
     RUN(bad_arguments_are_refused_and_nothing_is_written);
