@@ -96,10 +96,9 @@ def test_every_input_agreed_and_kept_the_bound() -> None:
         assert visit["mismatches"] == 0
         assert visit["worst_dph"] <= visit["bound_dph"]
     assert all(p["differ"] == 0 for p in result["primitives"])
-    gauss = [
-        p["worst_error"] for p in result["primitives"] if p["name"].startswith("fixed") and p["worst_error"]
-    ]
-    assert len(gauss) == 2 and max(gauss) <= 3.5e-8
+    fixed = {p["name"]: p["worst_error"] for p in result["primitives"] if p["name"].startswith("fixed")}
+    gauss = {name: worst for name, worst in fixed.items() if name.endswith(("gauss", "curve"))}
+    assert len(gauss) == 4 and max(gauss.values()) <= 3.5e-8
 
 
 def test_no_run_time_error_was_left_but_those_with_an_argument() -> None:
