@@ -1,4 +1,4 @@
-"""Small campaigns for tests of diagnosis: four hours a run, so that a search takes seconds."""
+"""Small campaigns: for diagnosis four hours a run, so that a search takes seconds; for channels shorter ones."""
 
 from __future__ import annotations
 
@@ -37,6 +37,25 @@ profiles = ["loops", "steps"]
 """
 
 GRADIENT = '[[cause]]\nid = "thermal_gradient"\ntau_s = 900.0\namplitude_dph_per_c = 3e-4\n'
+
+
+def up_and_down(base: str, runs: int) -> str:
+    """A campaign of a known scenario's gyro in runs of 2.5 h, one more of them a week later as the exam."""
+    return f"""
+extends = "{base}"
+[profile."up and down"]
+start_c = 10.0
+record_min = 150
+steps = [{{hold_min = 20}}, {{ramp_to_c = 40.0, c_per_min = 2.0}}, {{hold_min = 20}},
+  {{ramp_to_c = 0.0, c_per_min = 2.0}}, {{hold_min = 30}}, {{ramp_to_c = 20.0, c_per_min = 2.0}}, {{hold_min = 30}}]
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = {json.dumps(["up and down"] * runs)}
+[[set]]
+role = "exam"
+started = 2026-01-08T00:00:00Z
+profiles = ["up and down"]
+"""
 
 
 def scenario(folder: Path, cause: str = "", name: str = "short") -> Path:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from campaigns import up_and_down
 from conftest import run_gyrotc
 from gyrotc.dataset import load
 from gyrotc.model import Model, load_model
@@ -18,19 +19,6 @@ sys.path.insert(0, str(ROOT))
 from bench.signals import rms_of, without
 
 BENT = """
-extends = "separating"
-[profile."up and down"]
-start_c = 10.0
-record_min = 150
-steps = [{hold_min = 20}, {ramp_to_c = 40.0, c_per_min = 2.0}, {hold_min = 20}, {ramp_to_c = 0.0, c_per_min = 2.0},
-  {hold_min = 30}, {ramp_to_c = 20.0, c_per_min = 2.0}, {hold_min = 30}]
-[[set]]
-started = 2026-01-01T00:00:00Z
-profiles = ["up and down", "up and down", "up and down", "up and down", "up and down", "up and down"]
-[[set]]
-role = "exam"
-started = 2026-01-08T00:00:00Z
-profiles = ["up and down"]
 [[channel]]
 name = "supply_v"
 level = 28.0
@@ -65,7 +53,7 @@ slope_dph_per_unit_per_c = 1.2e-4
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("shapes")
-    (folder / "bent.toml").write_text(BENT, "utf-8")
+    (folder / "bent.toml").write_text(up_and_down("separating", 6) + BENT, "utf-8")
     simulate(folder / "bent.toml", seed=3, out=folder / "data")
     return folder / "data"
 

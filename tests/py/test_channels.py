@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaigns import up_and_down
 from gyrotc.dataset import Dataset, Rows, load
 from gyrotc.quantise.applied import applied_of
 from gyrotc.simulate import read_truth, simulate
@@ -21,22 +22,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _RUNS, _BLOCKS = 6, 720  # two hours of 10 s each
-
-SHORT = """
-extends = "signals"
-[profile."up and down"]
-start_c = 10.0
-record_min = 150
-steps = [{hold_min = 20}, {ramp_to_c = 40.0, c_per_min = 2.0}, {hold_min = 20}, {ramp_to_c = 0.0, c_per_min = 2.0},
-  {hold_min = 30}, {ramp_to_c = 20.0, c_per_min = 2.0}, {hold_min = 30}]
-[[set]]
-started = 2026-01-01T00:00:00Z
-profiles = ["up and down", "up and down", "up and down", "up and down"]
-[[set]]
-role = "exam"
-started = 2026-01-08T00:00:00Z
-profiles = ["up and down"]
-"""
 
 
 def wander(rng: np.random.Generator, tau: float = 150.0) -> Array:
@@ -209,7 +194,7 @@ def test_a_difference_of_columns_is_formed_by_its_name() -> None:
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("channels")
-    (folder / "short.toml").write_text(SHORT, "utf-8")
+    (folder / "short.toml").write_text(up_and_down("signals", 4), "utf-8")
     simulate(folder / "short.toml", seed=5, out=folder / "data")
     return folder / "data"
 
