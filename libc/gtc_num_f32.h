@@ -109,13 +109,17 @@ static inline float FN(on_grid)(float z)
     return shifted;
 }
 
-/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or GTC_E_ARG. */
+/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
 static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT *in)
 {
     int status;
     float z;
 
     if (FN(is_missing)(temp) || FN(is_missing)(slope)) {
+        in->temp = 0.0F;
+        in->slope = 0.0F;
+        in->z_temp = 0.0F;
+        in->z_slope = 0.0F;
         return GTC_E_ARG;
     }
     status = FN(clamp)(&temp, &table->envelope[0]) | FN(clamp)(&slope, &table->envelope[2]);

@@ -236,27 +236,23 @@ static inline int FN(position)(int_least32_t x, const int_least32_t range[2], in
 
     GTC_ASSERT_RANGE(span < 0x4000000U);
     if (offset > span) {
-        if (x == GTC_TEMP_MISSING) {
-            return GTC_E_ARG;
-        }
         offset = span & (0U - (uint_least32_t)(x > range[0]));
         status = GTC_CLAMPED;
+        if (x == GTC_TEMP_MISSING) {
+            status = GTC_E_ARG;
+        }
     }
     *position = FN(high)(offset << 5, (uint_least32_t)gain);
     return status;
 }
 
-/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or GTC_E_ARG. */
+/* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
 static inline int FN(locate)(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
 {
-    int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
-    int other;
+    const int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
+    const int other = FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
 
-    if (status >= 0) {
-        other = FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
-        status = (other < 0) ? other : (status | other);
-    }
-    return status;
+    return ((status < 0) || (other < 0)) ? GTC_E_ARG : (status | other);
 }
 
 /* Cells of the inputs, T and slope, among n each. */

@@ -16,7 +16,8 @@ static uint_least32_t FN(stand_in_of)(const gtc_word_t *term)
     return term[1].bits >> 16;
 }
 
-/* What a term adds on average where its channel is not known: its stand-in, at the inputs of the map. */
+/* What a term adds on average where its channel is not known: its stand-in, at the inputs of the map. Where they are
+ * none (something else wrote over the state) the map says so. */
 static NUM FN(stand_in)(const TABLE *table, uint_least32_t number, const EFFECT *effect)
 {
     const gtc_word_t *network = table->networks;
@@ -24,9 +25,7 @@ static NUM FN(stand_in)(const TABLE *table, uint_least32_t number, const EFFECT 
     POINT in;
     uint_least32_t i;
 
-    if (FN(locate)(table, effect->temp, effect->slope, &in) < 0) {
-        return NUM_ZERO;
-    }
+    (void)FN(locate)(table, effect->temp, effect->slope, &in);
     for (i = 1U; i < number; i++) {
         center = &center[network[0].bits * GTC_CENTER_WORDS];
         network = &network[GTC_NETWORK_WORDS];
@@ -45,22 +44,28 @@ static void FN(nothing)(STATE *state, uint_least32_t i, NUM x)
 /* ---- first-order memory: cavity_lag, thermal_gradient
  *
  * z <- z + gain (T - z) once a block. Parameters: gain; amplitude; rate, block / tau: where it is not 0
- * the map sees z and (T - z) rate instead of T and its slope. Adds amplitude (z - T). */
+ * the map sees z and (T - z) rate instead of T and its slope. Adds amplitude (z - T). What no call can have
+ * left in z (something else wrote there) would take years to follow, so z begins again at T. */
+
+static void FN(memory_follow)(NUM z[2], NUM x, NUM gain)
+{
+    const NUM most = FN(number_limits)[9].most;
+
+    if ((z[0] >= -most) && (z[0] <= most)) {
+        FN(follow)(z, x, gain);
+    } else {
+        FN(settle)(z, x);
+    }
+}
 
 static void FN(memory_begin)(STATE *state, uint_least32_t i, NUM x)
 {
-    NUM *const z = state->term[i];
-
-    if (FN(is_missing)(z[0]) != 0) {
-        FN(settle)(z, x);
-    } else {
-        FN(follow)(z, x, FN(power)(FN(parameter)(state, i, 0U), state->off_blocks));
-    }
+    FN(memory_follow)(state->term[i], x, FN(power)(FN(parameter)(state, i, 0U), state->off_blocks));
 }
 
 static void FN(memory_step)(STATE *state, uint_least32_t i, NUM x)
 {
-    FN(follow)(state->term[i], x, FN(parameter)(state, i, 0U));
+    FN(memory_follow)(state->term[i], x, FN(parameter)(state, i, 0U));
 }
 
 static void FN(memory_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
@@ -91,12 +96,12 @@ static void FN(play_step)(STATE *state, uint_least32_t i, NUM x)
     const NUM high = (NUM)FN(add)(x, width);
     NUM *const z = state->term[i];
 
-    if (*z < low) {
-        *z = low;
-    } else if (*z > high) {
+    if (*z > high) {
         *z = high;
-    } else {
+    } else if (*z >= low) {
         /* it does not move */
+    } else {
+        *z = low; /* what is no number, too */
     }
 }
 

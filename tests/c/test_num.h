@@ -29,6 +29,7 @@ typedef gtc_q31_state_t state_t;
 #define C(temperature) ((int_least32_t)((temperature) * 65536.0))
 #define MISSING GTC_TEMP_MISSING
 #define WORD_OF(member) (member)
+#define NUMBER(word) ((word).integer)
 #define MISSING_BITS 0x80000000UL
 #else
 typedef float num_t;
@@ -43,6 +44,7 @@ typedef gtc_f32_state_t state_t;
 #define C(temperature) ((float)(temperature))
 #define MISSING test_nan()
 #define WORD_OF(member) ((member).value)
+#define NUMBER(word) ((word).value)
 #define MISSING_BITS 0x7FC00000UL
 
 static inline float test_nan(void)

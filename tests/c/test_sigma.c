@@ -8,7 +8,6 @@ typedef gtc_q31_snapshot_t snapshot_t;
 #define INFINITE (-MUCH)
 #define HIGHEST 2147483647L
 #define VALUE(member) (member)
-#define NUMBER(word) ((word).integer)
 #else
 typedef gtc_f32_snapshot_t snapshot_t;
 #define DPH(x) ((float)(x))
@@ -16,7 +15,6 @@ typedef gtc_f32_snapshot_t snapshot_t;
 #define INFINITE (MUCH * MUCH)
 #define HIGHEST 3.4e38F
 #define VALUE(member) ((member).value)
-#define NUMBER(word) ((word).value)
 #endif
 
 static const snapshot_t nothing;

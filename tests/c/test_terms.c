@@ -453,8 +453,8 @@ TEST(bent_lines_and_products_have_stand_ins_too)
     CHECK(!same(map, bias_of(&state)));
 }
 
-/* A memory that was overwritten and never follows again gives the map no temperature, nor the stand-in. */
-TEST(a_memory_that_is_none_leaves_the_stand_in_out)
+/* What comes of a block that was overwritten lies within the authority; in float32 it is no temperature. */
+TEST(a_block_that_was_overwritten_stays_within_the_authority)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
     table_t table = TERMS;
@@ -462,15 +462,44 @@ TEST(a_memory_that_is_none_leaves_the_stand_in_out)
     num_t bias = 0;
 
     memcpy(terms, TERMS.terms, sizeof terms);
-    terms[2].bits = 0U; /* its gain */
+    terms[4].bits = 0U; /* the map sees the temperature, not its memory */
     table.terms = terms;
     state = started_with(&table);
-    (void)samples(&state, C(15.0), MISSING, 2001);
-    state.term[0][0] = MISSING;
-    state.term[0][1] = 0;
-    (void)samples(&state, C(15.0), MISSING, (int)(2U * N));
-    CHECK(FN(bias)(&state, &bias) < 0);
+    (void)samples(&state, C(15.0), MISSING, 2001 + (int)(N / 2U));
+    state.input[0].base = TEST_Q31 ? C(-32767.0) : MISSING;
+    state.input[0].sum = 0;
+    (void)samples(&state, MISSING, MISSING, (int)(N / 2U));
+    CHECK(FN(bias)(&state, &bias) != GTC_OK);
     CHECK(within(&TERMS, bias));
+}
+
+/* What something else wrote over the state of a term is left behind by the end of the block: a memory begins again at
+ * the temperature, a play is no farther from it than it is wide. */
+TEST(a_term_that_was_overwritten_is_back_by_the_end_of_the_block)
+{
+    const num_t written[] = {MISSING, C(-32767.0), C(32767.0), C(401.0), C(-401.0)};
+    const num_t x = C(15.0);
+    size_t k;
+
+    for (k = 0U; k < (sizeof written / sizeof written[0]); k++) {
+        state_t state = started_with(&TERMS);
+        uint_least32_t i;
+
+        (void)samples(&state, x, C(12.0), 2001);
+        for (i = 0U; i < TERMS.n_terms; i++) {
+            state.term[i][0] = written[k];
+            state.term[i][1] = written[k];
+        }
+        (void)samples(&state, x, C(12.0), (int)N);
+        for (i = 0U; i < TERMS.n_terms; i++) {
+            const gtc_word_t *const term = &TERMS.terms[i * GTC_TERM_WORDS];
+            const num_t z = state.term[i][0];
+            const num_t width = NUMBER(term[2]);
+
+            CHECK((term[0].bits != GTC_TERM_MEMORY) || same(x, z));
+            CHECK((term[0].bits != GTC_TERM_PLAY) || ((z >= x - width) && (z <= x + width)));
+        }
+    }
 }
 
 TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
@@ -782,7 +811,8 @@ int main(void)
 #endif
     RUN(a_stand_in_is_added_while_nothing_of_its_channel_is_believed);
     RUN(bent_lines_and_products_have_stand_ins_too);
-    RUN(a_memory_that_is_none_leaves_the_stand_in_out);
+    RUN(a_block_that_was_overwritten_stays_within_the_authority);
+    RUN(a_term_that_was_overwritten_is_back_by_the_end_of_the_block);
     RUN(networks_that_no_term_names_or_that_are_not_there_are_refused);
     RUN(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own);
     RUN(a_channel_that_never_came_is_taken_as_its_fallback);

@@ -66,14 +66,16 @@ PARTS = {
         shape=(1, "auxiliary"),
     ),
     "memory": Part("follow", "terms", left=2),
-    "memories, play, warm-up": Part("terms", "terms", precision=7, contracts=_TERMS, checks=1),
+    "memories, play, warm-up": Part("terms", "terms", precision=7, contracts=_TERMS, checks=2),
     "harmonic, channels": Part("terms", "bank", precision=7, contracts=_TERMS),
     "map of any table": Part("map", precision=7, contracts=_RELATED, checks=1, shape=(1, "warm_up")),
     "map of any bank": Part("map", precision=7, contracts=_RELATED, checks=1, left=3, shape=(2, "warm_up")),
-    "terms of any table": Part("terms", precision=7, contracts=_TERMS, shape=(1, "warm_up")),
-    "channels of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "auxiliary")),
-    "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "curve")),
-    "product of any table": Part("terms", precision=7, contracts=_STAND_INS, shape=(1, "product")),
+    "terms of any table": Part("terms", precision=7, contracts=_TERMS, checks=1, shape=(1, "warm_up")),
+    "channels of any table": Part(
+        "terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "auxiliary")
+    ),
+    "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "curve")),
+    "product of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "product")),
 }
 
 

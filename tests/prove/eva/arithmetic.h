@@ -13,6 +13,7 @@ typedef float wide_t;
 #define LOWEST (-90.0F)
 #define HIGHEST 200.0F
 #define STEEPEST 100000.0F /* C per block: far more than any slope of plausible means */
+#define FOLLOWED 400.0F /* a memory beyond it begins again */
 #define FINITE(x) \is_finite(x)
 #define NUMBER(word) ((word).value)
 #define MEMBER_NUMBER(member) ((member).value)
@@ -25,6 +26,7 @@ typedef int_least64_t wide_t;
 #define LOWEST (-90L * 65536L)
 #define HIGHEST (200L * 65536L)
 #define STEEPEST 2147483647L
+#define FOLLOWED (400L * 65536L)
 #define FINITE(x) \true
 #define NUMBER(word) ((word).integer)
 #define MEMBER_NUMBER(member) (member)

@@ -1,4 +1,5 @@
-/* follow.c - one step of a memory, for every state, every plausible argument and every gain, and its power. */
+/* follow.c - one step of a memory from every state that it follows on from, for every plausible argument and every
+ * gain, and its power. */
 #include "arithmetic.h"
 
 #include "gtc.c"
@@ -8,12 +9,12 @@ int main(void)
     num_t z[2];
 #if defined(F32)
     const float gain = Frama_C_float_interval(0.0F, 1.0F);
-    z[0] = Frama_C_float_interval(LOWEST, HIGHEST);
+    z[0] = Frama_C_float_interval(-FOLLOWED, FOLLOWED);
     z[1] = any_number(0);
 #else
     const int_least32_t gain = (int_least32_t)Frama_C_long_interval(0, 2147483647L);
-    z[0] = (int_least32_t)Frama_C_long_interval(LOWEST - 1L, HIGHEST);
-    z[1] = (int_least32_t)Frama_C_long_interval(0, 65535);
+    z[0] = (int_least32_t)Frama_C_long_interval(-FOLLOWED, FOLLOWED);
+    z[1] = any_number(0);
 #endif
     NAME(follow)(z, ANY_PLAUSIBLE(), gain);
     (void)NAME(power)(gain, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));

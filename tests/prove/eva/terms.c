@@ -1,21 +1,20 @@
-/* terms.c - every hook of every extension term of the table, on every state that its invariant allows.
+/* terms.c - every hook of every extension term of the table, on every state.
  *
  * The step functions call a hook with a plausible temperature; hooks touch nothing but the state of their own term.
- * Invariant: a memory is plausible, or a last place below it (docs/proof.md); a play is as far from that
- * as it is wide; the mean of a channel is a number. That a memory moves towards its argument and no farther, and
- * that a mean lies between its samples, is argued there, too; follow.c shows that the first has no error.
+ * The state of a memory is any number at all: beyond FOLLOWED it begins again. A play is as far from a plausible
+ * temperature as it is wide; the mean of a channel is a number. That a memory moves towards its argument and no
+ * farther (docs/proof.md), and that a mean lies between its samples, is argued there; follow.c shows that the first
+ * has no error.
  */
 #include "arithmetic.h"
 
 #if defined(F32)
-#define BELOW 0.0F
 /*@ assigns z[0 .. 1] \from z[0 .. 1], x, gain;
-    ensures FINITE(z[0]) && LOWEST - BELOW <= z[0] <= HIGHEST; */
+    ensures FINITE(z[0]) && -FOLLOWED <= z[0] <= FOLLOWED; */
 static inline void gtc_f32_follow(float z[2], float x, float gain);
 #else
-#define BELOW 1L
 /*@ assigns z[0 .. 1] \from z[0 .. 1], x, gain;
-    ensures LOWEST - BELOW <= z[0] <= HIGHEST && 0 <= z[1] <= 65535; */
+    ensures -FOLLOWED <= z[0] <= FOLLOWED && 0 <= z[1] <= 65535; */
 static inline void gtc_q31_follow(int_least32_t z[2], int_least32_t x, int_least32_t gain);
 #endif
 
@@ -42,17 +41,19 @@ static NAME(state_t) state;
 static void any_term(unsigned i)
 {
     const unsigned long kind = THE_TABLE.terms[i * GTC_TERM_WORDS].bits;
-    const num_t width = (kind == GTC_TERM_PLAY) ? NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]) : BELOW;
+    const num_t width = NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]);
     state.samples_per_block = Frama_C_unsigned_long_interval(1, MAX_BLOCK);
     state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
     state.off_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-#if defined(F32)
-    state.term[i][0] = Frama_C_float_interval(LOWEST - width, HIGHEST + width);
+    state.term[i][0] = any_number(Frama_C_unsigned_int_interval(0, KINDS - 1U));
     state.term[i][1] = any_number(0);
+    if (kind == GTC_TERM_PLAY) {
+#if defined(F32)
+        state.term[i][0] = Frama_C_float_interval(LOWEST - width, HIGHEST + width);
 #else
-    state.term[i][0] = (int_least32_t)Frama_C_long_interval(LOWEST - width, HIGHEST + width);
-    state.term[i][1] = (int_least32_t)Frama_C_long_interval(0, 65535);
+        state.term[i][0] = (int_least32_t)Frama_C_long_interval(LOWEST - width, HIGHEST + width);
 #endif
+    }
     if (READS_CHANNEL(kind)) {
         NAME(input_t) *const in = &state.input[THE_TABLE.terms[(i * GTC_TERM_WORDS) + 1U].bits & 0xFFFFU];
         in->gap_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
@@ -62,14 +63,17 @@ static void any_term(unsigned i)
     }
 }
 
-static void invariant_holds(unsigned i)
+static void invariant_holds(unsigned i, unsigned hook)
 {
     const unsigned long kind = THE_TABLE.terms[i * GTC_TERM_WORDS].bits;
-    const num_t width = (kind == GTC_TERM_PLAY) ? NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]) : BELOW;
-    if ((kind == GTC_TERM_MEMORY) || (kind == GTC_TERM_PLAY)) {
 #if !defined(ANY_TABLE) /* relates two numbers there */
+    if (kind == GTC_TERM_PLAY) {
+        const num_t width = NUMBER(THE_TABLE.terms[(i * GTC_TERM_WORDS) + 2U]);
         //@ check LOWEST - width <= state.term[i][0] <= HIGHEST + width;
+    }
 #endif
+    if ((kind == GTC_TERM_MEMORY) && (hook < 2U)) {
+        //@ check -FOLLOWED <= state.term[i][0] <= FOLLOWED;
     }
 }
 
@@ -95,7 +99,7 @@ static void one_hook(unsigned i, unsigned hook)
         code->apply(&state, i, ANY_PLAUSIBLE(), &effect);
         (void)NAME(added)(&THE_TABLE, &effect);
     }
-    invariant_holds(i);
+    invariant_holds(i, hook);
 }
 
 int main(void)
