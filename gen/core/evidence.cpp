@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace gyrotc {
@@ -15,11 +16,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kOfT = 40;         // functions of temperature alone, shared by s1 and s2
-constexpr int kCoupledT = 10;    // functions of the coupled part, by input
-constexpr int kCoupledR = 8;     // 121 in all: docs/training.md, section 1, step 2
-constexpr int kBasis = 1 + kOfT + kCoupledT * kCoupledR;
-constexpr int kRows = 480;        // of the basis at once: 0.5 MB, which stays in the cache
 constexpr int kColumns = 24;      // of a triangle at once: what is zero above or below them is left out
 constexpr double kReach = 1.4;            // domain over largest |input|: the basis vanishes at its edge
 constexpr double kConstVariance = 100.0;  // of the constant, in units of the bias' variance
@@ -37,17 +33,6 @@ constexpr double kShortScaleStarts[] = {0.08, 0.35};
 
 double frequency(int j, double reach) { return kPi * (j + 1) / (2.0 * reach); }
 
-// Rows: points. Columns: sin(w_j (x + reach)) / sqrt(reach), by recurrence.
-MatrixXd sines(const VectorXd &x, int n, double reach) {
-    const Eigen::ArrayXd angle = frequency(0, reach) * (x.array() + reach);
-    const Eigen::ArrayXd twice_cos = 2.0 * angle.cos();
-    MatrixXd s(x.size(), n);
-    s.col(0) = angle.sin() / std::sqrt(reach);
-    if (n > 1) s.col(1) = twice_cos * s.col(0).array();
-    for (int j = 2; j < n; ++j) s.col(j) = twice_cos * s.col(j - 1).array() - s.col(j - 2).array();
-    return s;
-}
-
 // Spectral density of a squared-exponential process of one input at w, and its derivatives by log s and log l.
 struct Density {
     double value, by_s, by_l;
@@ -57,10 +42,6 @@ Density density(double s, double l, double w) {
     const double v = s * s * std::sqrt(2.0 * kPi) * l * std::exp(-0.5 * lw2);
     return {v, 2.0 * v, v * (1.0 - lw2)};
 }
-
-// Rows of a block that begins at `at`. The last one takes the rest with it: Eigen sums a lone row in another order, and
-// no result shall depend on where a block ends.
-Eigen::Index rows_from(Eigen::Index at, Eigen::Index all) { return all - at < 2 * kRows ? all - at : kRows; }
 
 // Inverse of a lower triangle. What lies above a block of columns is zero and is not solved for.
 MatrixXd inverse_of(const MatrixXd &lower) {
@@ -81,26 +62,11 @@ double reach_of(const VectorXd &x) { return kReach * std::max(x.cwiseAbs().maxCo
 EvidenceModel::EvidenceModel(const Bins &bins, double least_sigma)
     : samples_(bins.samples), least_sigma_(least_sigma) {
     if (bins.t.size() == 0) throw std::invalid_argument("evidence: no bins");
-    reach_t_ = reach_of(bins.t);
-    reach_r_ = reach_of(bins.r);
-    const MatrixXd weighted = bins.count.cwiseSqrt().asDiagonal() * basis(bins.t, bins.r);
-    gram_ = MatrixXd::Zero(kBasis, kBasis);
-    gram_.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
-    gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
-    moment_ = weighted.transpose() * bins.count.cwiseSqrt().cwiseProduct(bins.mean);
+    domain_ = {reach_of(bins.t), reach_of(bins.r)};
+    Sums sums = sums_over(domain_, bins.t, bins.r, bins.count, bins.mean);
+    gram_ = std::move(sums.products);
+    moment_ = std::move(sums.moments);
     squares_ = bins.count.dot(bins.mean.cwiseAbs2()) + bins.within;
-}
-
-MatrixXd EvidenceModel::basis(const VectorXd &t, const VectorXd &r) const {
-    const MatrixXd of_t = sines(t, kOfT, reach_t_);
-    const MatrixXd of_r = sines(r, kCoupledR, reach_r_);
-    MatrixXd phi(t.size(), kBasis);
-    phi.col(0).setOnes();
-    phi.middleCols(1, kOfT) = of_t;
-    for (int i = 0; i < kCoupledT; ++i)
-        for (int j = 0; j < kCoupledR; ++j)
-            phi.col(1 + kOfT + i * kCoupledR + j) = of_t.col(i).cwiseProduct(of_r.col(j));
-    return phi;
 }
 
 VectorXd EvidenceModel::prior_variance(const EvidenceParameters &log_parameters, MatrixXd *derivative) const {
@@ -109,15 +75,15 @@ VectorXd EvidenceModel::prior_variance(const EvidenceParameters &log_parameters,
     variance[0] = kConstVariance;
     if (derivative) derivative->setZero(kBasis, kEvidenceParameters);
     for (int j = 0; j < kOfT; ++j) {
-        const double w = frequency(j, reach_t_);
+        const double w = frequency(j, domain_.t);
         const Density a = density(p[0], p[1], w), b = density(p[2], p[3], w);
         variance[1 + j] = a.value + b.value + kVarianceFloor;
         if (derivative) derivative->row(1 + j).head<4>() << a.by_s, a.by_l, b.by_s, b.by_l;
     }
     for (int i = 0; i < kCoupledT; ++i)
         for (int j = 0; j < kCoupledR; ++j) {
-            const Density a = density(p[4], p[5], frequency(i, reach_t_));
-            const Density b = density(1.0, p[6], frequency(j, reach_r_));
+            const Density a = density(p[4], p[5], frequency(i, domain_.t));
+            const Density b = density(1.0, p[6], frequency(j, domain_.r));
             const int k = 1 + kOfT + i * kCoupledR + j;
             variance[k] = a.value * b.value + kVarianceFloor;
             if (derivative)
@@ -164,6 +130,7 @@ void EvidenceModel::condition(const EvidenceParameters &log_parameters) {
     coefficients_ = root_.cwiseProduct(llt.solve(root_.cwiseProduct(moment_)));
     lower_ = llt.matrixLLT();
     factor_.resize(0, 0);
+    form_.reset();
 }
 
 void EvidenceModel::spread() const {
@@ -171,6 +138,9 @@ void EvidenceModel::spread() const {
     const double noise = std::exp(2.0 * log_parameters_[7]);
     const MatrixXd inverse_l = inverse_of(lower_);
     factor_ = std::sqrt(noise) * (root_.asDiagonal() * inverse_l.transpose());
+    MatrixXd covariance = MatrixXd::Zero(kBasis, kBasis);
+    covariance.selfadjointView<Eigen::Lower>().rankUpdate(factor_);
+    form_.emplace(domain_, covariance);
     freedom_ = kBasis - noise * inverse_l.squaredNorm();
 }
 
@@ -230,30 +200,16 @@ void EvidenceModel::optimise(const EvidenceParameters *start) {
 }
 
 VectorXd EvidenceModel::mean(const VectorXd &t, const VectorXd &r) const {
-    VectorXd found(t.size());
-    for (Eigen::Index at = 0, rows; at < t.size(); at += rows) {
-        rows = rows_from(at, t.size());
-        found.segment(at, rows).noalias() = basis(t.segment(at, rows), r.segment(at, rows)) * coefficients_;
-    }
-    return found;
+    return linear_form(domain_, coefficients_, t, r);
 }
 
-// The factor is an upper triangle: below a block of its columns it is zero.
+// By waves; where so little is left of them that rounding could show, by the factor.
 VectorXd EvidenceModel::variance(const VectorXd &t, const VectorXd &r) const {
     spread();
-    VectorXd found(t.size());
-    MatrixXd product;
-    for (Eigen::Index at = 0, rows; at < t.size(); at += rows) {
-        rows = rows_from(at, t.size());
-        const MatrixXd phi = basis(t.segment(at, rows), r.segment(at, rows));
-        product.resize(rows, kBasis);
-        for (int from = 0; from < kBasis; from += kColumns) {
-            const int to = std::min(from + kColumns, kBasis);
-            product.middleCols(from, to - from).noalias() =
-                phi.leftCols(to) * factor_.block(0, from, to, to - from);
-        }
-        found.segment(at, rows) = product.rowwise().squaredNorm();
-    }
+    VectorXd found = form_->at(t, r);
+    for (Eigen::Index k = 0; k < found.size(); ++k)
+        if (!(found[k] >= form_->least()))
+            found[k] = (basis_of(domain_, t.segment(k, 1), r.segment(k, 1)) * factor_).squaredNorm();
     return found;
 }
 

@@ -9,7 +9,9 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <array>
+#include <optional>
+
+#include "waves.hpp"
 
 namespace gyrotc {
 
@@ -54,13 +56,12 @@ class EvidenceModel {
     int evaluations() const { return evaluations_; }
 
   private:
-    Eigen::MatrixXd basis(const Eigen::VectorXd &t, const Eigen::VectorXd &r) const;
     Eigen::VectorXd prior_variance(const EvidenceParameters &log_parameters, Eigen::MatrixXd *derivative) const;
 
     double samples_ = 0.0;
     double least_sigma_ = 0.0;
     double squares_ = 0.0;               // y'y
-    double reach_t_ = 0.0, reach_r_ = 0.0;  // half lengths of the domain
+    Domain domain_;
     Eigen::MatrixXd gram_;               // Phi' N Phi
     Eigen::VectorXd moment_;             // Phi' N y
     EvidenceParameters log_parameters_ = EvidenceParameters::Zero();
@@ -70,6 +71,7 @@ class EvidenceModel {
     Eigen::VectorXd root_;               // sqrt of the prior variances
     Eigen::MatrixXd lower_;              // Cholesky factor of the posterior precision, scaled by root_ and noise
     mutable Eigen::MatrixXd factor_;     // sqrt of the posterior covariance: cov = factor factor'; empty: not made yet
+    mutable std::optional<QuadraticForm> form_;  // the same covariance, as waves
     mutable double freedom_ = 0.0;
     double value_ = 0.0;
     int evaluations_ = 0;

@@ -167,3 +167,22 @@ def test_a_process_that_is_conditioned_anew_forgets_its_earlier_variance() -> No
     assert not np.array_equal(again.variance(*at), before) and again.freedom != freedom
     assert np.array_equal(again.variance(*at), fresh.variance(*at)) and again.freedom == fresh.freedom
     assert np.array_equal(again.mean(*at), fresh.mean(*at))
+
+
+@pytest.mark.parametrize("sigma", [0.3, 1e-2, 1e-4])
+def test_variance_keeps_its_digits_where_hardly_any_noise_is_left(sigma: float) -> None:
+    """Of 1e-4 a sum of waves has cancelled to nothing. Held against a QR, which squares nothing."""
+    data = bins(12, 400)
+    log_p = PRIOR_MEAN.copy()
+    log_p[7] = np.log(sigma)
+    process = model(data)
+    process.condition(log_p)
+    t, r, count = (np.asarray(data[k]) for k in ("t", "r", "count"))
+    reach = REACH * np.abs(t).max(), REACH * np.abs(r).max()
+    phi, w_t, w_r = basis(t, r, *reach)
+    root = np.sqrt(prior_variance(np.exp(log_p), w_t, w_r))
+    factor = np.linalg.qr(np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r")
+    at = np.linspace(-1.0, 1.0, 37), np.linspace(0.9, -0.9, 37)
+    columns, *_ = basis(*at, *reach)
+    expected = np.sum(np.linalg.solve(factor.T, (columns * root).T) ** 2, axis=0)
+    np.testing.assert_allclose(process.variance(*at), expected, rtol=1e-4)
