@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..metrics import MAD_TO_SIGMA
+from ..metrics import MAD_TO_SIGMA, median, middle_of_five
 from .records import EarthRate, Floats, Rows, Run
 
 __all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
@@ -179,7 +179,7 @@ def _robust_sigma(values: Floats) -> float:
     """
     if len(values) == 0:
         return 0.0
-    sigma = MAD_TO_SIGMA * float(np.median(np.abs(values, out=values), overwrite_input=True))
+    sigma = MAD_TO_SIGMA * median(np.abs(values, out=values), overwrite_input=True)
     return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
 
 
@@ -206,7 +206,7 @@ def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, 
     if len(temperature) < 7:
         return ()
     departure = _departures(np.diff(temperature))
-    noise = MAD_TO_SIGMA * float(np.median(departure))
+    noise = MAD_TO_SIGMA * median(departure)
     found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
     changes = _changes(temperature)
     last = changes[np.searchsorted(changes, found, side="right") - 1]
@@ -224,7 +224,7 @@ def _departures(step: Floats) -> Floats:
     for start in range(0, len(step), _PART):
         around = sliding_window_view(padded[start : start + _PART + 4], 5)
         part = slice(start, start + len(around))
-        result[part] = np.abs(step[part] - np.partition(around, 2, axis=1)[:, 2])
+        result[part] = np.abs(step[part] - middle_of_five(*around.T))
     return result
 
 
@@ -238,7 +238,7 @@ def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
         return 0, None
     step = np.diff(np.r_[rate[2], rate, rate[-3]])
     moved = np.abs(step[step != 0.0])
-    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0) if len(moved) else np.inf
+    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * median(moved) / np.sqrt(2.0) if len(moved) else np.inf
     large = np.flatnonzero(np.abs(step) > limit)
     first, last = large[:-1], large[1:]
     pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
@@ -271,7 +271,7 @@ def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[flo
             continue
         rest = np.abs(step - size * np.rint(step / size))
         wraps = np.flatnonzero((np.abs(step) > 0.5 * size) & (rest < size / 8.0))
-        usual = MAD_TO_SIGMA * float(np.median(rest))
+        usual = MAD_TO_SIGMA * median(rest)
         wraps = wraps[rest[wraps] <= _OUTLIER_SIGMAS * usual + 4.0]
         if len(wraps) and usual < size / 32.0:
             return float(time[use][wraps[0] + 1]), bits, len(wraps)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..metrics import median
 from .columns import Layout
 from .earth import EARTH_RATE_DPH
 from .evidence import Evidence
@@ -153,7 +154,7 @@ def _sustained(time: Floats, temperature: Floats) -> float:
         took = time[_STEPS:] - time[:-_STEPS]
         moved = np.abs(temperature[_STEPS:] - temperature[:-_STEPS])
         fast = (moved >= _NEARLY * _RISE_C) & (60.0 * moved >= _NEARLY * _FASTEST_C_PER_MIN * took)
-        looked = np.flatnonzero(fast & (took > 0.0))
+        looked = (fast & (took > 0.0)).nonzero()[0]
         if len(looked):
             windows = np.lib.stride_tricks.sliding_window_view(np.diff(temperature), _STEPS)[looked]
             rise = np.abs(windows.sum(axis=1))
@@ -162,9 +163,14 @@ def _sustained(time: Floats, temperature: Floats) -> float:
             lasting = one_sign & even & (rise >= _RISE_C)
             if lasting.any():
                 fastest = max(fastest, float(np.max(60.0 * rise[lasting] / took[looked][lasting])))
-        half = len(time) // 2 * 2
-        time, temperature = time[:half].reshape(-1, 2).mean(1), temperature[:half].reshape(-1, 2).mean(1)
+        time, temperature = _of_pairs(time), _of_pairs(temperature)
     return fastest
+
+
+def _of_pairs(values: Floats) -> Floats:
+    """Means of the first and second value, the third and fourth and so on; an odd last one is left out."""
+    half = len(values) // 2 * 2
+    return np.asarray((values[:half:2] + values[1:half:2]) / 2.0)
 
 
 def _of_triad(rates: Floats, column: str, units: Mapping[str, Conversion]) -> Suspicion | None:
@@ -210,13 +216,12 @@ def _random_walk(time: Floats, rate: Floats) -> float:
     """
     largest = 0.0
     while len(rate) >= _FEWEST_CELLS:
-        tau = float(np.median(np.diff(time)))
+        tau = median(np.diff(time))
         if largest > 0.0 and tau > _QUIET_TAU_S:
             break
         deviation = np.sqrt(np.mean(np.diff(rate) ** 2) / 2.0)
         largest = max(largest, float(deviation * np.sqrt(max(tau, 0.0) / 3600.0)))
-        half = len(rate) // 2 * 2
-        time, rate = time[:half].reshape(-1, 2).mean(1), rate[:half].reshape(-1, 2).mean(1)
+        time, rate = _of_pairs(time), _of_pairs(rate)
     return largest
 
 

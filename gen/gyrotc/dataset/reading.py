@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..metrics import median
 from .columns import Layout, arrange
 from .csvfile import CsvFile
 from .evidence import Evidence
@@ -166,7 +167,7 @@ def open_recording(
         return None
     if len(problems) > before:
         return None
-    period = float(np.median(np.diff(time), overwrite_input=True))
+    period = median(np.diff(time), overwrite_input=True)
     if period < _SHORTEST_S:
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))

@@ -12,6 +12,7 @@ toggles or repeats a pattern tells nothing; rows that only repeat the one before
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,7 +28,7 @@ Words = NDArray[np.uint64]
 _SCALES = (7, 10)  # windows of 2^7 and, for coarse rates, 2^10 rows
 _ONE_IN = 16  # power of 2; a sixteenth of the windows finds a shared stretch of a few hundred rows
 _BITS = 80.0  # 2^50 alignments of two dozen runs of 100 h at 100 Hz, and a false alarm in 2^30 data sets
-_TABLE = 2**20  # counters: 4 MiB of float32
+_TABLE = 2**20  # counters: 4 MiB
 _PART, _OVERLAP = 2**18, 2**11  # rows that are looked at together, and those seen again with the next
 _CONTEXT = 4  # doublings: patterns are known by sixteen rows
 _PATTERN = 3  # windows that a recording holds this often are a pattern
@@ -150,9 +151,27 @@ def _unexpected(before: Words, rate: Words) -> NDArray[np.float32]:
     mask = np.uint64(_TABLE - 1)
     slot = (before & mask).view(np.int64)
     pair = (_mixed(before * _FIRST + rate) & mask).view(np.int64)
-    alone = np.bincount(slot)[slot].astype(np.float32)  # at least 1: each row counts itself
-    both = np.bincount(pair)[pair].astype(np.float32)
+    alone, both = _occurrences(slot), _occurrences(pair)  # at least 1: each row counts itself
     return np.asarray(np.log2(alone) - np.log2(both - np.float32(0.5)), dtype=np.float32)
+
+
+class _Scratch(threading.local):
+    """Counters that are all 0 between uses: a new table for each use would cost more than what is counted in it."""
+
+    def __init__(self) -> None:
+        self.counters = np.zeros(_TABLE, dtype=np.uint32)
+
+
+_scratch = _Scratch()
+
+
+def _occurrences(slot: NDArray[np.int64]) -> NDArray[np.float32]:
+    """How often each number occurs among all, same shape."""
+    counters = _scratch.counters
+    np.add.at(counters, slot, np.uint32(1))
+    found = counters[slot].astype(np.float32)
+    counters[slot] = 0
+    return found
 
 
 def windows_in_common(mine: Fingerprints, its: Fingerprints) -> NDArray[np.int64]:

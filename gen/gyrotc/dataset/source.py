@@ -46,6 +46,7 @@ class _LastRead:
 
     def __init__(self) -> None:
         self._kept: OrderedDict[Source, dict[str, Floats]] = OrderedDict()
+        self._size = 0
         self._lock = Lock()
 
     def of(self, file: Source) -> dict[str, Floats]:
@@ -56,9 +57,10 @@ class _LastRead:
         for values in columns.values():
             values.flags.writeable = False
         with self._lock:
+            self._size += _bytes(columns) - _bytes(self._kept.pop(file, {}))
             self._kept[file] = columns
-            while sum(_bytes(c) for c in self._kept.values()) > _KEPT_BYTES:
-                self._kept.popitem(last=False)
+            while self._size > _KEPT_BYTES:
+                self._size -= _bytes(self._kept.popitem(last=False)[1])
 
 
 def _bytes(columns: dict[str, Floats]) -> int:

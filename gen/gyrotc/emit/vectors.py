@@ -144,10 +144,14 @@ def _stepped(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 
 def _after(steps: NDArray[np.uint32], x: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """States after some steps, by what these make of each bit."""
+    """States after some steps, by what these make of each bit; looked up for eight bits at once."""
     result = np.zeros_like(x)
-    for bit in range(32):
-        result ^= ((x >> np.uint32(bit)) & np.uint32(1)) * steps[bit]
+    octets = np.arange(256, dtype=np.uint32)
+    for first in range(0, 32, 8):
+        made = np.zeros(256, dtype=np.uint32)
+        for bit in range(8):
+            made ^= ((octets >> np.uint32(bit)) & np.uint32(1)) * steps[first + bit]
+        result ^= made[(x >> np.uint32(first)) & np.uint32(255)]
     return result
 
 

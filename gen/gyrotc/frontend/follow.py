@@ -262,13 +262,12 @@ def _closings(
     good = valid[blocks]
     full = good & (blocks - latest + 1 >= window)
     slope = np.zeros_like(mean[blocks])
-    used = [valid[blocks[full] - (window - 1) + k] for k in range(window)]
-    enough = np.zeros(int(full.sum()), dtype=np.int64)
-    for there in used:
-        enough = enough + there
-    d = [arithmetic.diff(mean[blocks[full] - (window - 1) + k], mean[blocks[full]]) for k in range(window)]
-    steep = arithmetic.slope(d, list(range(window)), used)
-    sure = enough >= max(2, (window + 1) // 2)
+    last = blocks[full]
+    at = last - (window - 1) + np.arange(window)[:, None]
+    used = valid[at]
+    d = arithmetic.diff(mean[at], mean[last])
+    steep = arithmetic.slope(d, used)
+    sure = np.count_nonzero(used, axis=0) >= max(2, (window + 1) // 2)
     slope[full] = np.where(sure, steep, slope.dtype.type(0))
     warming = ~full
     warming[full] = ~sure

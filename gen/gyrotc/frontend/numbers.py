@@ -40,8 +40,13 @@ class Arithmetic(Protocol):
 
     def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers: ...
 
-    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
-        """Least-squares slope of differences d at abscissae k where `used`; 0 where under two are."""
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        """Least-squares slope of differences d at abscissae 0, 1, ... where `used`; 0 where under two are.
+
+        Args:
+            d: Shape (abscissae, n).
+            used: The same shape.
+        """
 
 
 class _F32:
@@ -72,14 +77,15 @@ class _F32:
         quotient = total / n.astype(np.float32)
         return np.asarray(base + quotient)
 
-    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
-        sum_d = np.zeros_like(d[0])
-        sum_kd = np.zeros_like(d[0])
-        for one, abscissa, there in zip(d, k, used, strict=True):
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        sum_d, sum_kd = np.zeros_like(d[0]), np.zeros_like(d[0])
+        everywhere = used.all()
+        for abscissa, one in enumerate(d):
             product = np.float32(abscissa) * one
-            sum_d = np.where(there, sum_d + one, sum_d)
-            sum_kd = np.where(there, sum_kd + product, sum_kd)
-        n, sum_k, sum_kk = moments(k, used)
+            there = True if everywhere else used[abscissa]
+            np.add(sum_d, one, out=sum_d, where=there)
+            np.add(sum_kd, product, out=sum_kd, where=there)
+        n, sum_k, sum_kk = moments(used)
         den = n * sum_kk - sum_k * sum_k
         first = n.astype(np.float32) * sum_kd
         second = sum_k.astype(np.float32) * sum_d
@@ -88,16 +94,14 @@ class _F32:
 
 
 def moments(
-    k: list[int], used: list[NDArray[np.bool_]]
+    used: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """n, Σk, Σk² over the abscissae in use."""
-    zero = np.zeros(used[0].shape, dtype=np.int64)
-    n, sum_k, sum_kk = zero, zero, zero
-    for abscissa, there in zip(k, used, strict=True):
-        n = n + there
-        sum_k = sum_k + abscissa * there
-        sum_kk = sum_kk + abscissa * abscissa * there
-    return n, sum_k, sum_kk
+    """n, Σk, Σk² over the abscissae k = 0, 1, ... in use, shape (n,) each."""
+    k = np.arange(len(used), dtype=np.int64)
+    if used.all():  # as almost everywhere
+        n, sum_k, sum_kk = (np.full(used.shape[1], total) for total in (k.size, k.sum(), (k * k).sum()))
+        return n, sum_k, sum_kk
+    return np.count_nonzero(used, axis=0), k @ used, (k * k) @ used
 
 
 class _Q31:
@@ -127,13 +131,12 @@ class _Q31:
     def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
         return np.asarray(base + divided(total, n))
 
-    def slope(self, d: list[Numbers], k: list[int], used: list[NDArray[np.bool_]]) -> Numbers:
-        sum_d = np.zeros_like(d[0])
-        sum_kd = np.zeros_like(d[0])
-        for one, abscissa, there in zip(d, k, used, strict=True):
-            sum_d = sum_d + one * there
-            sum_kd = sum_kd + abscissa * one * there
-        n, sum_k, sum_kk = moments(k, used)
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        sum_d, sum_kd = np.zeros_like(d[0]), np.zeros_like(d[0])
+        for abscissa, one in enumerate(d * used):
+            sum_d += one
+            sum_kd += abscissa * one
+        n, sum_k, sum_kk = moments(used)
         den = n * sum_kk - sum_k * sum_k
         return divided(n * sum_kd - sum_k * sum_d, np.where(den > 0, den, 1))
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..metrics import MAD_TO_SIGMA
+from ..metrics import MAD_TO_SIGMA, median, middle_of_five
 
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
@@ -75,7 +75,7 @@ def _running(values: Floats) -> Floats:
     if len(values) <= half:
         return np.full(len(values), np.median(values))
     windows = sliding_window_view(np.pad(values, half, mode="reflect"), _AROUND)
-    return np.asarray(np.partition(windows, half, axis=1)[:, half])
+    return middle_of_five(*windows.T)
 
 
 def _largest_around(values: Floats) -> Floats:
@@ -96,7 +96,7 @@ def _scale(rate: Floats, rest: Floats, n: int) -> Floats:
     moved = step[step > 0.0]
     if len(moved) == 0:
         return np.full(len(rate), np.inf)
-    least = MAD_TO_SIGMA * float(np.median(moved)) / np.sqrt(2.0)
+    least = MAD_TO_SIGMA * median(moved) / np.sqrt(2.0)
     group = min(max(_GROUP, _GROUP_BLOCKS * n), len(rate))
     whole = len(rate) // group * group
     of_steps = np.median(step[:whole].reshape(-1, group), axis=1) / np.sqrt(2.0)

@@ -7,6 +7,7 @@ from figures alone: no name of a file, folder or serial plays a part.
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -196,7 +197,7 @@ def _contradictions(
         if len(members) < 2:
             continue
         if len(members) > 2:
-            others = [float(np.median(mean[members]))] * len(members)
+            others = [statistics.median(mean[members].tolist())] * len(members)
         else:  # of two, each against the other
             others = [float(mean[m]) for m in members[::-1]]
         for m, other in zip(members, others, strict=True):

@@ -70,9 +70,9 @@ def sign_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     curves = [_curve(f) for f in runs]
     for k, f in enumerate(runs):
         others = [c for j, c in enumerate(curves) if j != k]
-        mine = [_correlation(curves[k], other) for other in others]
-        if max(mine) >= -_ALIKE:
+        if any(_correlation(curves[k], other) >= -_ALIKE for other in others):
             continue
+        mine = [_correlation(curves[k], other) for other in others]
         among = [_correlation(a, b) for i, a in enumerate(others) for b in others[i + 1 :]]
         if min(among) > _ALIKE:
             yield {
@@ -90,7 +90,12 @@ def sign_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
 def _curve(f: RunFacts) -> dict[int, float]:
     """Mean rate at each degree, deg/h."""
     place = np.round(f.temperatures_c / _PLACE_C).astype(np.int64)
-    return {int(p): float(f.rates_dph[place == p].mean()) for p in np.unique(place)}
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.diff(place[order], prepend=place[order[0]] - 1))
+    rates = np.split(f.rates_dph[order], starts[1:])
+    return {
+        p: float(np.add.reduce(of) / len(of)) for p, of in zip(place[order[starts]].tolist(), rates, strict=True)
+    }
 
 
 def _correlation(one: dict[int, float], other: dict[int, float]) -> float:

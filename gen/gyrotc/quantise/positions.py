@@ -87,8 +87,9 @@ class Surface:
 
 
 def _add_products(total: Floats, weights: Floats, a: Floats, b: Floats) -> Floats:
+    product = np.empty_like(total)
     for k, weight in enumerate(weights):
-        total = total + (weight * a[:, k])[:, None] * b[None, :, k]
+        total += np.multiply((weight * a[:, k])[:, None], b[None, :, k], out=product)
     return total
 
 

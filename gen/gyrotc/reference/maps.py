@@ -28,10 +28,12 @@ def evaluate_map(
         Statuses, shape (n,), and the bits of the biases (0 where the status is negative).
     """
     numbers = table.numbers(inputs)
-    usable = ~np.any(_is_missing(table, numbers), axis=1)
+    missing = _is_missing(table, numbers)
+    usable = ~(missing[:, 0] | missing[:, 1])
     x = np.where(usable[:, None], numbers, table.numbers(table.envelope)[[0, 2]])
     low, high = table.numbers(table.envelope).reshape(2, 2).T
-    status = np.where(np.any((x < low) | (x > high), axis=1), CLAMPED, 0)
+    beyond = (x < low) | (x > high)
+    status = np.where(beyond[:, 0] | beyond[:, 1], CLAMPED, 0)
     x = np.minimum(np.maximum(x, low), high)
     if table.numeric == "f32":
         points = f32.normalise(table, x, fused)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..metrics import median
 
 __all__ = [
     "Bins",
@@ -21,6 +22,7 @@ __all__ = [
     "gather",
     "joined",
     "scaling_of",
+    "weighted_mean",
 ]
 
 Floats = NDArray[np.float64]
@@ -28,6 +30,7 @@ Floats = NDArray[np.float64]
 # Floors of the scale, so that a constant input is not divided by 0.
 _MIN_HALF_RANGE_C = 1.0
 _MIN_HALF_RANGE_C_PER_MIN = 0.05  # rates of a chamber at rest must not be blown up to a whole range
+_MOST_PLACES = 2**16  # of a table by cell: more, of inputs far beyond the range, are sorted instead
 _BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
 
 
@@ -196,14 +199,39 @@ class Cells:
 
 def cells_of(data: TrainingData, length_s: float) -> Cells:
     """Cells of `average`."""
-    if float(np.median(data.duration_s)) > 0.5 * length_s:
+    if _mostly_above(data.duration_s, 0.5 * length_s):
         return Cells(None, data.weight, data.weight)
-    next_run = np.diff(data.run) != 0
-    starts = np.r_[0, np.flatnonzero(next_run) + 1]
-    origin = np.repeat(data.time_s[starts], np.diff(np.r_[starts, len(data)]))
+    next_run = data.run[1:] != data.run[:-1]
+    starts = np.concatenate([[0], next_run.nonzero()[0] + 1])
+    origin = np.repeat(data.time_s[starts], np.diff(starts, append=len(data)))
     cell = np.floor((data.time_s - origin) / length_s + 1e-9)
-    edges = np.r_[0, np.flatnonzero(next_run | (np.diff(cell) != 0)) + 1]
+    edges = np.concatenate([[0], (next_run | (cell[1:] != cell[:-1])).nonzero()[0] + 1])
     return Cells(edges, data.weight, np.add.reduceat(data.weight, edges))
+
+
+def _mostly_above(values: Floats, bound: float) -> bool:
+    """Whether the median is above a bound; most often all values are one."""
+    if values.min() > bound:
+        return True
+    return bool(values.max() > bound and median(values) > bound)
+
+
+def weighted_mean(values: Floats, weight: Floats) -> float:
+    """That of `np.average`, whose checks cost more than it; the weights add up to more than 0."""
+    return float((values * weight).sum() / weight.sum())
+
+
+def _numbered(cell_t: NDArray[np.int64], cell_r: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Cells that hold samples, numbered in order of T, then of dT/dt."""
+    first_t, first_r = int(cell_t.min()), int(cell_r.min())
+    width = int(cell_r.max()) - first_r + 1
+    places = (int(cell_t.max()) - first_t + 1) * width
+    place = (cell_t - first_t) * width + (cell_r - first_r)
+    if places > _MOST_PLACES:
+        return np.unique(place, return_inverse=True)[1]
+    there = np.zeros(places, dtype=bool)
+    there[place] = True
+    return np.asarray((np.cumsum(there) - 1)[place])
 
 
 def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:
@@ -213,7 +241,7 @@ def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:
     """
     cell_t = np.floor(t * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
     cell_r = np.floor(r * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
-    _, index = np.unique(cell_t * 1_000_003 + cell_r, return_inverse=True)
+    index = _numbered(cell_t, cell_r)
     count = np.asarray(np.bincount(index, weight), dtype=np.float64)
     mean = np.bincount(index, weight * y) / count
     return Bins(

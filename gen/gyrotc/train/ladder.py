@@ -24,7 +24,7 @@ without each stretch; the network that is emitted follows it to within a tenth o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,11 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metrics import LEAST_SPAN_C
-from .data import Scaling, TrainingData, average, cells_of
+from .data import Scaling, TrainingData, average, cells_of, weighted_mean
 from .paired import more_than_its_error, of_pieces, surely_above_0, t_statistic
 from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .residual_noise import difference_sigma
-from .simple import SIMPLE, columns_of, design, solve
+from .simple import SIMPLE, all_solved, powers_of
 from .spans import Fold, history_folds
 
 __all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb", "pieces_of"]
@@ -250,22 +250,21 @@ def _squares(
     flat = limits[0][1] - limits[0][0] < LEAST_SPAN_C
     cells, asked = cells_of(held, average_s), _Places.of(*at)
     places = _Places.of(*scaling.normalise(rest.temperature_c, rest.slope_c_per_min))
+    taught = _Taught(rest, places, kept[~fold.near], process)
     squares = []
     for name in RUNGS:
-        taught = "constant" if flat and name != "nothing" else name
         try:
-            correction = _taught(taught, rest, places, kept[~fold.near], process)
+            correction = taught.correction("constant" if flat and name != "nothing" else name, asked)
         except TrainingFailed:
             squares.append(np.nan)
             continue
-        left = cells.mean(held.bias_dph - correction(asked))
-        squares.append(float(np.average(left**2, weights=cells.weight)))
+        squares.append(weighted_mean(cells.mean(held.bias_dph - correction) ** 2, cells.weight))
     return squares
 
 
 @dataclass(frozen=True, slots=True)
 class _Places:
-    """Normalised inputs, and their powers as `cubic_slope` has them: of these are the columns of all simple rungs."""
+    """Normalised inputs, and their powers: of these are the columns of all simple rungs."""
 
     t: Floats
     r: Floats
@@ -273,28 +272,39 @@ class _Places:
 
     @classmethod
     def of(cls, t: Floats, r: Floats) -> _Places:
-        return cls(t, r, design("cubic_slope", t, r))
+        return cls(t, r, powers_of(t, r))
 
 
-Correction = Callable[[_Places], Floats]
+class _Taught:
+    """Every rung fitted to what remains.
 
-
-def _taught(
-    name: str, rest: TrainingData, at: _Places, known: NDArray[np.bool_], process: Process | None
-) -> Correction:
-    """A rung fitted to what remains: a function of normalised inputs, deg/h.
-
-    Raises:
-        TrainingFailed: The map cannot be fitted.
+    Args:
+        rest: Means that are not left out.
+        at: Their places.
+        known: Which of them the process has kept.
+        process: Of the whole record; None: there is none.
     """
-    if name == "nothing":
-        return lambda asked: np.zeros(len(asked.t))
-    if name in SIMPLE:
-        center = float(np.average(rest.bias_dph, weights=rest.weight))
-        found = solve(columns_of(name, at.powers), rest.bias_dph - center, rest.weight)
-        return lambda asked: center + columns_of(name, asked.powers) @ found
-    if process is None:
-        raise TrainingFailed("there is no evidence process")
-    of_rate = 1.0 if name == "mrbf" else 0.0
-    mean = conditioned(process, at.t[known], of_rate * at.r[known], rest.bias_dph[known], rest.weight[known])
-    return lambda asked: mean(asked.t, of_rate * asked.r)
+
+    def __init__(
+        self, rest: TrainingData, at: _Places, known: NDArray[np.bool_], process: Process | None
+    ) -> None:
+        self._rest, self._at, self._known, self._process = rest, at, known, process
+        self._center = weighted_mean(rest.bias_dph, rest.weight)
+        self._simple = all_solved(at.powers, rest.bias_dph - self._center, rest.weight)
+
+    def correction(self, name: str, asked: _Places) -> Floats:
+        """What a rung says at places, deg/h.
+
+        Raises:
+            TrainingFailed: The map cannot be fitted.
+        """
+        if name == "nothing":
+            return np.zeros(len(asked.t))
+        if name in SIMPLE:
+            return np.asarray(self._center + asked.powers @ self._simple[name])
+        if self._process is None:
+            raise TrainingFailed("there is no evidence process")
+        known, of_rate = self._known, 1.0 if name == "mrbf" else 0.0
+        t, r = self._at.t[known], of_rate * self._at.r[known]
+        mean = conditioned(self._process, t, r, self._rest.bias_dph[known], self._rest.weight[known])
+        return mean(asked.t, of_rate * asked.r)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..errors import GyrotcError
-from ..metrics import MAD_TO_SIGMA
-from .data import Bins, Scaling, TrainingData, average, gather
+from ..metrics import MAD_TO_SIGMA, median
+from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
 from .residual_noise import difference_sigma
 
 __all__ = ["MEAN_S", "Asked", "MapModel", "Process", "TrainingFailed", "conditioned", "fit_process"]
@@ -140,9 +140,9 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
     """
     means = average(data, MEAN_S)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
-    weight = means.weight / np.median(means.weight)
-    center = float(np.average(means.bias_dph, weights=weight))
-    spread = float(np.sqrt(np.average((means.bias_dph - center) ** 2, weights=weight)))
+    weight = means.weight / median(means.weight)
+    center = weighted_mean(means.bias_dph, weight)
+    spread = float(np.sqrt(weighted_mean((means.bias_dph - center) ** 2, weight)))
     spread = spread if spread > 0.0 else 1.0
     y = np.round((means.bias_dph - center) / spread * _GRID) / _GRID
     kept = np.ones(len(y), dtype=bool)
@@ -153,13 +153,13 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
         bins = gather(t[kept], r[kept], y[kept], weight[kept])
         model = _optimised(bins, least, start)
         residual = np.abs(y - model.mean(t, r)) * np.sqrt(weight)
-        robust = MAD_TO_SIGMA * float(np.median(residual[kept]))
+        robust = MAD_TO_SIGMA * median(residual[kept])
         inside = residual <= _TRIM_SIGMA * max(robust, _TRIM_NOISE * scale)
         settled = round_ == _TRIMS or np.array_equal(inside, kept)
         if settled or np.count_nonzero(~inside) > _TRIM_SHARE * len(inside):
             break
         kept, start = inside, model.log_parameters
-    seconds = float(np.median(means.duration_s))
+    seconds = median(means.duration_s)
     return Process(model, bins, t, r, y, weight, means.run, kept, center, spread, seconds)
 
 
@@ -189,9 +189,9 @@ def conditioned(
     Raises:
         TrainingFailed: The equations cannot be solved.
     """
-    center = float(np.average(bias_dph, weights=weight))
+    center = weighted_mean(bias_dph, weight)
     y = (bias_dph - center) / process.spread
-    bins = gather(t, r, y, weight / np.median(weight))
+    bins = gather(t, r, y, weight / median(weight))
     model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
     try:
         model.condition(process.model.log_parameters)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from ..metrics import MAD_TO_SIGMA
+from ..metrics import MAD_TO_SIGMA, median
 from .data import TrainingData, average
 
 __all__ = ["difference_sigma", "floor_dph", "not_white"]
@@ -24,7 +24,7 @@ def robust_sigma(x: Floats) -> float:
     """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
     if len(x) == 0:
         return 0.0
-    limit = _CLIP * MAD_TO_SIGMA * float(np.median(np.abs(x)))
+    limit = _CLIP * MAD_TO_SIGMA * median(np.abs(x))
     inside = x[np.abs(x) <= limit]
     return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
 
@@ -51,7 +51,7 @@ def difference_sigma(means: TrainingData, y: Floats, weight: Floats) -> float:
         y: Their bias in any unit.
         weight: The noise variance of a mean is σ²/weight.
     """
-    next_to = (np.diff(means.run) == 0) & (np.diff(means.time_s) < 1.5 * float(np.median(means.duration_s)))
+    next_to = (np.diff(means.run) == 0) & (np.diff(means.time_s) < 1.5 * median(means.duration_s))
     first = np.diff(y) / np.sqrt(1.0 / weight[1:] + 1.0 / weight[:-1])
     both = next_to[1:] & next_to[:-1]
     second = np.diff(y, 2) / np.sqrt(1.0 / weight[2:] + 4.0 / weight[1:-1] + 1.0 / weight[:-2])

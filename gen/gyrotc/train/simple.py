@@ -16,7 +16,7 @@ from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
 from .result import Network, Outcome, network
 
-__all__ = ["SIMPLE", "columns_of", "design", "fit_simple", "solve", "without_rate"]
+__all__ = ["SIMPLE", "all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +28,9 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "cubic_slope": ((0, 0), (1, 0), (0, 1), (2, 0), (3, 0)),
 }
 """Powers of (z_T, z_r) of each."""
+_FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
+"""How many of `powers_of` each has."""
+_DEPENDENT = 1e-8  # of a triangle's diagonal: such columns are told apart by a singular value decomposition alone
 
 # Number, width and outermost center of Gaussians, in half ranges. Largest error of z² and z³ over |z| <= 1, and sum of
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
@@ -48,12 +51,36 @@ def without_rate(fitted: Network) -> dict[str, Any]:
 
 def design(name: str, t: Floats, r: Floats) -> Floats:
     """Columns of a correction at normalised inputs, shape (n, powers)."""
-    return np.stack([t**a * r**b for a, b in SIMPLE[name]], axis=1)
+    of_t, of_r = (np.ones(len(t)), t, t * t, t * t * t), (None, r)
+    return np.stack([of_t[a] if of_r[b] is None else of_t[a] * of_r[b] for a, b in SIMPLE[name]], axis=1)
 
 
-def columns_of(name: str, richest: Floats) -> Floats:
-    """The columns of a correction among those of `cubic_slope`, which has all powers."""
-    return np.ascontiguousarray(richest[:, [SIMPLE["cubic_slope"].index(powers) for powers in SIMPLE[name]]])
+def powers_of(t: Floats, r: Floats) -> Floats:
+    """The powers that corrections are made of, in an order in which those of each come first, shape (n, 5)."""
+    columns = np.empty((len(t), 5), order="F")
+    columns[:, 0], columns[:, 1], columns[:, 4] = 1.0, t, r
+    np.multiply(t, t, out=columns[:, 2])
+    np.multiply(columns[:, 2], t, out=columns[:, 3])
+    return columns
+
+
+def all_solved(powers: Floats, y: Floats, weight: Floats) -> dict[str, Floats]:
+    """Weights of `powers_of`, 0 for those that a correction does without, of each of `SIMPLE`: as `solve` finds them.
+
+    One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
+    """
+    root = np.sqrt(weight / weight.max())
+    triangle = np.linalg.qr(np.column_stack([powers * root[:, None], y * root]), mode="r")
+    size = np.abs(np.diagonal(triangle)[:-1])
+    found = {}
+    for name, columns in _FIRST.items():
+        weights = np.zeros(powers.shape[1])
+        if size[:columns].min() > _DEPENDENT * size[:columns].max():
+            weights[:columns] = np.linalg.solve(triangle[:columns, :columns], triangle[:columns, -1])
+        else:
+            weights[:columns] = solve(powers[:, :columns], y, weight)
+        found[name] = weights
+    return found
 
 
 def solve(columns: Floats, y: Floats, weight: Floats) -> Floats:

@@ -179,12 +179,20 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
         return 1.0, 0.0
     squares, variance, noise = np.concatenate(rows, axis=1)
     plain, scale = _likeliest(squares, variance, noise, 0.0)
-    level = float(np.mean(variance + noise)) * _LEVELS
-    found = [(*_likeliest(squares, variance, noise, between), between) for between in level]
-    best, its_scale, between = min(found)
+    best, its_scale, between = np.inf, scale, 0.0
+    for level in float(np.mean(variance + noise)) * _LEVELS:
+        if _least_deviance(squares, level) <= best:
+            found = (*_likeliest(squares, variance, noise, level), level)
+            best, its_scale, between = min((best, its_scale, between), found)
     if plain - best <= _SIGNIFICANT:
         return scale, 0.0
     return its_scale, float(between) * of_few(len(rows))
+
+
+def _least_deviance(squares: Floats, between: float) -> float:
+    """What no deviance lies below for a variance between runs: a square is best explained by itself, or by that."""
+    total = np.maximum(squares, between)
+    return float(np.sum(squares / total + np.log(total)))
 
 
 def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metrics import MAD_TO_SIGMA, Averages
+from ...metrics import MAD_TO_SIGMA, Averages, median
 from ...results.fleet import ComparedRun, Facts, LikelyStep, ResidualSeries
 
 __all__ = ["BINS", "BIN_C", "FIRST_C", "NOISY_RUN", "facts_of", "step_in"]
@@ -37,7 +37,7 @@ def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
 def _shown(runs: Sequence[ComparedRun]) -> int:
     """The run that is drawn if the gyro stands apart: one much noisier than its others, else the likeliest step."""
     noise = np.array([run.noise_dph for run in runs])
-    if noise.max() > NOISY_RUN * np.median(noise):
+    if noise.max() > NOISY_RUN * median(noise):
         return int(np.argmax(noise))
     return int(np.argmax([run.step.score for run in runs]))
 
@@ -81,7 +81,7 @@ def _noise(residual: Array) -> float:
     """Noise of a mean from successive differences, of their bulk: steps and spikes do not count."""
     if residual.size < 3:
         return 0.0
-    return float(MAD_TO_SIGMA * np.median(np.abs(np.diff(residual))) / np.sqrt(2.0))
+    return float(MAD_TO_SIGMA * median(np.abs(np.diff(residual))) / np.sqrt(2.0))
 
 
 def step_in(residual: Array) -> tuple[int, float, float]:
@@ -96,7 +96,7 @@ def step_in(residual: Array) -> tuple[int, float, float]:
     if n < _LEAST_MEANS or sigma == 0.0:
         return 0, 0.0, 0.0
     calm = np.clip(
-        residual, *(np.median(residual) + np.array([-6.0, 6.0]) * max(sigma, float(residual.std())))
+        residual, *(median(residual) + np.array([-6.0, 6.0]) * max(sigma, float(residual.std())))
     )
     k = np.arange(1, n)
     before = np.cumsum(calm)[:-1] / k
