@@ -181,7 +181,9 @@ def test_variance_keeps_its_digits_where_hardly_any_noise_is_left(sigma: float) 
     reach = REACH * np.abs(t).max(), REACH * np.abs(r).max()
     phi, w_t, w_r = basis(t, r, *reach)
     root = np.sqrt(prior_variance(np.exp(log_p), w_t, w_r))
-    factor = np.linalg.qr(np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r")
+    factor = np.linalg.qr(
+        np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r"
+    )
     at = np.linspace(-1.0, 1.0, 37), np.linspace(0.9, -0.9, 37)
     columns, *_ = basis(*at, *reach)
     expected = np.sum(np.linalg.solve(factor.T, (columns * root).T) ** 2, axis=0)

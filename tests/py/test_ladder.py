@@ -13,10 +13,11 @@ import pytest
 from conftest import ROOT
 from gyrotc.dataset import load
 from gyrotc.train import Fit, TrainingData, fit, predict
+from gyrotc.train.data import gather
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guard import objection
 from gyrotc.train.ladder import RUNGS, Ladder
-from gyrotc.train.simple import SIMPLE, fit_simple
+from gyrotc.train.simple import SIMPLE, all_solved, design, fit_simple, powers_of, solve
 from gyrotc.train.spans import Fold, history_folds
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -267,3 +268,28 @@ def test_simple_corrections_are_least_squares() -> None:
         predict(found, data.temperature_c, data.slope_c_per_min), expected, atol=0.01 * found.noise_floor_dph
     )
     assert fit_simple("linear", data, found.scaling, 100.0).networks[0]["weights"] == []
+
+
+@pytest.mark.parametrize("still", [False, True])
+def test_one_factor_gives_all_simple_rungs_as_least_squares_does(still: bool) -> None:
+    """At one dT/dt columns depend on one another, and the smallest of equally good weights counts."""
+    rng = np.random.default_rng(3)
+    t, r = rng.uniform(-1.0, 1.0, (2, 500))
+    r = np.zeros(500) if still else r
+    weight, y = rng.uniform(0.5, 4.0, 500), rng.normal(size=500)
+    found = all_solved(powers_of(t, r), y, weight)
+    for name in SIMPLE:
+        expected = design(name, t, r) @ solve(design(name, t, r), y, weight)
+        np.testing.assert_allclose(powers_of(t, r) @ found[name], expected, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("reach", [1.0, 30.0])
+def test_samples_are_gathered_by_cell_in_order_of_temperature(reach: float) -> None:
+    """By a table where cells are few, by sorting where inputs lie far beyond the range."""
+    rng = np.random.default_rng(4)
+    t, r, y = rng.uniform(-reach, reach, (3, 700))
+    bins = gather(t, r, y, np.ones(700))
+    cells = np.floor(np.stack([t, r], axis=1) * 50 + 0.5).astype(np.int64)
+    keys, index = np.unique(cells, axis=0, return_inverse=True)
+    assert len(bins.count) == len(keys) and bins.samples == 700
+    np.testing.assert_allclose(bins.t * bins.count, np.bincount(index.reshape(-1), t), atol=1e-12)

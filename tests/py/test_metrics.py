@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.metrics import average, pooled, statistics, time_statistics
+from gyrotc.metrics import average, median, middle_of_five, pooled, statistics, time_statistics
 
 
 def _averages(values: np.ndarray, period: float = 10.0, average_s: float = 100.0, **scored: np.ndarray):
@@ -56,3 +56,15 @@ def test_constant_residual_turns_by_its_rate_times_one_hour() -> None:
     assert figures["rms_30min_dph"] == pytest.approx(2.0)
     assert figures["first_10min_rms_dph"] == pytest.approx(2.0)
     assert time_statistics(_averages(np.ones(50)), 100.0)["angle_1h_arcsec"] is None
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 10, 2880, 2881])
+def test_medians_are_those_of_numpy_to_the_bit(n: int) -> None:
+    rng = np.random.default_rng(n)
+    for values in (rng.normal(size=n), np.round(rng.normal(size=n), 1), np.zeros(n)):
+        before = values.copy()
+        assert median(values) == np.median(before)
+        np.testing.assert_array_equal(values, before)
+        assert median(values, overwrite_input=True) == np.median(before)
+    five = np.round(rng.normal(size=(5, n)), 1)
+    np.testing.assert_array_equal(middle_of_five(*five), np.median(five, axis=0))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.dataset import load
-from gyrotc.dataset.shared import fingerprints_of, windows_in_common, windows_that_repeat
+from gyrotc.dataset.shared import _occurrences, fingerprints_of, windows_in_common, windows_that_repeat
 from gyrotc.errors import InputError
 from gyrotc.jobs.fleet.copies import copies
 from gyrotc.judge.check import check
@@ -122,3 +122,9 @@ def test_values_beyond_float32_are_no_trouble() -> None:
     time = np.arange(2048.0)
     wild = np.full(2048, 1e276)
     fingerprints_of(time, wild, [wild])
+
+
+def test_occurrences_start_from_none_each_time() -> None:
+    for _ in range(2):
+        found = _occurrences(np.array([7, 3, 7, 2**20 - 1, 7]))
+        np.testing.assert_array_equal(found, [3.0, 1.0, 3.0, 1.0, 3.0])

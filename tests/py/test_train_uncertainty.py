@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty
+from gyrotc.train.uncertainty import _least_deviance, _likeliest
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 
@@ -89,3 +90,13 @@ def test_a_single_run_is_cut_into_spans() -> None:
     assert sigma.shape == (3, 4)
     assert np.isfinite(sigma).all()
     assert (sigma > 0.0).all()
+
+
+def test_no_deviance_lies_below_what_leaves_a_level_out() -> None:
+    """Levels between runs are left out by a bound: no level that it leaves out may be the likeliest."""
+    rng = np.random.default_rng(5)
+    for size in (1e-8, 1.0, 1e6):
+        squares, variance, noise = size * rng.chisquare(1, (3, 40)) * 10.0 ** rng.uniform(-3.0, 3.0, (3, 40))
+        for between in size * 10.0 ** rng.uniform(-6.0, 6.0, 20):
+            deviance, _ = _likeliest(squares, variance, noise, float(between))
+            assert _least_deviance(squares, float(between)) <= deviance + 1e-9

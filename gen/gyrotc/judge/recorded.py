@@ -94,7 +94,8 @@ def _curve(f: RunFacts) -> dict[int, float]:
     starts = np.flatnonzero(np.diff(place[order], prepend=place[order[0]] - 1))
     rates = np.split(f.rates_dph[order], starts[1:])
     return {
-        p: float(np.add.reduce(of) / len(of)) for p, of in zip(place[order[starts]].tolist(), rates, strict=True)
+        p: float(np.add.reduce(of) / len(of))
+        for p, of in zip(place[order[starts]].tolist(), rates, strict=True)
     }
 
 

@@ -228,7 +228,7 @@ def _numbered(cell_t: NDArray[np.int64], cell_r: NDArray[np.int64]) -> NDArray[n
     places = (int(cell_t.max()) - first_t + 1) * width
     place = (cell_t - first_t) * width + (cell_r - first_r)
     if places > _MOST_PLACES:
-        return np.unique(place, return_inverse=True)[1]
+        return np.asarray(np.unique(place, return_inverse=True)[1], dtype=np.int64)
     there = np.zeros(places, dtype=bool)
     there[place] = True
     return np.asarray((np.cumsum(there) - 1)[place])

@@ -30,7 +30,9 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
 """Powers of (z_T, z_r) of each."""
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
 """How many of `powers_of` each has."""
-_DEPENDENT = 1e-8  # of a triangle's diagonal: such columns are told apart by a singular value decomposition alone
+_DEPENDENT = (
+    1e-8  # of a triangle's diagonal: such columns are told apart by a singular value decomposition alone
+)
 
 # Number, width and outermost center of Gaussians, in half ranges. Largest error of z² and z³ over |z| <= 1, and sum of
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
@@ -51,8 +53,8 @@ def without_rate(fitted: Network) -> dict[str, Any]:
 
 def design(name: str, t: Floats, r: Floats) -> Floats:
     """Columns of a correction at normalised inputs, shape (n, powers)."""
-    of_t, of_r = (np.ones(len(t)), t, t * t, t * t * t), (None, r)
-    return np.stack([of_t[a] if of_r[b] is None else of_t[a] * of_r[b] for a, b in SIMPLE[name]], axis=1)
+    of_t = np.ones(len(t)), t, t * t, t * t * t
+    return np.stack([of_t[a] * r if b else of_t[a] for a, b in SIMPLE[name]], axis=1)
 
 
 def powers_of(t: Floats, r: Floats) -> Floats:
@@ -70,7 +72,8 @@ def all_solved(powers: Floats, y: Floats, weight: Floats) -> dict[str, Floats]:
     One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
     """
     root = np.sqrt(weight / weight.max())
-    triangle = np.linalg.qr(np.column_stack([powers * root[:, None], y * root]), mode="r")
+    factors: Any = np.linalg.qr(np.column_stack([powers * root[:, None], y * root]), mode="r")
+    triangle = np.asarray(factors, dtype=np.float64)  # without the orthogonal one
     size = np.abs(np.diagonal(triangle)[:-1])
     found = {}
     for name, columns in _FIRST.items():

@@ -95,9 +95,7 @@ def step_in(residual: Array) -> tuple[int, float, float]:
     sigma = _noise(residual)
     if n < _LEAST_MEANS or sigma == 0.0:
         return 0, 0.0, 0.0
-    calm = np.clip(
-        residual, *(median(residual) + np.array([-6.0, 6.0]) * max(sigma, float(residual.std())))
-    )
+    calm = np.clip(residual, *(median(residual) + np.array([-6.0, 6.0]) * max(sigma, float(residual.std()))))
     k = np.arange(1, n)
     before = np.cumsum(calm)[:-1] / k
     after = (calm.sum() - np.cumsum(calm)[:-1]) / (n - k)
