@@ -38,6 +38,9 @@ _LEVEL = 0.01  # familywise level of the search (docs/diagnosis.md)
 _MOVING = 0.1  # C/min
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _WITHIN_95 = float(chdtri(1, 0.05))  # fall of 2 log likelihood of one parameter at 95 % (Wilks 1938)
+_SHOWN = (
+    -40.0
+)  # of 2 log likelihood below its top: ten times the fall at 95 %, beyond which nothing is to be seen
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
 _MOST_PANELS = 6  # runs with events that are drawn
 
@@ -282,10 +285,13 @@ def _before_and_after(before: Sequence[Averages], after: Sequence[Averages], ave
 
 
 def _likelihood(cause: Refined) -> str | None:
-    """Profile likelihood of the parameter of a cause, with its 95 % interval."""
+    """Profile likelihood of the parameter of a cause where it is near its top, with its 95 % interval."""
     if cause.profile is None:
         return None
     x, gain = cause.profile
+    near = np.flatnonzero(gain - gain.max() >= _SHOWN)
+    some = slice(max(int(near[0]) - 1, 0), int(near[-1]) + 2)
+    x, gain = x[some], gain[some]
     name = next(n for n in cause.parameters if n in cause.candidate.values)
     interval = cause.parameters[name]
     with mpl.rc_context(STYLE):
@@ -294,7 +300,7 @@ def _likelihood(cause: Refined) -> str | None:
         ax.axvspan(interval.low, interval.high, color=AFTER, alpha=0.12, linewidth=0)
         ax.plot(x, gain - gain.max(), "o-", color=AFTER, markersize=3, linewidth=1.0)
         ax.axhline(-_WITHIN_95, color=ACCENT, linewidth=0.6, linestyle="--")
-        ax.set_ylim(bottom=max(-40.0, float((gain - gain.max()).min()) * 1.05))
+        ax.set_ylim(bottom=max(_SHOWN, float((gain - gain.max()).min()) * 1.05))
         ax.set_xlabel(name)
         ax.set_ylabel("2 Δ log likelihood")
         ax.set_title(CATALOGUE[cause.candidate.id].words.name, fontsize=8, loc="left")

@@ -41,23 +41,23 @@ def parabola_top(
 
 
 def profile_interval(profile: Array) -> tuple[float, float]:
-    """Where a profile has fallen by the 95 % quantile of one parameter; its ends where it has not.
+    """The least interval with every value whose likelihood is not below the 95 % quantile of one parameter.
+
+    A profile may have several tops, as that of a wave's period has; what lies between two of them belongs to it.
 
     Args:
-        profile: Parameter values, ascending, and twice the log-likelihoods, shape (2, n); linear between.
+        profile: Parameter values, ascending, and twice the log-likelihoods, shape (2, n); linear between. Its ends are
+            those of the interval where it has not fallen.
     """
     x, e = profile
-    top = int(e.argmax())
-    drop = e[top] - CHI2_95_ONE
-    low, high = float(x[0]), float(x[-1])
-    for i in range(top, 0, -1):
-        if e[i - 1] < drop:
-            low = float(np.interp(drop, [e[i - 1], e[i]], [x[i - 1], x[i]]))
-            break
-    for i in range(top, x.size - 1):
-        if e[i + 1] < drop:
-            high = float(np.interp(drop, [e[i + 1], e[i]], [x[i + 1], x[i]]))
-            break
+    drop = float(e.max()) - CHI2_95_ONE
+    inside = np.flatnonzero(e >= drop)
+    first, last = int(inside[0]), int(inside[-1])
+    low, high = float(x[first]), float(x[last])
+    if first > 0:
+        low = float(np.interp(drop, e[first - 1 : first + 1], x[first - 1 : first + 1]))
+    if last < x.size - 1:
+        high = float(np.interp(drop, e[[last + 1, last]], x[[last + 1, last]]))
     return low, high
 
 

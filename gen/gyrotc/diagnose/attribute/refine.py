@@ -161,7 +161,10 @@ def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tupl
 
 
 def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]:
-    """Profile likelihood of the k-th member's parameter around its optimum, and the optimum."""
+    """Profile likelihood of the k-th member's parameter over the search's grid and about its optimum, and the optimum.
+
+    Only about the optimum where the cause changes the map's input: a point of its grid is a map of its own.
+    """
     parameter = shape_parameter(members[k].id)
     assert parameter is not None
     points: dict[float, float] = {}
@@ -171,7 +174,11 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]
             points[value] = fit.energy([*members[:k], _moved(members[k], value), *members[k + 1 :]])
         return points[value]
 
-    here = members[k].values[parameter.name]
+    energy(members[k].values[parameter.name])
+    if members[k].role == "columns":
+        for values in searched(members[k].id).grid(reach_of(fit.search.records)):
+            energy(values[parameter.name])
+    here = max(points, key=lambda v: points[v])
     width = _local_width(fit, members[k], here)
     low = -np.inf if parameter.signed else 0.05 * here
     for shrink in (1.0, 0.35):
