@@ -96,6 +96,25 @@ def test_what_is_within_a_standard_error_but_worse_than_a_cubic_is_not_taken() -
     assert ladder(constant=[30.0, 40.0, 35.0, 20.0], cubic=[300.0, 5.0, 400.0, 9.0]).chosen() == "constant"
 
 
+def test_what_gains_at_the_ends_of_temperature_alone_is_no_reason_to_ship() -> None:
+    """A wave of no use on whole runs was shipped for the hottest and the coldest tenth, which belong to all runs."""
+    plain = [1.07, 1.12, 1.96, 1.05, 1.07, 1.06, 1.63, 2.06]
+    only_ends = [1.082, 1.104, 1.964, 1.042, 1.072, 1.063, 1.42, 1.73]
+    everywhere = [0.9 * x for x in plain]
+
+    def of_runs_and_ends(rms: list[float]) -> Ladder:
+        whole = np.ones(4, dtype=bool)
+        folds = [Fold("run", k, k, whole, whole) for k in range(6)]
+        folds += [Fold("hottest", -1, -1, whole, whole), Fold("coldest", -1, -1, whole, whole)]
+        table = np.array([rms if name.startswith("mrbf") else [40.0] * 8 for name in RUNGS]).T
+        return Ladder(folds, table, 0.5 * np.log(table**2 + 1.0), 1.0, np.array([*range(6), -1, -1]))
+
+    before = of_runs_and_ends(plain)
+    assert before.beaten_by("mrbf_t", of_runs_and_ends(everywhere), "mrbf")
+    assert not before.beaten_by("mrbf_t", of_runs_and_ends(only_ends), "mrbf")
+    assert not before.beaten_by("mrbf_t", before, "mrbf")
+
+
 def test_no_fold_is_a_random_sample_and_every_one_keeps_its_distance() -> None:
     data = samples(0)
     folds = history_folds(data, data.run)

@@ -125,7 +125,9 @@ class Ladder:
         """Whether a rung of another ladder, over the same stretches, is what this one would choose above `name`.
 
         It must be better than `name` by more than a standard error of the paired difference, in score and in mean
-        square, and better than this ladder's constant as `beats_constant` asks.
+        square, over all stretches and over independent pieces of history alone, and better than this ladder's constant
+        as `beats_constant` asks. Pieces alone: stretches overlap, and the ends of the range of temperature count
+        among them; what gains at the ends and nowhere else has been seen twice, not in many runs.
         """
         own, others = RUNGS.index(name), RUNGS.index(rung)
         if len(self.folds) < 2 or not np.all(np.isfinite(other.score[:, others])):
@@ -137,7 +139,8 @@ class Ladder:
             score[:, own], rms[:, own] = self.score[:, top], self.rms_dph[:, top]
         score[:, top], rms[:, top] = other.score[:, others], other.rms_dph[:, others]
         both = replace(self, score=score, rms_dph=rms)
-        return both._clearly_worse(own, top) and both.beats_constant("mrbf")
+        pieces = (of_pieces(v[:, own] - v[:, top], self.pieces) for v in (score, rms**2))
+        return both._clearly_worse(own, top) and more_than_its_error(*pieces) and both.beats_constant("mrbf")
 
     def rows(self, chosen: str) -> list[dict[str, Any]]:
         """`ladder` of `training.json`: RMS over the stretches, all counting alike, with its standard error."""
