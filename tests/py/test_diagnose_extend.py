@@ -10,7 +10,7 @@ import pytest
 from gyrotc.dataset import Dataset, load
 from gyrotc.diagnose.extend.extension import extend
 from gyrotc.diagnose.extend.gain import gain_of
-from gyrotc.diagnose.extend.refit import Effect, samples
+from gyrotc.diagnose.extend.refit import Effect, known, samples
 from gyrotc.diagnose.extend.refitting import Refitting, folds_of
 from gyrotc.diagnose.extend.shipping import shipping
 from gyrotc.diagnose.result import diagnose
@@ -98,6 +98,34 @@ def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     assert shipping(blind, [GRADIENT, wrong]).shipped == [GRADIENT], "what makes it worse is left"
     offset = replace(GRADIENT, id="turn_on_offset", values={"sigma_dph": 1e-3})
     assert shipping(blind, [offset]).shipped == [], "no table holds it"
+
+
+def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_path: Path) -> None:
+    """The temperature of a run's end was held where the record did not have it: the right shift made exams worse."""
+    print("seed", SEED + 1)
+    rng, late, time = np.random.default_rng(SEED + 1), 300.0, 10.0 * np.arange(720)
+
+    def true_c(at: np.ndarray, k: int) -> np.ndarray:
+        return 20.0 + 30.0 * np.sin(2.0 * np.pi * at / (3100.0 + 700.0 * k) + k)
+
+    for k in range(4):
+        rate = 0.01 + 2e-4 * true_c(time, k) + 1e-3 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "temperature_c": true_c(time - late, k), "rate_dph": rate}
+        write_csv(tmp_path / f"{k}.csv", columns)
+    runs = [f'file = "{k}.csv"\nrole = "{"exam" if k == 3 else "train"}"' for k in range(4)]
+    (tmp_path / "dataset.toml").write_text(toml(*runs), "utf-8")
+    dataset = load(tmp_path)
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    refitting = Refitting(dataset, records, OPTIONS, single_cycle=False)
+    shift = Effect("time_misalignment", {"shift_s": late})
+    run = refitting.exam[0]
+    mask = known(run, [shift])
+    assert np.array_equal(mask, run.data.time_s <= run.data.time_s[-1] - late)
+    assert known(run, [GRADIENT]).all()
+    before, after = refitting.on_exam([[], [shift]])
+    assert [r.time_s.tolist() for r in before] == [r.time_s.tolist() for r in after], "the same samples"
+    gain = gain_of(before, after, LEVEL, 100.0)
+    assert gain.positive and gain.rms_after < 1.3 * LEVEL < 0.6 * gain.rms_before
 
 
 def test_without_causes_there_is_no_extension(case: Case) -> None:

@@ -149,7 +149,7 @@ class Cause:
         features: Columns for given nonlinear parameters.
         amplitudes: Linear parameters from the fitted weights of the columns.
         mended: For kind "input" without a table: what the map would see had the recording been right, from times
-            in s, temperature in C, its rate in C/min and the parameters.
+            in s, temperature in C, its rate in C/min and the parameters; not a number where nothing says it.
         unseen_s: How much of either end of a run the cause puts out of sight, s.
         repair: The line of `dataset.toml` that takes it out of recordings.
     """

@@ -37,8 +37,12 @@ def _grid(reach: Reach) -> list[Values]:
 
 
 def _mended(time_s: Array, temperature_c: Array, slope: Array, values: Values) -> tuple[Array, Array]:
+    """Not a number where the temperature of that time was not recorded."""
     later = time_s + values["shift_s"]
-    return np.interp(later, time_s, temperature_c), np.interp(later, time_s, slope)
+    true_c, true_slope = (
+        np.interp(later, time_s, x, left=np.nan, right=np.nan) for x in (temperature_c, slope)
+    )
+    return true_c, true_slope
 
 
 def _unseen_s(values: Values) -> float:

@@ -29,6 +29,7 @@ __all__ = [
     "Played",
     "added_range",
     "fit_extended",
+    "known",
     "play_runs",
     "samples",
     "scored_means",
@@ -139,7 +140,10 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
 
 
 def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
-    """Training samples with the inputs that the effects give and their additions taken off."""
+    """Training samples with the inputs that the effects give and their additions taken off.
+
+    Where the input of a mended recording is not known (`known`) it is no number.
+    """
     data, at = run.data, run.in_force
     temperature, slope = data.temperature_c, data.slope_c_per_min
     added = np.zeros(at.size)
@@ -160,16 +164,30 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
     return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
 
 
+def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
+    """Samples whose input is known beside the effects, shape (n,): a late record does not say how a run ends."""
+    if not any(effect.term.mended for effect in effects):
+        return np.ones(run.in_force.size, dtype=bool)
+    return np.isfinite(samples(run, effects).temperature_c)
+
+
+def _chosen(
+    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+) -> TrainingData:
+    """Samples of all runs beside the effects: those `kept` (default: all) whose input is known."""
+    masks = [known(run, effects) for run in runs]
+    if kept is not None:
+        masks = [mask & k for mask, k in zip(masks, kept, strict=True)]
+    return joined([samples(run, effects).select(m) for run, m in zip(runs, masks, strict=True) if m.any()])
+
+
 def with_bumps(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
 ) -> list[Effect]:
     """The effects, the bumps of a finer map found beside the others on the samples `kept` (default: all)."""
     if not any(effect.term.finer_map for effect in effects):
         return list(effects)
-    parts = [samples(run, [e for e in effects if not e.term.finer_map]) for run in runs]
-    if kept is not None:
-        parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
-    data = cleaned(joined(parts))
+    data = cleaned(_chosen(runs, [e for e in effects if not e.term.finer_map], kept))
     try:
         found = find_bumps(data, scaling_of(data))
     except TrainingFailed:
@@ -214,10 +232,7 @@ def fit_extended(
     rate: bool = True,
 ) -> Fit:
     """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
-    parts = [samples(run, effects) for run in runs]
-    if kept is not None:
-        parts = [p.select(k) for p, k in zip(parts, kept, strict=True) if k.any()]
-    data = joined(parts)
+    data = _chosen(runs, effects, kept)
     offsets = [e.values["std_dph"] for e in effects if e.term.kind == "random"]
     if offsets:
         data = levelled(data, max(offsets))
@@ -276,18 +291,24 @@ def scored_means(
     average_s: float,
     scored: Sequence[NDArray[np.bool_]],
 ) -> list[Averages]:
-    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out."""
+    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out.
+
+    Samples whose input is not known beside the effects are not scored.
+    """
     out = []
-    for run, chosen in zip(runs, scored, strict=True):
+    for run, asked in zip(runs, scored, strict=True):
+        seen = known(run, effects)
+        chosen = asked & seen
         if not chosen.any():
             continue
-        data = samples(run, effects)
-        rest = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
+        data, rest = samples(run, effects).select(seen), np.zeros(seen.size)
+        left = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
         if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
-            rest = _re_zeroed(rest, data.time_s, effects)
+            left = _re_zeroed(left, data.time_s, effects)
+        rest[seen] = left
         out.append(
             average(
-                data.time_s,
+                run.data.time_s,
                 run.data.temperature_c,
                 run.data.bias_dph,
                 rest,

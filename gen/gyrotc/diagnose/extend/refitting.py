@@ -20,7 +20,7 @@ from ..attribute.refine import Refined
 from ..attribute.single_cycle import cycle_of
 from ..pipeline import search_of
 from ..screen.blocks import Records
-from .refit import Effect, Played, fit_extended, play_runs, scored_means, with_bumps
+from .refit import Effect, Played, fit_extended, known, play_runs, scored_means, with_bumps
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 
@@ -67,8 +67,8 @@ class Refitting:
         """The map beside the effects (`beside`: as if there were any); fits on all samples are remembered."""
         whole = kept is None or all(m.all() for m in kept)
         rate = not (self.single_cycle and (bool(effects) if beside is None else beside))
-        for known, with_rate, fitted in self._fits:
-            if whole and known == list(effects) and with_rate == rate:
+        for fitted_beside, with_rate, fitted in self._fits:
+            if whole and fitted_beside == list(effects) and with_rate == rate:
                 return fitted
         fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept, rate=rate)
         if whole:
@@ -80,8 +80,9 @@ class Refitting:
         return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
 
     def on_exam(self, stages: Sequence[Sequence[Effect]]) -> Chain:
-        """Residuals of the exam runs for each set of effects."""
-        whole = [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.exam]
+        """Residuals of the exam runs for each set of effects, of samples whose input is known beside all of them."""
+        all_of_them = [effect for stage in stages for effect in stage]
+        whole = [known(run, all_of_them) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
 
     def on_training(self, effects: Sequence[Effect]) -> list[Averages]:
@@ -93,8 +94,9 @@ class Refitting:
         kept = [~m for m in held]
         effects = with_bumps(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
         stages = (effects[:k] for k in range(count + 1))
+        scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
         return [
-            self._residuals(kept, self.train, held, stage, beside=k > 0) for k, stage in enumerate(stages)
+            self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)
         ]
 
     def _residuals(
