@@ -102,20 +102,37 @@ def _limit_ratio(hidden: Hidden, result: dict[str, Any]) -> float | None:
 def _gain(
     hidden: Hidden, campaign: Campaign, result: dict[str, Any], physical: list[dict[str, Any]]
 ) -> dict[str, float] | None:
-    """Squares before and after on the exam runs, and of the noise that was really added."""
-    if not physical or not all(c["gain"] for c in physical):
+    """Squares before and after on the exam runs, and of the noise that was really added.
+
+    Where nothing is named nothing is gained: what was hidden counts, not what was named.
+    """
+    if result.get("baseline") is None or not all(c["gain"] for c in physical):
         return None
     exam = [k for k, role in enumerate(campaign.roles) if role == "exam"]
     noise = np.concatenate([mean_of(hidden.noise_rows[k], _AVERAGE) for k in exam])
-    shipped = result["extended"]["gain"] if result["extended"] else None
+    before = result["baseline"]["exam_rms_dph"]
+    if physical:  # a mended record leaves out what it does not have: both of the same samples
+        before, after = (physical[k]["gain"][f"exam_rms_{w}_dph"] for k, w in ((0, "before"), (-1, "after")))
+    else:
+        after = before
     return {
-        "before2": physical[0]["gain"]["exam_rms_before_dph"] ** 2,
-        "after2": physical[-1]["gain"]["exam_rms_after_dph"] ** 2,
+        "before2": before**2,
+        "after2": after**2,
         "noise2": float(np.mean(noise**2)),
-        "shipped": float(shipped is not None),
-        "worse": float(
-            shipped is not None and shipped["exam_rms_after_dph"] > shipped["exam_rms_before_dph"]
-        ),
+        **shipped_worse(result),
+    }
+
+
+def shipped_worse(result: dict[str, Any]) -> dict[str, float]:
+    """Whether an extension was shipped, is worse on the exam, and by more than the exam's noise (95 %)."""
+    gain = result["extended"]["gain"] if result.get("extended") else None
+    if gain is None:
+        return {"shipped": 0.0, "worse": 0.0, "surely_worse": 0.0}
+    worse = gain["exam_rms_after_dph"] > gain["exam_rms_before_dph"]
+    return {
+        "shipped": 1.0,
+        "worse": float(worse),
+        "surely_worse": float(gain["rms_removed_dph"]["high"] < 0.0),
     }
 
 

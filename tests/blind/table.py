@@ -253,15 +253,31 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
         and family_right(r)
         and r["truth"][0] in _GAINING
     ]
-    out: list[dict[str, Any]] = []
-    if chosen:
-        got = sum(max(g["before2"], 0) / g["noise2"] - g["after2"] / g["noise2"] for g in chosen)
-        best = sum(g["before2"] / g["noise2"] - 1.0 for g in chosen)
-        name = "held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"
-        out += _value(name, "≥ 85 %", got / best, got / best >= 0.85, len(chosen))
-    shipped = [r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]]
-    worse = [bool(g["worse"]) for g in shipped]
-    return out + proportion("shipped although worse on the exam", "0", worse, 0.0, "max")
+    out = _share("held-out gain as share of the oracle's, k ≥ 1.7 (pooled)", chosen)
+    for cause in FAMILY:
+        hidden = [
+            r["gain"]
+            for r in rows
+            if r["stratum"] == "one" and _k(r) >= 1.7 and r["gain"] and r["truth"] == [cause]
+        ]
+        out += _share(f"... of all that hide {cause}, named or not", hidden)
+    return out + worse_on_the_exam([r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]])
+
+
+def _share(name: str, gains: Sequence[dict[str, float]]) -> list[dict[str, Any]]:
+    """What is gained of what knowing everything gains, over all of these together."""
+    got = sum((g["before2"] - g["after2"]) / g["noise2"] for g in gains)
+    best = sum(g["before2"] / g["noise2"] - 1.0 for g in gains)
+    return _value(name, "≥ 85 %", got / best, got / best >= 0.85, len(gains)) if best > 0.0 else []
+
+
+def worse_on_the_exam(shipped: Sequence[dict[str, float]]) -> list[dict[str, Any]]:
+    """Shares of the extensions that were shipped and made the exam worse, at all and beyond its noise."""
+    out = proportion(
+        "shipped although worse on the exam", "0", [bool(g["worse"]) for g in shipped], 0.0, "max"
+    )
+    surely = [bool(g.get("surely_worse", False)) for g in shipped]
+    return out + proportion("... by more than the exam's noise (95 %)", "0", surely, 0.0, "max")
 
 
 def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:

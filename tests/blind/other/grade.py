@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..effects import FAMILY
-from ..grade import Row, alarmed, family_right, in_set, wrong_family
-from ..table import proportion, reliability
+from ..grade import Row, alarmed, family_right, in_set, shipped_worse, wrong_family
+from ..table import proportion, reliability, worse_on_the_exam
 from .record import Recording, told
 
 __all__ = ["answers", "graded", "table"]
@@ -31,19 +31,12 @@ def graded(recording: Recording, result: dict[str, Any]) -> Row:
             for id, p in (c.get("probabilities") or {}).items()
         ],
         "events": [e["id"] for e in result.get("events", [])],
-        "shipped_worse": _shipped_worse(result, physical),
+        **shipped_worse(result),
         "seconds": result.get("seconds"),
     }
     if result["verdict"] == "error":
         row["error"] = result["text"]
     return row
-
-
-def _shipped_worse(result: dict[str, Any], physical: list[dict[str, Any]]) -> bool | None:
-    """Whether what was shipped is worse on the exam run; None: nothing was shipped or measured."""
-    if result.get("extended") is None or not physical or not all(c["gain"] for c in physical):
-        return None
-    return bool(physical[-1]["gain"]["exam_rms_after_dph"] > physical[0]["gain"]["exam_rms_before_dph"])
 
 
 Chosen = Callable[[Row], bool]
@@ -86,14 +79,6 @@ _CHECKS: list[tuple[str, str, Chosen, Callable[[Row], bool], float, str]] = [
     ("... parameter beyond the search", "-", _of("one", beyond=True), family_right, 0.0, "min"),
     ("truth named or equivalent, k ≥ 2.5", "≥ 95 %", _of("one", 2.5), in_set, 0.95, "min"),
     ("a wrong family named", "≤ 5 %", _of("one"), wrong_family, 0.05, "max"),
-    (
-        "shipped although worse on the exam",
-        "0",
-        lambda r: r["shipped_worse"] is not None,
-        lambda r: bool(r["shipped_worse"]),
-        0.0,
-        "max",
-    ),
     ("broke down", "0", lambda r: True, lambda r: r["verdict"] == "error", 0.0, "max"),
 ]
 
@@ -103,7 +88,7 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for name, goal, select, hit, bound, kind in _CHECKS:
         out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
-    return out + reliability(rows)
+    return out + worse_on_the_exam([row for row in rows if row.get("shipped")]) + reliability(rows)
 
 
 def answers(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
