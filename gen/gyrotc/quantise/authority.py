@@ -1,9 +1,9 @@
 """The smallest and largest correction that a table may give, and that its terms may add.
 
-The range of the map over the envelope, seen by the reference on a grid, at every center and where lines through two
-centers cross (a Gaussian may be a ridge, narrower than the grid, whose highest place lies in another one), and of the
-terms, as training saw it or as their parameters allow; each with a margin. 0 belongs to it: before anything is believed
-there is no correction.
+The range of the map over the envelope, seen by the reference on a grid, at every center, where lines through two
+centers cross and along the lines of those narrower than the grid (a Gaussian may be a ridge, whose highest place lies
+in another one or at the envelope's edge), as of regions that are, and of the terms, as training saw it or as their
+parameters allow; each with a margin. 0 belongs to it: before anything is believed there is no correction.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ MARGIN = 0.25
 _LARGEST_DPH = 1.5e7  # twice the largest rate that anything here takes for one
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 _CELLS = (96, 48)  # of the grid, T and slope
-_CROSSING = 64  # centers of which all lines are crossed: 4096 places, as many as the grid has
+_CROSSING = 64  # lines that are all crossed: 4096 places, as many as the grid has
+_NARROW = 2.0  # cells: half a cell off, a wider Gaussian keeps 94 % of its height
+_STATIONS = np.linspace(
+    0.0, 1.0, 5
+)  # of a narrow region, from edge to edge: alone in the middle, handed over outside
 
 Range = tuple[float, float]
 
@@ -69,17 +73,35 @@ def _wider(bounds: Range, least: float = 0.0) -> Range:
 
 def _granted(model: Model, table: Table) -> Range:
     """What the map may give, deg/h: its range with the margin."""
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    grid = _lattice(np.linspace(t0, t1, _CELLS[0] + 1), np.linspace(r0, r1, _CELLS[1] + 1))
+    envelope = (model.envelope.temperature_c, model.envelope.slope_c_per_min)
+    lines = [np.linspace(*ends, cells + 1) for ends, cells in zip(envelope, _CELLS, strict=True)]
+    grid = _lattice(*lines)
     centers = np.array([center for network in model.networks for center in network.centers]).reshape(-1, 2)
     floor = model.noise_floor_dph or 0.0
     seen = _map_range(model, table, np.concatenate([grid, centers]))
     granted = _wider(seen, floor)
-    if 0 < len(centers) <= _CROSSING:
-        crossed = _map_range(model, table, _lattice(*centers.T))
+    narrow = [_ridges(model, axis, float(line[1] - line[0])) for axis, line in enumerate(lines)]
+    crossing = [_lattice(narrow[0], lines[1]), _lattice(lines[0], narrow[1])]
+    crossing += [_lattice(*each) for each in (centers.T, narrow) if max(map(len, each)) <= _CROSSING]
+    places = np.concatenate(crossing)
+    if len(places):
+        crossed = _map_range(model, table, places)
         if crossed[0] < granted[0] or crossed[1] > granted[1]:
             return _wider((min(seen[0], crossed[0]), max(seen[1], crossed[1])), floor)
     return granted
+
+
+def _ridges(model: Model, axis: int, cell: float) -> NDArray[np.float64]:
+    """Where along an axis (0: C, 1: C/min) Gaussians and regions lie that are narrow beside a cell of the grid."""
+    unit = (model.scale.temperature_c[1], model.scale.slope_c_per_min)[axis]
+    places: list[float] = []
+    for network in model.networks:
+        gaussians = zip(network.centers, network.widths, strict=True)
+        places += [c[axis] for c, widths in gaussians if (widths[axis] or np.inf) * unit < _NARROW * cell]
+        if network.region is not None:
+            low, high = (network.region.temperature_c, network.region.slope_c_per_min)[axis]
+            places += (low + (high - low) * _STATIONS).tolist() if high - low < _NARROW * cell else []
+    return np.array(places, dtype=np.float64)
 
 
 def _lattice(temperature_c: NDArray[np.float64], slope_c_per_min: NDArray[np.float64]) -> NDArray[np.float64]:
