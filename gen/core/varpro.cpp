@@ -101,6 +101,23 @@ MatrixXd VariableProjection::gaussians(const Shapes &shapes) const {
     return g;
 }
 
+// The Gaussians of `dictionary`, as `gaussians` has them but for rounding: each is a product of functions of one input,
+// of which a center has eleven for its thirty Gaussians.
+MatrixXd VariableProjection::dictionary_columns(const MatrixXd &centers) const {
+    constexpr Eigen::Index of_t = std::size(kWidthsT), of_r = std::size(kWidthsR);
+    MatrixXd g(t_.size(), centers.rows() * of_t * of_r), in_r(t_.size(), of_r);
+    Eigen::Index k = 0;
+    for (Eigen::Index i = 0; i < centers.rows(); ++i) {
+        for (Eigen::Index j = 0; j < of_r; ++j)
+            in_r.col(j) = (-((r_.array() - centers(i, 1)) / kWidthsR[j]).square()).exp();
+        for (const double width : kWidthsT) {
+            const ArrayXd in_t = root_.array() * (-((t_.array() - centers(i, 0)) / width).square()).exp();
+            for (Eigen::Index j = 0; j < of_r; ++j) g.col(k++) = in_t * in_r.col(j).array();
+        }
+    }
+    return g;
+}
+
 MatrixXd VariableProjection::columns(const Shapes &shapes) const {
     MatrixXd x(t_.size(), kLinear + shapes.cols());
     x.col(0) = root_;
@@ -251,7 +268,7 @@ Network VariableProjection::prune(const Network &network, double tolerance) cons
 std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_size, double enough, double settled,
                                               double tolerance) const {
     Dictionary candidates{dictionary(centers), {}, {}};
-    candidates.columns = gaussians(candidates.shapes);
+    candidates.columns = dictionary_columns(centers);
     candidates.norms = candidates.columns.colwise().squaredNorm();
     std::vector<Network> sizes{project(Shapes(kNonlinear, 0))};
     while (static_cast<int>(sizes.size()) <= max_size && centers.rows() > 0) {

@@ -60,6 +60,7 @@ class VariableProjection {
     };
 
     Eigen::MatrixXd gaussians(const Shapes &shapes) const;
+    Eigen::MatrixXd dictionary_columns(const Eigen::MatrixXd &centers) const;
     Eigen::MatrixXd columns(const Shapes &shapes) const;
     Eigen::VectorXd gains(const Network &network, const Dictionary &candidates) const;
     Network grow(const Network &network, const Dictionary &candidates, double tolerance, int steps) const;

@@ -145,6 +145,8 @@ def _only_c(value: Any) -> Any:
     Raises:
         ValueError: Text that went through no function of this module.
     """
+    if type(value) is int:  # most are, and what else is a whole number takes long to tell
+        return value
     if isinstance(value, CText) or (isinstance(value, str) and _WORD.fullmatch(value)):
         return value
     if isinstance(value, SupportsIndex) and not isinstance(value, bool):

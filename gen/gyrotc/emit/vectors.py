@@ -125,16 +125,30 @@ def _samples(segment: Segment, numeric: str, draws: NDArray[np.uint32]) -> NDArr
 def _draws(seed: int, count: int) -> NDArray[np.uint32]:
     """The first numbers of Marsaglia's xorshift32, as in board_test.c.
 
-    A step is linear over the bits of the state. From n numbers and what n steps make of each bit follow the next
-    n numbers, and what 2n steps make of each bit.
+    A step is linear over the bits of the state. From 2^k numbers and what 2^k steps make of each state follow the next
+    2^k numbers.
     """
-    numbers = _stepped(np.array([seed], dtype=np.uint32))
-    steps = _stepped(np.uint32(1) << np.arange(32, dtype=np.uint32))
+    numbers, doublings = _stepped(np.array([seed], dtype=np.uint32)), 0
     while numbers.size < count:
-        numbers = np.concatenate([numbers, _after(steps, numbers[: count - numbers.size])])
-        steps = _after(steps, steps)
+        following = _after(_steps_of(doublings), numbers[: count - numbers.size])
+        numbers, doublings = np.concatenate([numbers, following]), doublings + 1
     numbers.flags.writeable = False
     return numbers[:count]
+
+
+@functools.cache
+def _steps_of(doublings: int) -> NDArray[np.uint32]:
+    """What 2^doublings steps make of each octet of a state, the others being 0, shape (4, 256)."""
+    bits = np.uint32(1) << np.arange(32, dtype=np.uint32)
+    if doublings:
+        half = _steps_of(doublings - 1)
+        bits = _after(half, _after(half, bits))
+    else:
+        bits = _stepped(bits)
+    made = np.zeros((4, 1), dtype=np.uint32)
+    for of_bit in bits.reshape(4, 8).T:
+        made = np.concatenate([made, made ^ of_bit[:, None]], axis=1)
+    return made
 
 
 def _stepped(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
@@ -144,14 +158,10 @@ def _stepped(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 
 def _after(steps: NDArray[np.uint32], x: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """States after some steps, by what these make of each bit; looked up for eight bits at once."""
-    result = np.zeros_like(x)
-    octets = np.arange(256, dtype=np.uint32)
-    for first in range(0, 32, 8):
-        made = np.zeros(256, dtype=np.uint32)
-        for bit in range(8):
-            made ^= ((octets >> np.uint32(bit)) & np.uint32(1)) * steps[first + bit]
-        result ^= made[(x >> np.uint32(first)) & np.uint32(255)]
+    """States after some steps, by what these make of each octet."""
+    result: NDArray[np.uint32] = steps[0][x & np.uint32(255)]
+    for k in range(1, 4):
+        result ^= steps[k][(x >> np.uint32(8 * k)) & np.uint32(255)]
     return result
 
 

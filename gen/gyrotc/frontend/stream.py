@@ -58,6 +58,8 @@ class Stream:
 
     def _elapsed(self, at: NDArray[np.int64], samples_per_block: int) -> NDArray[np.int64]:
         """Blocks since the start at each sample number, with those that were left out."""
+        if not self.dropped.any():
+            return np.asarray(at // samples_per_block)
         total = np.concatenate([[0], np.cumsum(self.dropped)])
         runs = self.position - self.missed  # where the missing samples before each row begin
         return np.asarray(at // samples_per_block + total[np.searchsorted(runs, at, side="right")])

@@ -6,7 +6,6 @@ import json
 import math
 import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -126,7 +125,9 @@ def _look_through(content: Any, where: str) -> None:
     for depth in range(deepest + 2):
         below: list[Any] = []
         for value in levels:
-            if isinstance(value, Mapping):
+            if type(value) is float:  # most are
+                continue
+            if isinstance(value, dict):
                 for key, inner in value.items():
                     _look_at(key, where)
                     below.append(inner)

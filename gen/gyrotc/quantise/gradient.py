@@ -44,14 +44,15 @@ def largest_gradient(
         other = 1 - axis
         moving = [np.linspace(low[k], high[k], _POINTS[k]) for k in (0, 1)]
         slope = np.full((_POINTS[axis], _POINTS[other]), linear[axis])
+        product = np.empty_like(slope)
         for center, inverse, weight in zip(centers, inverse_widths, weights, strict=True):
             a = (moving[axis] - center[axis]) * inverse[axis]
             b = (moving[other] - center[other]) * inverse[other]
             steep = weight * (-2.0 * a * inverse[axis]) * exp2_of_minus(a * a * _LOG2E)
-            slope = slope + steep[:, None] * exp2_of_minus(b * b * _LOG2E)
+            slope += np.multiply(steep[:, None], exp2_of_minus(b * b * _LOG2E), out=product)
         half = (high - low) / (np.array(_POINTS) - 1.0) / 2.0
         size = np.abs(weights) * inverse_widths[:, axis]
         growth = _MOST_CURVED * half[axis] * size * inverse_widths[:, axis]
         growth = growth + _STEEPEST**2 * half[other] * size * inverse_widths[:, other]
-        bounds[axis] = np.max(np.abs(slope)) + math.fsum(growth)
+        bounds[axis] = np.max(np.abs(slope, out=slope)) + math.fsum(growth)
     return bounds

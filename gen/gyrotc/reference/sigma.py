@@ -99,8 +99,8 @@ def evidence_of(
 
 def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Numbers:
     """Lowest or highest temperature since the terms began last."""
-    starts = np.union1d([0], np.flatnonzero(is_restart))
-    parts = np.split(course.temperature, starts[1:])
+    starts = np.flatnonzero(is_restart)
+    parts = np.split(course.temperature, starts[starts > 0])
     return np.concatenate([of.accumulate(part) for part in parts])
 
 

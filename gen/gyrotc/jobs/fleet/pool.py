@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -85,6 +86,7 @@ def _pool(jobs: int) -> ProcessPoolExecutor:
 def _end_with_parent() -> None:
     """Ctrl-C is the parent's to handle; when it is gone, however that came, nobody goes on writing for it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.freeze()  # what was imported stays: it need not be looked through after every serial
     parent = multiprocessing.parent_process()
     assert parent is not None
 
