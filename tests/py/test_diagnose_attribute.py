@@ -211,10 +211,10 @@ def test_a_pair_must_gain_and_need_both() -> None:
     both = (("hysteresis", 1.0), ("warm_up", 1.0))
     size = 400
     assert best_of(singles, size) is singles[0]
-    assert clear_pair(singles, [_point(800.0, *both)], size) is not None
-    assert clear_pair(singles, [_point(510.0, *both)], size) is None, "the second adds next to nothing"
+    assert clear_pair(singles, _point(800.0, *both), size) is not None
+    assert clear_pair(singles, _point(510.0, *both), size) is None, "the second adds next to nothing"
     weak = [_point(100.0, ("hysteresis", 1.0)), _point(90.0, ("warm_up", 1.0))]
-    assert clear_pair(weak, [_point(800.0, *both)], size) is None, "neither says anything alone"
+    assert clear_pair(weak, _point(800.0, *both), size) is None, "neither says anything alone"
 
 
 def test_rivals_are_near_in_the_criterion() -> None:

@@ -19,8 +19,9 @@ from ..detect.search import Search
 from ..signatures.candidates import Candidate
 from .contest import Contest, contest
 from .gains import Gains, Point
+from .marginal_likelihood import MarginalLikelihood
 from .misfit import misfit
-from .pairs import best_of, clear_pair, makes_sense
+from .pairs import clear_pair, makes_sense
 from .refine import Refined, model_columns, refine, sized
 from .rivals import Rival, near_of, probabilities_of, ranked_rivals
 from .simulated_odds import calibrated
@@ -96,19 +97,18 @@ def attribute(search: Search) -> Attribution:
         return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first, Contest("", -np.inf))
     gains = Gains(search)
     singles = list(gains.single())
-    stage = _stage(search, gains, best_of(singles, gains.size).members)
+    weigher = MarginalLikelihood(gains)
+    stage = _stage(search, gains, weigher.preferred(singles).members)
     pairs: list[Point] = []
     if stage.remains:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
-        pair = clear_pair(singles, pairs, gains.size)
+        pair = clear_pair(singles, weigher.preferred(pairs), gains.size)
         if pair is not None:
             stage = _deeper(search, gains, stage, pair.members)
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
     taken = tuple(stage.chosen[k] for k in order)
-    ranked = ranked_rivals(singles, pairs, taken, gains.size)
-    pool = singles if len(taken) == 1 else pairs
-    likely = [calibrated(gains, pool, taken, k, near) for k, near in enumerate(ranked)]
+    ranked, likely = _rivals(weigher, singles, pairs, taken)
     return Attribution(
         first=first,
         causes=refined,
@@ -121,6 +121,17 @@ def attribute(search: Search) -> Attribution:
         other=_contest(gains, refined, tuple(map(near_of, ranked))),
         probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
     )
+
+
+def _rivals(
+    weigher: MarginalLikelihood, singles: list[Point], pairs: list[Point], taken: tuple[Candidate, ...]
+) -> tuple[list[tuple[Rival, ...]], list[tuple[Rival, ...]]]:
+    """Of each cause, nearest first; and with odds that simulation bears out, likeliest first."""
+    gains = weigher.gains
+    pool = singles if len(taken) == 1 else pairs
+    near = ranked_rivals(singles, pairs, taken, gains.size)
+    ranked = [weigher.judged(pool, taken, k, rivals) for k, rivals in enumerate(near)]
+    return ranked, [calibrated(gains, pool, taken, k, rivals) for k, rivals in enumerate(ranked)]
 
 
 def _contest(gains: Gains, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]) -> Contest:
@@ -157,10 +168,11 @@ def choose(search: Search, count: int) -> tuple[Refined, ...]:
     """The best one or two causes without asking whether there is any: for runs left out of a choice made."""
     gains = Gains(search)
     points = list(gains.single())
-    best = best_of(points, gains.size)
+    weigher = MarginalLikelihood(gains)
+    best = weigher.preferred(points)
     if count > 1:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
-        pair = best_of(pairs, gains.size)
+        pair = weigher.preferred(pairs)
         best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
     chosen = sorted(
         best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...terms import CATALOGUE
@@ -30,13 +32,12 @@ def makes_sense(point: Point) -> bool:
     return bool(abs(np.log(x / y)) > APART)
 
 
-def best_of(points: list[Point], size: int) -> Point:
+def best_of(points: Sequence[Point], size: int) -> Point:
     return max(points, key=lambda p: p.criterion(size))
 
 
-def clear_pair(singles: list[Point], pairs: list[Point], size: int) -> Point | None:
+def clear_pair(singles: list[Point], best: Point, size: int) -> Point | None:
     """The best pair if it is clearly better than the best single cause and needs both its members."""
-    best = best_of(pairs, size)
     alone = {id: max(p.gain for p in singles if p.members[0].id == id) for id in {m.id for m in best.members}}
     if best.criterion(size) < best_of(singles, size).criterion(size) + _PAIR:
         return None

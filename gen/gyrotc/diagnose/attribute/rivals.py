@@ -12,6 +12,7 @@ from .gains import Point
 
 __all__ = [
     "EQUIVALENT",
+    "LOOKED_AT",
     "Kind",
     "Rival",
     "kind_of",
@@ -24,6 +25,9 @@ __all__ = [
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
 below e^4, about 50 to 1, name no cause."""
+
+LOOKED_AT = 3.0 * EQUIVALENT
+"""Farther behind, a rival has odds below 1 in 700 of the tempered likelihood."""
 
 _TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
 """How much of a difference of the criterion counts in odds: so that one other explanation at the edge of what counts as

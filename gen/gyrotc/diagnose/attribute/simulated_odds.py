@@ -21,7 +21,7 @@ from ..orthonormal import orthonormal
 from ..screen.blocks import singled_out
 from ..signatures.candidates import Candidate, searched
 from .gains import Gains, Point
-from .rivals import EQUIVALENT, Kind, Rival, kind_of, odds_of
+from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
 __all__ = ["calibrated"]
 
@@ -29,9 +29,6 @@ Array = NDArray[np.float64]
 
 _DRAWS = 300  # of each cause: odds of 9 to 1 are then known to about a third
 _SEED = 17  # any: the same recordings have the same odds
-_LOOKED_AT = (
-    3.0 * EQUIVALENT
-)  # rivals that are farther behind have odds below 1 in 700 of the tempered likelihood
 _MOST_RIVALS = 4  # the nearest: whoever comes after them adds little to their sum
 _MOST_POINTS, _REACH = 8, 15.0
 """Points of a cause's grid that stand for it: its best ones on these recordings, as far as they explain nearly as much
@@ -51,7 +48,8 @@ def calibrated(
         chosen: The named causes, one or two; the other one stays at its place in the grid.
         ranked: All rivals of the k-th, nearest first.
     """
-    near = [r for r in ranked if r.distance <= _LOOKED_AT and r.id != chosen[k].id][:_MOST_RIVALS]
+    near = [r for r in ranked if r.distance <= LOOKED_AT and r.odds is None and r.id != chosen[k].id]
+    near = near[:_MOST_RIVALS]
     if not near:
         return tuple(ranked)
     others = (*chosen[:k], *chosen[k + 1 :])
