@@ -22,7 +22,7 @@ from ..train.stand_ins import StandIn
 from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
 from .extend.channel_terms import stand_ins_of
 from .extend.extension import Extension, extend
-from .extend.refit import Effect, added_range, play_runs
+from .extend.refit import Effect, added_range, play_runs, terms_of
 from .noise_colour.colours import declared_noise
 from .pipeline import Analysis, analyse
 from .screen.events import Event, accepted, events_of
@@ -181,7 +181,7 @@ def _extended_model(
 def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:
     """Terms as a model has them, those of channels last: a stand-in is fitted to what all others leave of the input."""
     entries = []
-    for effect in sorted(shipped, key=lambda e: e.channel is not None):
+    for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):
         if effect.term.table is None:
             continue
         names = [p.name for p in effect.term.parameters]

@@ -34,6 +34,7 @@ from .attribute.single_cycle import Cycle
 from .detect.detection_limits import CauseLimit
 from .discrepancy.declared_noise import NoiseFinding
 from .extend.extension import Extension
+from .extend.refit import terms_of
 from .noise_words import NOISE_WORDS
 from .pipeline import Analysis
 from .signatures.candidates import diagnosed
@@ -234,7 +235,7 @@ def _extended(extension: Extension) -> ExtendedModel | None:
     return ExtendedModel(
         exam_rms_dph=extension.total.rms_after,
         centers=extension.centers,
-        terms=tuple(e.id for e in extension.shipped if CATALOGUE[e.id].table is not None),
+        terms=tuple(e.id for e in terms_of(extension.shipped) if CATALOGUE[e.id].table is not None),
         model=None,
         gain=extension.total.result(),
         rate_left_out=None if left is None else WithoutRate(environment=left[0], **dict(left[1].result())),

@@ -53,6 +53,10 @@ def _grid(reach: Reach) -> list[Values]:
     return [{_PERIOD.name: float(1.0 / w)} for w in waves]
 
 
+def _overtone(values: Values, number: int) -> dict[str, float]:
+    return {_PERIOD.name: values[_PERIOD.name] / number}
+
+
 def _record(values: Values, block_s: float) -> list[float]:
     return [1.0 / values["period_c"], turns(values["phase_rad"]), values["amplitude_dph"]]
 
@@ -73,7 +77,7 @@ CAUSE = Cause(
         name="The bias is periodic in temperature",
         short="period",
         signature="residual waves over T with one period and the same phase heating and cooling",
-        remedy="a sine and a cosine of T",
+        remedy="a sine and a cosine of T, with overtones where the wave is no sine",
         experiment="one slow ramp over the full range in both directions",
         telling=Telling.STATIC,
         beside={"map_too_coarse": "one slow ramp over the full range (0.5 C/min)"},
@@ -91,4 +95,5 @@ CAUSE = Cause(
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
+    overtone=_overtone,
 )

@@ -21,7 +21,7 @@ from .data import Scaling, TrainingData
 from .process import fit_process
 from .simple import FLAT
 
-__all__ = ["Bumps", "find_bumps"]
+__all__ = ["BesideSmooth", "Bumps", "beside_smooth", "find_bumps"]
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +82,18 @@ def find_bumps(data: TrainingData, scaling: Scaling) -> Bumps:
     Raises:
         TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
     """
+    beside = beside_smooth(data, scaling)
+    if beside is None:
+        return Bumps((), (), (), scaling.temperature_c)
+    return _Search(beside).found(beside.price(_PARAMETERS))
+
+
+def beside_smooth(data: TrainingData, scaling: Scaling) -> BesideSmooth | None:
+    """Cleaned samples without outliers beside any smooth map; None where nothing is left of them.
+
+    Raises:
+        TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
+    """
     process = fit_process(data, scaling)
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     weight = data.weight / np.median(data.weight)
@@ -89,15 +101,23 @@ def find_bumps(data: TrainingData, scaling: Scaling) -> Bumps:
     sigma = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
     near = np.abs(residual) <= _OUTLIER * sigma
     if sigma <= 0.0 or not near.any():
-        return Bumps((), (), (), scaling.temperature_c)
-    search = _Search(data.select(near), weight[near], sigma, scaling)
-    return search.found(_PARAMETERS * float(np.log(max(data.duration_s.sum() / _MEAN_S, 2.0))))
+        return None
+    return BesideSmooth(data.select(near), weight[near], sigma, scaling, float(data.duration_s.sum()))
 
 
-class _Search:
-    """Bins of samples, weighted to unit noise, with the splines projected out."""
+class BesideSmooth:
+    """Bins of samples, weighted to unit noise, with the splines projected out.
 
-    def __init__(self, data: TrainingData, weight: Floats, sigma: float, scaling: Scaling) -> None:
+    Attributes:
+        t: Temperature of each bin, C, shape (n,).
+        root: Square root of its weight, 1/(deg/h), the same shape.
+        range: Lowest and highest temperature of the samples.
+        y: Weighted bias beside the splines, the same shape.
+    """
+
+    def __init__(
+        self, data: TrainingData, weight: Floats, sigma: float, scaling: Scaling, seconds: float
+    ) -> None:
         cell = np.floor(data.temperature_c / _CELL_C).astype(np.int64) * 1_000_003
         cell += np.floor(data.slope_c_per_min / _CELL_C_PER_MIN + 0.5).astype(np.int64)
         _, index = np.unique(cell, return_inverse=True)
@@ -109,12 +129,29 @@ class _Search:
         slow = _SLOW_S / float(np.median(data.duration_s))
         self.root = 1.0 / (sigma * np.sqrt(1.0 / count + 1.0 / slow))
         self.range = scaling.temperature_c
+        self._seconds = seconds
         r = r / scaling.half_range_c_per_min
         fine, coarse = (_splines(self.t, self.range, step) for step in _SPLINE_C)
         columns = np.column_stack([fine, coarse * r[:, None], coarse * r[:, None] ** 2])
         left, size, _ = np.linalg.svd(columns * self.root[:, None], full_matrices=False)
-        self.smooth = left[:, size > 1e-3 * size[0]]
-        self.y = self._rest((y * self.root)[:, None])[:, 0]
+        self._smooth = left[:, size > 1e-3 * size[0]]
+        self.y = self.rest((y * self.root)[:, None])[:, 0]
+
+    def rest(self, columns: Floats) -> Floats:
+        """What the splines do not hold of weighted columns, shape (n, k)."""
+        return np.asarray(columns - self._smooth @ (self._smooth.T @ columns))
+
+    def price(self, parameters: int) -> float:
+        """Energy that so many parameters must explain by BIC."""
+        return parameters * float(np.log(max(self._seconds / _MEAN_S, 2.0)))
+
+
+class _Search:
+    """Bumps one after the other."""
+
+    def __init__(self, beside: BesideSmooth) -> None:
+        self.t, self.root, self.range, self.y = beside.t, beside.root, beside.range, beside.y
+        self._rest = beside.rest
         tried = [(c, w) for w in _WIDTHS_C for c in np.arange(*self.range, 0.5 * w)]
         self.tried = np.array(tried).reshape(-1, 2).T
         raw = self._raw(*self.tried)
@@ -184,9 +221,6 @@ class _Search:
 
     def _raw(self, centers: Floats, widths: Floats) -> Floats:
         return np.asarray(np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * self.root[:, None])
-
-    def _rest(self, columns: Floats) -> Floats:
-        return np.asarray(columns - self.smooth @ (self.smooth.T @ columns))
 
 
 def _splines(t: Floats, span: tuple[float, float], step_c: float) -> Floats:

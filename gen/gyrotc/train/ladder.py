@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from ..metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average, cells_of, weighted_mean
-from .paired import more_than_its_error, of_pieces, surely_above_0, t_statistic
+from .paired import more_than_error_of_pieces, more_than_its_error, of_pieces, surely_above_0, t_statistic
 from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .residual_noise import difference_sigma
 from .simple import SIMPLE, all_solved, powers_of
@@ -125,9 +125,10 @@ class Ladder:
         """Whether a rung of another ladder, over the same stretches, is what this one would choose above `name`.
 
         It must be better than `name` by more than a standard error of the paired difference, in score and in mean
-        square, over all stretches and over independent pieces of history alone, and better than this ladder's constant
-        as `beats_constant` asks. Pieces alone: stretches overlap, and the ends of the range of temperature count
-        among them; what gains at the ends and nowhere else has been seen twice, not in many runs.
+        square, over all stretches and over those of independent pieces of history alone, and better than this
+        ladder's constant as `beats_constant` asks. Pieces alone: the branches of a run resemble each other, and the
+        ends of the range of temperature belong to all runs; what gains there and nowhere else has been seen twice,
+        not in many runs.
         """
         own, others = RUNGS.index(name), RUNGS.index(rung)
         if len(self.folds) < 2 or not np.all(np.isfinite(other.score[:, others])):
@@ -139,8 +140,12 @@ class Ladder:
             score[:, own], rms[:, own] = self.score[:, top], self.rms_dph[:, top]
         score[:, top], rms[:, top] = other.score[:, others], other.rms_dph[:, others]
         both = replace(self, score=score, rms_dph=rms)
-        pieces = (of_pieces(v[:, own] - v[:, top], self.pieces) for v in (score, rms**2))
-        return both._clearly_worse(own, top) and more_than_its_error(*pieces) and both.beats_constant("mrbf")
+        differences = (v[:, own] - v[:, top] for v in (score, rms**2))
+        return (
+            both._clearly_worse(own, top)
+            and more_than_error_of_pieces(self.pieces, *differences)
+            and both.beats_constant("mrbf")
+        )
 
     def rows(self, chosen: str) -> list[dict[str, Any]]:
         """`ladder` of `training.json`: RMS over the stretches, all counting alike, with its standard error."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-__all__ = ["more_than_its_error", "of_pieces", "surely_above_0", "t_statistic"]
+__all__ = ["more_than_error_of_pieces", "more_than_its_error", "of_pieces", "surely_above_0", "t_statistic"]
 
 Floats = NDArray[np.float64]
 
@@ -16,6 +16,25 @@ _SIGNIFICANCE = 0.05  # of the t test: docs/training.md, section 2
 def more_than_its_error(*differences: Floats) -> bool:
     """Whether the mean of each of these, one entry a stretch, is above its standard error."""
     return not any(d.mean() <= d.std(ddof=1) / np.sqrt(len(d)) for d in differences)
+
+
+def more_than_error_of_pieces(pieces: NDArray[np.int64], *differences: Floats) -> bool:
+    """The same where stretches of one piece of history resemble each other; those of the piece -1 are left out.
+
+    The standard error of a mean over clusters: the sums of deviations within pieces are what scatters independently
+    (Liang and Zeger 1986). False with fewer than two pieces.
+    """
+    used = pieces >= 0
+    _, index = np.unique(pieces[used], return_inverse=True)
+    count = int(index.max(initial=-1)) + 1
+    if count < 2:
+        return False
+    for d in (difference[used] for difference in differences):
+        sums = np.bincount(index, d - d.mean())
+        error = np.sqrt(count / (count - 1.0) * (sums**2).sum()) / len(d)
+        if d.mean() <= error:
+            return False
+    return True
 
 
 def of_pieces(values: Floats, pieces: NDArray[np.int64]) -> Floats:

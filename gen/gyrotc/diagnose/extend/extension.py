@@ -24,7 +24,7 @@ from ...train.fitting import FitOptions
 from ..attribute.refine import Refined
 from ..screen.blocks import Records
 from .gain import Gain, floor_of, gain_of
-from .refit import Effect, samples, scored_means, with_bumps
+from .refit import Effect, completed, samples, scored_means
 from .refitting import FEW_RUNS, Chain, Refitting, folds_of
 from .shipping import Shipping, shipping
 
@@ -98,7 +98,7 @@ def extend(
     """Refits the model with the causes and measures the gain."""
     say("measuring the gain")
     refitting = Refitting(dataset, records, options, single_cycle=single_cycle)
-    effects = with_bumps(refitting.train, [Effect.of(c) for c in causes])
+    effects = completed(refitting.train, [Effect.of(c) for c in causes])
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
     if single_cycle and effects:  # found together: one alone is another model

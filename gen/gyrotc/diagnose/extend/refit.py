@@ -23,33 +23,38 @@ from ...train.fitting import FrontEnd, samples_of
 from ...train.process import fit_process
 from ...train.simple import without_rate
 from ..attribute.refine import Refined
+from .overtones import overtones_of
 
 __all__ = [
+    "MOST_TERMS",
     "Effect",
     "Played",
     "added_range",
+    "completed",
     "fit_extended",
     "known",
     "play_runs",
     "samples",
     "scored_means",
-    "with_bumps",
+    "terms_of",
 ]
 
 Array = NDArray[np.float64]
 
+MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 _LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
 _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """A cause with its fitted parameters, as the replay applies it; a finer map with its bumps."""
+    """A cause with its fitted parameters, as the replay applies it; with a finer map's bumps, a wave's overtones."""
 
     id: str
     values: dict[str, float]
     channel: str | None = None
     bumps: Bumps | None = None
+    overtones: tuple[Effect, ...] = ()
 
     @staticmethod
     def of(cause: Refined) -> Effect:
@@ -108,7 +113,7 @@ class Played:
         return made
 
 
-_REMEMBERED = 8  # outcomes of terms for each run: those of two sets of causes at a time
+_REMEMBERED = 8  # outcomes of terms for each run: those of two full tables
 
 
 def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
@@ -147,7 +152,7 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
     data, at = run.data, run.in_force
     temperature, slope = data.temperature_c, data.slope_c_per_min
     added = np.zeros(at.size)
-    for effect in effects:
+    for effect in terms_of(effects):
         term = effect.term
         if term.table is not None:
             made = run.outcome(effect)
@@ -181,18 +186,34 @@ def _chosen(
     return joined([samples(run, effects).select(m) for run, m in zip(runs, masks, strict=True) if m.any()])
 
 
-def with_bumps(
+def completed(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
 ) -> list[Effect]:
-    """The effects, the bumps of a finer map found beside the others on the samples `kept` (default: all)."""
-    if not any(effect.term.finer_map for effect in effects):
-        return list(effects)
-    data = cleaned(_chosen(runs, [e for e in effects if not e.term.finer_map], kept))
-    try:
-        found = find_bumps(data, scaling_of(data))
-    except TrainingFailed:
-        return list(effects)
-    return [replace(effect, bumps=found) if effect.term.finer_map else effect for effect in effects]
+    """The effects, with the overtones of a wave and the bumps of a finer map as samples show them.
+
+    Each is found beside the other effects, bumps last, on the samples `kept` (default: all).
+    """
+    out = list(effects)
+    waves = [k for k, e in enumerate(out) if e.term.overtone is not None]
+    finer = [k for k, e in enumerate(out) if e.term.finer_map]
+    for k in [*waves, *finer]:
+        effect = out[k]
+        data = cleaned(_chosen(runs, [e for e in out if e is not effect], kept))
+        try:
+            if effect.term.finer_map:
+                out[k] = replace(effect, bumps=find_bumps(data, scaling_of(data)))
+            else:
+                found = overtones_of(data, effect.term, effect.values)
+                room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
+                out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
+        except TrainingFailed:
+            continue
+    return out
+
+
+def terms_of(effects: Sequence[Effect]) -> list[Effect]:
+    """The effects, each with its overtones behind it: what stands in a table."""
+    return [one for effect in effects for one in (effect, *effect.overtones)]
 
 
 def added_range(
@@ -203,7 +224,7 @@ def added_range(
     Args:
         beside: What else was added at each sample of all runs, shape (n,).
     """
-    held = [effect for effect in effects if effect.term.table is not None]
+    held = [effect for effect in terms_of(effects) if effect.term.table is not None]
     none = [np.zeros(run.in_force.size) for run in runs]
     added = np.concatenate(
         [

@@ -20,7 +20,7 @@ from ..attribute.refine import Refined
 from ..attribute.single_cycle import cycle_of
 from ..pipeline import search_of
 from ..screen.blocks import Records
-from .refit import Effect, Played, fit_extended, known, play_runs, scored_means, with_bumps
+from .refit import Effect, Played, completed, fit_extended, known, play_runs, scored_means
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 
@@ -92,7 +92,7 @@ class Refitting:
     def left_out(self, held: list[Mask], count: int) -> Chain:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
         kept = [~m for m in held]
-        effects = with_bumps(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
+        effects = completed(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
         stages = (effects[:k] for k in range(count + 1))
         scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
         return [

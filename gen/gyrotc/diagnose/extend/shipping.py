@@ -19,12 +19,10 @@ from ...train.data import cleaned, joined, scaling_of
 from ...train.fitting import power_ons
 from ...train.ladder import RUNGS, Ladder, climb
 from ...train.process import fit_process
-from .refit import Effect, samples
+from .refit import MOST_TERMS, Effect, samples
 from .refitting import Refitting
 
 __all__ = ["Shipping", "shipping"]
-
-_MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class Shipping:
 
 def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     """Adds the effects that a table can hold one after the other; those of a single cycle all at once."""
-    able = [e for e in effects if e.term.shipped][:_MOST_TERMS]
+    able = [e for e in effects if e.term.shipped][:MOST_TERMS]
     plain = _ladder(refitting, [], None)
     rung = plain.chosen()
     shipped: list[Effect] = []
