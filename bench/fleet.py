@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +46,10 @@ def fleet_figures(serials: int) -> dict[str, Any]:
     program = Path(sys.executable).with_name("gyrotc")
     with tempfile.TemporaryDirectory(prefix="gyrotc-fleet-") as work:
         folder = Path(work)
-        for gyro in range(_GYROS):
-            source = folder / "gyros" / str(gyro)
-            command = [program, "simulate", "paper", "--seed", str(gyro + 1), "--out", source]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        print(f"simulating {_GYROS} gyros", file=sys.stderr)
+        with ThreadPoolExecutor(_JOBS) as pool:
+            list(pool.map(lambda gyro: _simulated(program, folder, gyro), range(_GYROS)))
+        print(f"{serials} serials, {_JOBS} processes", file=sys.stderr)
         for k in range(serials):
             _under_serial(folder / "gyros" / str(k % _GYROS), folder / "data" / f"RLG-{k:04d}")
         load = os.getloadavg()[0]
@@ -70,6 +71,12 @@ def fleet_figures(serials: int) -> dict[str, Any]:
         "load": load,
         "rms_over_floor": {"median": ratio["median"], "worst": ratio["largest"]},
     }
+
+
+def _simulated(program: Path, folder: Path, gyro: int) -> None:
+    source = folder / "gyros" / str(gyro)
+    command = [program, "simulate", "paper", "--seed", str(gyro + 1), "--out", source]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def _under_serial(source: Path, folder: Path) -> None:
@@ -115,6 +122,7 @@ def filled(page: str, figures: dict[str, Any]) -> str:
 def main(docs: Path, serials: int) -> None:
     figures = fleet_figures(serials)
     print(json.dumps(figures, indent=1), file=sys.stderr)
+    print(f"{1e3 * figures['cpu_s'] / serials:.0f} ms of processor time a serial", file=sys.stderr)
     if figures["exit_status"]:
         sys.exit("a serial failed: nothing written")
     (docs / "results" / "fleet.json").write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
