@@ -135,10 +135,7 @@ def extended(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 TERM_FAULTS = {
-    "memory that does not move": (
-        r"FN\(follow\)\(state->term\[i\], x, FN\(parameter\)\(state, i, 0U\)\)",
-        "(void)state, (void)i, (void)x",
-    ),
+    "memory that does not move": (r"FN\(follow\)\(z, x, gain\)", "(void)gain"),
     "play with one wall in the middle": (r"NUM low = \(NUM\)FN\(diff\)\(x, width\)", "NUM low = x"),
     "warm-up a block late": (r"FN\(fading\)\(state->elapsed,", "FN(fading)(state->elapsed + 1U,"),
     "harmonic with half its phase": (r"\(x, frequency, phase, amp", "(x, frequency, phase / 2, amp"),
