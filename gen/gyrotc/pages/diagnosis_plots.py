@@ -38,9 +38,7 @@ _LEVEL = 0.01  # familywise level of the search (docs/diagnosis.md)
 _MOVING = 0.1  # C/min
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _WITHIN_95 = float(chdtri(1, 0.05))  # fall of 2 log likelihood of one parameter at 95 % (Wilks 1938)
-_SHOWN = (
-    -40.0
-)  # of 2 log likelihood below its top: ten times the fall at 95 %, beyond which nothing is to be seen
+_SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
 _MOST_PANELS = 6  # runs with events that are drawn
 

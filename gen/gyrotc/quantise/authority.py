@@ -31,9 +31,8 @@ _LARGEST = 2**31 - 1  # a signed 32-bit word
 _CELLS = (96, 48)  # of the grid, T and slope
 _CROSSING = 64  # lines that are all crossed: 4096 places, as many as the grid has
 _NARROW = 2.0  # cells: half a cell off, a wider Gaussian keeps 94 % of its height
-_STATIONS = np.linspace(
-    0.0, 1.0, 5
-)  # of a narrow region, from edge to edge: alone in the middle, handed over outside
+_STATIONS = np.linspace(0.0, 1.0, 5)
+"""Of a narrow region, from edge to edge: alone in the middle, handed over outside."""
 
 Range = tuple[float, float]
 

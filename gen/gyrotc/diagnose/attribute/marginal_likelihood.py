@@ -41,9 +41,8 @@ _MOST_KINDS = 8  # the nearest: whoever comes after them is no rival in practice
 _MOST_BEHIND = 2  # of these, the nearest: what a clock may stand behind, at a dozen shifts
 _BOUNDS = (-6.0, 22.0)
 """Of the logarithm of a group's variance, in units of the noise that its columns have on average: nothing to all."""
-_START = (
-    8.0  # where the search for them begins: from 4 and 8 both, criteria differ by 1.4 at most (78 models)
-)
+_START = 8.0
+"""Where the search for them begins: from 4 and 8 both, criteria differ by 1.4 at most (78 models)."""
 
 
 class MarginalLikelihood:
