@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import random
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -129,6 +130,20 @@ def test_a_noisy_thermometer_does_not_jump(tmp_path: Path, model_dict: dict[str,
     rounded = columns(600)
     rounded["temperature_c"] = np.round(rounded["temperature_c"])
     assert ids(dataset_of(tmp_path / "R", rounded), model_dict, result_of()) == set()
+
+
+@pytest.mark.parametrize("wavering", [0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 1.0, 3.0])
+def test_a_coarse_thermometer_that_wavers_jumps_where_it_jumps(wavering: float, tmp_path: Path) -> None:
+    """In steps of its resolution: most rows are as the one before, and some are two steps off."""
+    seed = random.SystemRandom().randrange(2**31)
+    print(f"seed {seed}")
+    step, n = 0.0625, 6000
+    slow = 20.0 + 0.002 * np.arange(n) + step * wavering * np.random.default_rng(seed).normal(0.0, 1.0, n)
+    for size, found in ((0.0, []), (5.0, [3000.0])):
+        read = step * np.round((slow + size * (np.arange(n) >= 3000)) / step)
+        table = columns(n) | {"time_s": np.arange(n) * 1.0, "temperature_c": read}
+        run = dataset_of(tmp_path / f"R{size}", table).runs[0]
+        assert [jump.time_s for jump in facts_of(run, run.rows()).jumps] == found
 
 
 def test_weights_that_cancel(plain: Dataset, model_dict: dict[str, Any]) -> None:

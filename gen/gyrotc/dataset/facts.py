@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,6 +19,8 @@ _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
 _CELL_ROWS = 5  # fewer do not average the resolution of a thermometer
 _HOLD_C_PER_MIN = 0.1  # slower than this a chamber holds, or settles
 _JUMP_SIGMAS = 10.0  # no normal deviation reaches it
+_WAVERING = 0.9  # of departures: more are no jumps
+_WAVERING_SIGMAS = NormalDist().inv_cdf(0.5 + _WAVERING / 2.0)
 _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
 _HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
 _MAX_JUMPS = 20  # that are listed: enough to see a pattern
@@ -207,6 +210,8 @@ def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, 
         return ()
     departure = _departures(np.diff(temperature))
     noise = MAD_TO_SIGMA * median(departure)
+    if noise == 0.0:  # a coarse thermometer stays where it is most times; by how much it wavers, its larger steps tell
+        noise = float(np.quantile(departure, _WAVERING)) / _WAVERING_SIGMAS
     found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
     changes = _changes(temperature)
     last = changes[np.searchsorted(changes, found, side="right") - 1]
