@@ -44,6 +44,8 @@ def attribution(**changes: Any) -> Any:
         ("explained", attribution(), NOISE),
         ("ambiguous", attribution(rivals=(("hysteresis",),)), []),
         ("partial", attribution(misfit_p=1e-4, share=0.95), []),
+        ("partial", attribution(misfit_p=1e-9, share=0.85), []),
+        ("unexplained", attribution(misfit_p=1e-9, share=0.75), []),
         ("unexplained", attribution(misfit_p=1e-9, share=0.3), []),
         ("unexplained", attribution(causes=(), rivals=()), []),
         ("unexplained", attribution(other=SimpleNamespace(lead=1e6)), []),

@@ -210,7 +210,7 @@ def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, 
         return ()
     departure = _departures(np.diff(temperature))
     noise = MAD_TO_SIGMA * median(departure)
-    if noise == 0.0:  # a coarse thermometer stays where it is most times; by how much it wavers, its larger steps tell
+    if noise == 0.0:  # a coarse thermometer stays where it is most times; its larger steps tell how it wavers
         noise = float(np.quantile(departure, _WAVERING)) / _WAVERING_SIGMAS
     found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
     changes = _changes(temperature)
