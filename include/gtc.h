@@ -268,20 +268,20 @@ typedef struct {
  * calls, which is linked once; stack at the deepest call, whatever terms a table has. Other targets:
  * docs/results.md of gyrotc.
  *               f32 code  stack   q31 code  stack
- *   check           4450    410       3520    430
+ *   check           4450    410       3550    430
  *   open            2720    440       2490    460
- *   map              910     20        760    120
+ *   map              910     20        790    120
  *   init            2560    260       2360    290
- *   sample          5410    210       5780    370
- *   sample_at       5750    220       6120    380
- *   missed          4630    200       5190    360
+ *   sample          5480    210       5840    370
+ *   sample_at       5810    220       6170    380
+ *   missed          4700    200       5240    360
  *   bias              80      0         70     10
- *   snapshot        1110     30       1880    110
- *   rezero          1350     40       2240    110
+ *   snapshot        1180     40       1900    140
+ *   rezero          1430     40       2290    140
  *   unzero           120      0        110     10
  *   angle            340      0        180     20
  *   save             560     30        550     30
- *   restore         4270    770       3970    830 */
+ *   restore         4310    770       3970    830 */
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
