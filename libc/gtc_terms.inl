@@ -45,7 +45,7 @@ static void FN(nothing)(STATE *state, uint_least32_t i, NUM x)
  *
  * z <- z + gain (T - z) once a block. Parameters: gain; amplitude; rate, block / tau: where it is not 0
  * the map sees z and (T - z) rate instead of T and its slope. Adds amplitude (z - T). What no call can have
- * left in z (something else wrote there) would take years to follow, so z begins again at T. */
+ * left in z (something else wrote there) would take long to follow, so z begins again at T. */
 
 static void FN(memory_follow)(NUM z[2], NUM x, NUM gain)
 {

@@ -7,7 +7,6 @@ from figures alone: no name of a file, folder or serial plays a part.
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import Dataset, RunFacts, earth_rate_warning
-from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA
+from ..metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
 from ..model import Model
 from ..results.training import Training
 from .recorded import shared_rows_findings, sign_findings
@@ -196,10 +195,8 @@ def _contradictions(
     for members in np.split(order, np.flatnonzero(np.diff(place.reshape(-1)[order])) + 1):
         if len(members) < 2:
             continue
-        if len(members) > 2:
-            others = [statistics.median(mean[members].tolist())] * len(members)
-        else:  # of two, each against the other
-            others = [float(mean[m]) for m in members[::-1]]
+        other_one = [float(mean[m]) for m in members[::-1]]  # of two
+        others = [median(mean[members])] * len(members) if len(members) > 2 else other_one
         for m, other in zip(members, others, strict=True):
             departures.setdefault(int(keys[m, 2]), []).append(float(mean[m]) - other)
     for k, values in departures.items():
