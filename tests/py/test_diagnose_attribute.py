@@ -133,7 +133,7 @@ def test_the_planted_cause_is_named_with_its_parameters(case: Case) -> None:
     width, size = cause.parameters["width_c"], cause.parameters["amplitude_dph_per_c"]
     assert width.low < WIDTH_C < width.high and width.high - width.low < 0.5 * WIDTH_C
     assert size.low < SIZE < size.high
-    assert case.found.share > 0.9 and case.found.misfit_p > 0.01
+    assert case.found.left.share > 0.9 and case.found.left.p_value > 0.01
     assert case.found.other.lead < -2.0, "no shape without a name does better"
 
 
@@ -171,8 +171,8 @@ def test_a_choice_without_asking_takes_the_same_cause(case: Case) -> None:
 def test_what_is_left_after_a_wrong_cause_is_not_noise(case: Case) -> None:
     wrong = Candidate("warm_up", {"tau_s": 1800.0}, "columns")
     refined = refine(case.search, case.gains, (wrong,))
-    p_value, share = misfit(case.search.extended(model_columns(refined)), "map and beside", refined, 1.0)
-    assert p_value < 1e-6 and share < 0.1
+    found = misfit(case.search.extended(model_columns(refined)), "map and beside", refined)
+    assert found.p_value < 1e-6 and found.share < 0.1
 
 
 def test_a_shape_without_a_name_beats_causes_where_it_was_planted(case: Case) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gyrotc.commands.diagnosis_lines import diagnosis_lines
 from gyrotc.diagnose.advice import VERDICTS, next_steps
+from gyrotc.diagnose.attribute.misfit import Misfit
 from gyrotc.diagnose.discrepancy.declared_noise import NoiseFinding
 from gyrotc.diagnose.verdict import verdict_of
 from gyrotc.results.diagnosed import (
@@ -28,10 +29,9 @@ def attribution(**changes: Any) -> Any:
     """What `verdict_of` reads: one cause that explains everything, without rivals."""
     plain: dict[str, Any] = {
         "detected": True,
-        "causes": ("a cause",),
+        "causes": (SimpleNamespace(plausible=True),),
         "rivals": ((),),
-        "misfit_p": 0.5,
-        "share": 1.0,
+        "left": Misfit(0.5, 0.5, 1.0),
     }
     plain["other"] = SimpleNamespace(lead=-np.inf)
     return SimpleNamespace(**{**plain, **changes})
@@ -43,10 +43,13 @@ def attribution(**changes: Any) -> Any:
         ("explained", attribution(), []),
         ("explained", attribution(), NOISE),
         ("ambiguous", attribution(rivals=(("hysteresis",),)), []),
-        ("partial", attribution(misfit_p=1e-4, share=0.95), []),
-        ("partial", attribution(misfit_p=1e-9, share=0.85), []),
-        ("unexplained", attribution(misfit_p=1e-9, share=0.75), []),
-        ("unexplained", attribution(misfit_p=1e-9, share=0.3), []),
+        ("partial", attribution(left=Misfit(1e-4, 1e-4, 0.95)), []),
+        ("partial", attribution(left=Misfit(1e-9, 1e-9, 0.85)), []),
+        ("unexplained", attribution(left=Misfit(1e-9, 1e-9, 0.75)), []),
+        ("unexplained", attribution(left=Misfit(1e-9, 1e-9, 0.3)), []),
+        ("explained", attribution(left=Misfit(0.2, 1e-9, 0.95)), NOISE),
+        ("unexplained", attribution(left=Misfit(0.2, 1e-9, 0.75)), NOISE),
+        ("unexplained", attribution(causes=(SimpleNamespace(plausible=False),)), []),
         ("unexplained", attribution(causes=(), rivals=()), []),
         ("unexplained", attribution(other=SimpleNamespace(lead=1e6)), []),
         ("noise_differs", attribution(detected=False, causes=(), rivals=()), NOISE),

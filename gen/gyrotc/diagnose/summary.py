@@ -38,7 +38,7 @@ from .extend.refit import terms_of
 from .noise_words import NOISE_WORDS
 from .pipeline import Analysis
 from .signatures.candidates import diagnosed
-from .verdict import verdict_of
+from .verdict import looks_like, verdict_of
 
 __all__ = ["not_testable", "result_of"]
 
@@ -295,8 +295,8 @@ def _unexplained(analysis: Analysis) -> Unexplained:
     """What is left: how much of the structure the best cause holds, and where the rest lies."""
     attribution = analysis.attribution
     return Unexplained(
-        share_explained=attribution.share,
-        p_value=attribution.misfit_p,
+        share_explained=attribution.left.share,
+        p_value=attribution.left.worst,
         best_partial_match=tuple(c.candidate.id for c in attribution.causes),
-        looks_like=attribution.other.name if attribution.other.lead > 0.0 else None,
+        looks_like=looks_like(attribution),
     )

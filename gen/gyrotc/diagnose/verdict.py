@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from ..results.diagnosed import DiagnosisVerdict
 from .attribute.attribution import Attribution
 from .discrepancy.declared_noise import NoiseFinding
+from .signatures.candidates import shape_parameter
 
-__all__ = ["holds", "verdict_of"]
+__all__ = ["holds", "looks_like", "verdict_of"]
 
 _MISFITS = ((0.05, 0.5), (0.01, 0.8))
-"""p-value of what is left, and share of the structure below which the causes then explain too little.
+"""p-value of what is left (`Misfit.worst`), and share of the structure below which the causes then explain too little.
 
 However clear the remainder: where four fifths are a cause and no other shape does better, it is that cause in another
 form than the catalogue's (relays in place of a play), and the remainder is told beside it.
@@ -23,8 +24,10 @@ _LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not 
 
 def holds(attribution: Attribution) -> bool:
     """Whether causes are given at all: not when most of the structure is none of them, or has another shape."""
-    little = any(attribution.misfit_p < p and attribution.share < share for p, share in _MISFITS)
-    return bool(attribution.causes) and not little and attribution.other.lead < _LEAD
+    left = attribution.left
+    little = any(left.worst < p and left.share < share for p, share in _MISFITS)
+    plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
+    return plausible and not little and attribution.other.lead < _LEAD
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
@@ -37,7 +40,20 @@ def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> Diagn
     if attribution.detected and not holds(attribution):
         return "unexplained"
     if holds(attribution):
-        if attribution.misfit_p < _REMAINDER:
+        if attribution.left.p_value < _REMAINDER:
             return "partial"
         return "ambiguous" if any(attribution.rivals) else "explained"
     return "noise_differs" if noise else "consistent"
+
+
+def looks_like(attribution: Attribution) -> str | None:
+    """What structure without a name resembles: another shape, or a cause with a parameter that no gyro has."""
+    if attribution.other.lead > 0.0:
+        return attribution.other.name
+    for cause in attribution.causes:
+        parameter = shape_parameter(cause.candidate.id)
+        if parameter is not None and not cause.plausible:
+            value = f"{parameter.name} = {cause.parameters[parameter.name].value:.2g} {parameter.unit}"
+            known = f"{parameter.low:g} to {parameter.high:g} {parameter.unit} are known"
+            return f"{cause.candidate.id.replace('_', ' ')} with {value}, where {known}"
+    return None

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from ..detect.detection import Found, detect
 from ..detect.joined import Held
-from ..detect.project import project
 from ..detect.search import Search
 from ..signatures.candidates import Candidate
 from .contest import Contest, contest
 from .gains import Gains, Point
 from .marginal_likelihood import MarginalLikelihood
-from .misfit import misfit
+from .misfit import Misfit, explained, misfit
 from .pairs import clear_pair, makes_sense
 from .refine import Refined, model_columns, refine, sized
 from .rivals import Rival, near_of, probabilities_of, ranked_rivals
@@ -47,8 +46,7 @@ class Attribution:
         rivals: For each, other causes in its place that explain the recordings as well, nearest first.
         probabilities: For each, of every cause in its place, itself first, by id.
         gain: Twice the log-likelihood ratio of all causes together.
-        misfit_p: p-value of what is left against the dictionary.
-        share: Share of the detectable structure that the causes explain.
+        left: What all causes leave.
         last: The search after the last cause.
         other: The best shape that no cause has, and its lead over the causes.
     """
@@ -58,8 +56,7 @@ class Attribution:
     p_values: tuple[float, ...]
     rivals: tuple[tuple[Rival, ...], ...]
     gain: float
-    misfit_p: float
-    share: float
+    left: Misfit
     last: list[Found]
     other: Contest
     probabilities: tuple[dict[str, float], ...] = ()
@@ -77,24 +74,23 @@ class _Stage:
     refined: tuple[Refined, ...]
     found: list[Found]
     gain: float
-    misfit_p: float
-    share: float
+    left: Misfit
 
     @property
     def remains(self) -> bool:
-        return self.misfit_p < _MISFIT or self.found[0].p_value <= _LEVEL
+        return self.left.p_value < _MISFIT or self.found[0].p_value <= _LEVEL
 
     @property
     def well(self) -> bool:
         """Whether the causes leave so little that a set of them is taken for the whole explanation."""
-        return self.misfit_p >= _WELL or (self.misfit_p >= _NEARLY and self.share >= _MOST)
+        return self.left.p_value >= _WELL or (self.left.p_value >= _NEARLY and self.left.share >= _MOST)
 
 
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = detect(search, "map and beside")
     if first[0].p_value > _LEVEL:
-        return Attribution(first, (), (), (), 0.0, 1.0, 1.0, first, Contest("", -np.inf))
+        return Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
     gains = Gains(search)
     singles = list(gains.single())
     weigher = MarginalLikelihood(gains)
@@ -115,8 +111,7 @@ def attribute(search: Search) -> Attribution:
         p_values=tuple(_p_value(first, r.candidate) for r in refined),
         rivals=tuple(map(near_of, likely)),
         gain=stage.gain,
-        misfit_p=stage.misfit_p,
-        share=stage.share,
+        left=stage.left,
         last=stage.found,
         other=_contest(gains, refined, tuple(map(near_of, ranked))),
         probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
@@ -143,9 +138,8 @@ def _contest(gains: Gains, causes: tuple[Refined, ...], rivals: tuple[tuple[Riva
 def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
     refined = refine(search, gains, chosen)
     current, held = _with(search, refined)
-    gain = _total(current, held)
-    misfit_p, share = misfit(current, held, refined, gain)
-    return _Stage(chosen, refined, detect(current, held), gain, misfit_p, share)
+    gain = explained(current, current.likeliest, held)
+    return _Stage(chosen, refined, detect(current, held), gain, misfit(current, held, refined))
 
 
 def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
@@ -154,7 +148,7 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
     third = _third(two.found, pair) if two.remains else None
     if third is not None:
         three = _stage(search, gains, (*pair, third))
-        if three.misfit_p >= _WELL > two.misfit_p and _believed(gains, three.refined):
+        if three.left.p_value >= _WELL > two.left.p_value and _believed(gains, three.refined):
             return three
     return two if two.well else one
 
@@ -195,14 +189,6 @@ def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Held]:
     current = search.extended(model_columns(causes))
     swapped = any(c.candidate.role == "input" for c in causes)  # the replaced map stands beside the plain one
     return current, "beside" if swapped else "map and beside"
-
-
-def _total(current: Search, held: Held) -> float:
-    """Energy that the causes explain beyond the map, at the likeliest colour, over the noise."""
-    view = current.likeliest
-    before = project(current, view, "map")
-    after = project(current, view, held)
-    return max((before.rest - after.rest) / view.scale**2, 0.0)
 
 
 def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:

@@ -1,14 +1,16 @@
 """Lack of fit: is anything left, and are the causes what they seem?
 
-Three tests under the likeliest colour and under the declared one. What the causes leave is held against the
-whole dictionary, flat and weighted; and every cause must have one amplitude over all runs, temperatures and
-directions: a foreign effect that happens to look like a cause in one run does not in the next.
+Three tests: what the causes leave is held against the whole dictionary, flat and weighted; and every cause must
+have one amplitude over all runs, temperatures and directions: a foreign effect that happens to look like a cause in
+one run does not in the next. Each under every colour of the noise that the data allow, and on their average by
+likelihood, for a colour that is a little too fast makes structure of the noise; and under the declared noise, unless
+the data contradict it: what is left of a wrong declaration is no structure.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +27,7 @@ from ..orthonormal import main_directions, orthonormal
 from ..signatures.signature_bank import direction_of
 from .refine import Refined
 
-__all__ = ["misfit"]
+__all__ = ["Misfit", "explained", "misfit"]
 
 Array = NDArray[np.float64]
 
@@ -33,29 +35,69 @@ _DIRECTION_C = (
     3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
 )
 _MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
+_TESTS = 3  # of which the smallest p-value counts
 _OWN = 1e-3  # share of a column that must be left after the model is projected out
 
 
-def misfit(current: Search, held: Held, causes: Sequence[Refined], gain: float) -> tuple[float, float]:
-    """p-value of what is left, and the share of the structure that the causes explain.
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """What causes leave.
+
+    Attributes:
+        p_value: p-value of what is left, under the noise that the data allow and that which is declared, unless the
+            data contradict it.
+        worst: The same with the declared noise in any case.
+        share: Share of the structure that the causes explain, under the noise of `p_value`.
+    """
+
+    p_value: float
+    worst: float
+    share: float
+
+
+def misfit(current: Search, held: Held, causes: Sequence[Refined]) -> Misfit:
+    """Whether anything is left.
 
     Args:
         current: The search with the causes taken.
         held: What the model holds: not the map where a cause replaces its input.
         causes: The causes that were taken.
-        gain: What they explain, twice the log-likelihood.
     """
-    views = [current.likeliest]
-    if current.declared is not None:
-        view = current.view_of(current.declared)
-        views.append(replace(view, scale=max(view.scale, 1.0)))
     changed = _changed(current, causes)
-    p_value, left = 1.0, 0.0
-    for view in views:
-        found = [*_dictionary(project(current, view, held)), _changes(current, view, held, changed)]
-        p_value = min([p_value, *(p for p, _ in found)])
-        left = max([left, *(e for _, e in found)])
-    return min(1.0, 3.0 * len(views) * p_value), gain / max(gain + left, 1e-300)
+    views = [current.views[k] for k in current.allowed]
+    weight = np.exp([view.log_likelihood - current.likeliest.log_likelihood for view in views])
+    p_value, share = _told(current, views, weight / weight.sum(), held, changed)
+    if current.declared is None:
+        return Misfit(p_value, p_value, share)
+    view = current.view_of(current.declared)
+    declared = replace(view, scale=max(view.scale, 1.0))
+    own_p, own_share = _told(current, [declared], np.ones(1), held, changed)
+    worst = min(1.0, 2.0 * min(p_value, own_p))
+    if current.contradicts(view):
+        return Misfit(p_value, worst, share)
+    return Misfit(worst, worst, min(share, own_share))
+
+
+def _told(
+    current: Search, views: Sequence[View], weight: Array, held: Held, changed: Array
+) -> tuple[float, float]:
+    """The same where the noise has one of some colours, each as likely as its weight says."""
+    tests = np.array([_tests(current, view, held, changed) for view in views])
+    p_values, left = np.einsum("v,vtk->kt", weight, tests)
+    gain = float(weight @ [explained(current, view, held) for view in views])
+    return min(1.0, _TESTS * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
+
+
+def _tests(current: Search, view: View, held: Held, changed: Array) -> list[tuple[float, float]]:
+    """p-value and energy left of every test under one colour."""
+    return [*_dictionary(project(current, view, held)), _changes(current, view, held, changed)]
+
+
+def explained(current: Search, view: View, held: Held) -> float:
+    """Energy that the causes of a search explain beyond the map under one colour, over the noise."""
+    before = project(current, view, "map")
+    after = project(current, view, held)
+    return max((before.rest - after.rest) / view.scale**2, 0.0)
 
 
 def _dictionary(projection: Projection) -> list[tuple[float, float]]:

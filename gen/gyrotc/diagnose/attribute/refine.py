@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 2  # several parameters are moved one after the other, twice
 _STEP = 0.02  # relative step of the derivative to a parameter
+_BEYOND = 1.5  # how far beyond the catalogue's range a parameter may lie: that range is of the order of what gyros have
 _FINEST_C = 1.25  # spacing of the map's local functions once it is named too coarse
 
 
@@ -49,6 +50,16 @@ class Refined:
     contribution: Array
     edges: Array | None
     profile: Array | None
+
+    @property
+    def plausible(self) -> bool:
+        """Whether its nonlinear parameter may lie in the catalogue's range, or not far beyond."""
+        parameter = shape_parameter(self.candidate.id)
+        interval = self.parameters.get(parameter.name) if parameter is not None else None
+        if parameter is None or interval is None:
+            return True
+        ends = abs(interval.low), abs(interval.high)
+        return max(ends) >= parameter.low / _BEYOND and min(ends) <= parameter.high * _BEYOND
 
 
 def model_columns(causes: Sequence[Refined]) -> Array:

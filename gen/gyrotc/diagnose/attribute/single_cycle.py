@@ -144,7 +144,7 @@ class Cycle:
             p_values=(self.p_value,) * count,
             rivals=(self.rivals, *((),) * (count - 1)),
             probabilities=(),
-            share=share,
+            left=replace(before.left, share=share),
         )
 
 

@@ -22,6 +22,8 @@ __all__ = ["Search", "open_search"]
 
 Array = NDArray[np.float64]
 
+_COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour and one that is contradicted
+
 
 @dataclass(frozen=True)
 class Search:
@@ -85,6 +87,10 @@ class Search:
     def view_of(self, colour: Colour) -> View:
         """The view under any colour."""
         return view_of(self.question, colour)
+
+    def contradicts(self, view: View) -> bool:
+        """Whether the data are so much likelier under another colour that that of the view cannot be theirs."""
+        return 2.0 * (self.likeliest.log_likelihood - view.log_likelihood) > _COLOUR_RATIO
 
     def map_weights(self) -> Array:
         """Least-squares weights of the map, shape (m,)."""

@@ -17,7 +17,6 @@ __all__ = ["NoiseFinding", "noise_findings"]
 
 _LEVEL_P = 1e-3  # one in a thousand campaigns with noise as declared is told to have another level
 _LEVEL_RATIO = 0.06  # a level that differs by less is as declared
-_COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour and the declared one
 _HIDDEN_P = 0.003  # a third of the 1 % of the search: level and colour are tested beside it
 _SEED = 20140917  # any: it fixes the draws, so that a diagnosis repeats to the last digit
 
@@ -51,9 +50,8 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
         if p < _LEVEL_P and abs(np.log(ratio)) > _LEVEL_RATIO:
             text = f"the noise is {ratio:.2f} times the declared level"
             found.append(NoiseFinding("noise_level", p, {"ratio": ratio}, text))
-    gain = 2.0 * (best.log_likelihood - view.log_likelihood)
-    if gain > _COLOUR_RATIO:
-        p = float(chdtrc(2, gain))
+    if search.contradicts(view):
+        p = float(chdtrc(2, 2.0 * (best.log_likelihood - view.log_likelihood)))
         found.append(
             NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared")
         )
