@@ -1,7 +1,8 @@
 """Runs that are another gyro's as a whole: a reversed sign, exchanged axes, another gain; told before any cause.
 
 Sign and axes are those of the checks of recordings (`judge.orientation`, `judge.recorded`). A gain is found where the
-mean rate over temperature is that of the other runs with a factor, where these agree with one another.
+mean rate over temperature is that of the other runs with a factor, where these agree with one another, and where no
+memory of the temperature explains the run as well.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from ...dataset import Curve, Dataset, facts_of
 from ...judge.orientation import orientation_findings
 from ...judge.recorded import sign_findings
 from .events import Event
+from .turned_within import another_gain_throughout
 
 __all__ = ["turned_runs"]
 
@@ -38,6 +40,8 @@ def turned_runs(dataset: Dataset) -> list[Event]:
     files = {run.file for run in training}
     curves = [curve for curve in dataset.curves if curve.file in files]
     for file, factor, low, high in _gains(curves, dataset.axis):
+        if not another_gain_throughout(training, [run.file for run in training].index(file)):
+            continue
         text = (
             f"The rates of {file} are those of the other runs times {factor:.3g} (95 % {low:.3g} ... {high:.3g}): its "
             "scale was another one. Mend it, or take the run out of dataset.toml."

@@ -3,7 +3,8 @@
 The yardstick is the other runs' mean rate over temperature, as for runs that are another gyro's as a whole (`turned`).
 On either side of every time of a run a level, a factor on that curve and one on dT/dt are fitted; a change is told
 where the factors differ by far more than their errors, and these are stretched by what the other runs show among
-themselves, at the best place of each.
+themselves, at the best place of each. It also has to explain the run better than any memory of the temperature does
+(`remembered`): in a unit with hysteresis one branch is the curve of the others with a factor.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from ...dataset import Dataset, Run
 from ...frontend.cells import cell_means
 from ...quantiles import CHI2_95_ONE
 from .events import Event
+from .remembered import evidence_beside_memories
 
-__all__ = ["gain_changes"]
+__all__ = ["another_gain_throughout", "gain_changes"]
 
 Floats = NDArray[np.float64]
 _Means = tuple[Floats, Floats, Floats]
@@ -35,6 +37,7 @@ _SWING = (
 _MOST_ALIKE = (
     0.95  # correlation of neighbours that is counted: beyond it a side has hardly two independent means
 )
+_EVIDENCE = 10.0  # twice the logarithm of the odds against a memory: very strong
 _PLACE_C = 1.0  # what counts as the same temperature, as for curves of runs
 
 
@@ -77,7 +80,7 @@ def _clear_changes(means: Sequence[_Means]) -> Iterator[tuple[int, _Change]]:
             continue
         among = [_change(m, _usual([o for o in others if o is not m])) for m in others]
         stretch = max([1.0, *(abs(c.factor - 1.0) / c.error for c in among if c is not None)])
-        if change.beyond(stretch):
+        if change.beyond(stretch) and _beside_memories(own, _usual(others), change.time_s[0]) > _EVIDENCE:
             yield k, replace(change, error=change.error * stretch)
 
 
@@ -117,6 +120,35 @@ def _usual(others: Sequence[_Means]) -> tuple[Floats, Floats]:
     levels = [np.mean([c[t] for t in shared if t in c] or [0.0]) for c in curves]
     usual = [np.mean([c[t] - m for c, m in zip(curves, levels, strict=True) if t in c]) for t in shared]
     return _PLACE_C * np.array(shared), np.array(usual)
+
+
+def another_gain_throughout(runs: Sequence[Run], number: int) -> bool:
+    """Whether a factor on the other runs' curve explains a run better than that curve with any memory."""
+    means = [_means(run) for run in runs]
+    usual = _usual([m for k, m in enumerate(means) if k != number])
+    if len(usual[0]) < _LEAST_BLOCKS:
+        return True
+    curve, used, side = _beside(means[number], usual)
+    t, x, y = means[number]
+    return evidence_beside_memories((t, x, y - curve), used, side, side[:, :0]) > _EVIDENCE
+
+
+def _beside_memories(own: _Means, usual: tuple[Floats, Floats], at_s: float) -> float:
+    """Evidence for levels, factors and rates that differ before and behind a time, against memories of the run."""
+    curve, used, side = _beside(own, usual)
+    behind = (own[0] >= at_s)[:, None]
+    return evidence_beside_memories(own, used, np.hstack([side * ~behind, side * behind]), curve[:, None])
+
+
+def _beside(own: _Means, usual: tuple[Floats, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    """The others' curve at a run's temperatures, where they have one, and columns level, curve, rate."""
+    t, x, _ = own
+    curve = np.interp(x, *usual)
+    return (
+        curve,
+        (x >= usual[0][0]) & (x <= usual[0][-1]),
+        np.column_stack([np.ones_like(t), curve, np.gradient(x, t)]),
+    )
 
 
 def _change(own: _Means, usual: tuple[Floats, Floats]) -> _Change | None:
