@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,9 +12,14 @@ from gyrotc.dataset import load
 from gyrotc.diagnose.screen.events import Event, accepted, events_of
 from gyrotc.diagnose.screen.turned import turned_runs
 from gyrotc.diagnose.screen.turned_within import gain_changes
+from gyrotc.frontend import lasting_steps
 from gyrotc.frontend.beginning_drifts import drifts_of
 from gyrotc.frontend.lasting_steps import steps_of
 from recordings import toml, write_csv
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.blind.other.record import draw_recording, write
 
 SEED, ROW_S, HOURS = 20261122, 10.0, 8
 NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means
@@ -62,6 +68,64 @@ def test_recordings_without_steps_have_none() -> None:
         alarms += bool(steps_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
     print(f"{alarms} of 40 sets with a step")
     assert alarms <= 3, alarms
+
+
+def test_one_record_in_as_many_as_is_said_has_a_step_by_chance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At an alarm rate of a fifth, where short records of white noise show it: too few looks had made it a quarter."""
+    monkeypatch.setattr(lasting_steps, "FALSE_ALARMS", 0.2)
+    rng = np.random.default_rng(SEED + 2)
+    time = np.arange(7200.0)
+    records = [(time, np.full(time.size, 20.0), rng.standard_normal(time.size)) for _ in range(200)]
+    alarms = sum(bool(steps_of([record])) for record in records)
+    print(f"{alarms} of 200 records with a step")
+    assert alarms <= 36, alarms
+
+
+def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None:
+    """Six passages over 2 C in half a minute. A step in the same place of one passage alone is told."""
+    rng = np.random.default_rng(SEED + 3)
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    temperature = np.interp(time / 3600.0, [0, 1, 1.25, 3, 3.25, 6, 6.25, 8], [0, 0, 60, 60, 0, 0, 60, 60])
+    feature = np.tanh((temperature - 30.0) / 1.0)
+    at = float(time[np.searchsorted(temperature[time < 7200.0], 30.0)])
+    for size, lasting, expected in ((0.01, 0.0, 0), (0.0, 0.02, 1)):
+        rates = [size * feature + NOISE_DPH * rng.standard_normal(time.size) for _ in range(2)]
+        rates[1] = rates[1] + lasting * (time >= at)
+        found = steps_of([(time, temperature, rate) for rate in rates])
+        assert len(found) == expected, (size, found)
+        assert all(step.run == 1 and step.time_s[1] <= at <= step.time_s[2] for step in found)
+
+
+def test_limits_of_time_and_size_hold_in_as_many_cases_as_they_say() -> None:
+    """Sixty steps of 9 to 20 noise floors, on ramps and holds. A step within a cell had been told too small."""
+    rng = np.random.default_rng(SEED + 4)
+    found, times, sizes = 0, 0, 0
+    for _ in range(60):
+        run = recording(rng, 1)
+        at, size = 3600.0 * rng.uniform(1.2, 6.8), 7e-4 * rng.uniform(9.0, 20.0)
+        rate = run["rate_dph"] + size * (run["time_s"] >= at)
+        steps = steps_of([(run["time_s"], run["temperature_c"], rate)])
+        for step in [s for s in steps if abs(s.time_s[0] - at) < 600.0][:1]:
+            found += 1
+            times += step.time_s[1] <= at <= step.time_s[2]
+            sizes += step.size_dph[1] <= size <= step.size_dph[2]
+    print(f"{found} of 60 steps, times hold {times}, sizes {sizes}")
+    assert found >= 54 and min(times, sizes) >= 0.87 * found
+
+
+@pytest.mark.parametrize(
+    ("seed", "number", "name"),
+    [
+        (1865575792, 13, "hysteresis"),
+        (1809580124, 1008, "hysteresis"),
+        (1809580124, 42, "map_too_coarse"),
+    ],
+)
+def test_what_a_unit_always_does_is_no_event(tmp_path: Path, seed: int, number: int, name: str) -> None:
+    """Relays of which a branch looked like a gain that changed, in a run and of a run; a kink passed in a minute."""
+    write(draw_recording(seed, number, "one", name), tmp_path, "A")
+    dataset = load(tmp_path)
+    assert [e.id for e in (*turned_runs(dataset), *gain_changes(dataset), *events_of(dataset))] == []
 
 
 def test_recordings_without_drifts_have_none_though_temperatures_are_followed_late() -> None:

@@ -32,6 +32,7 @@ _CELLS = 20  # of a half window
 _LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what noise makes
 _KNOWN = 6.0  # degrees of freedom of a scale from a median, for each window: 0.4 for each of 15 places
 _STILL_THERE = 0.8  # of the limit, what is to be left beside other passages: their own noise costs some
+_NOT_OF_MAP = 0.6  # of the step: their noise costs a true one a tenth, the map's own leaves a third at most
 _OWN = 0.02  # of a column's size, what it has to have on its own to count: what is left of less is rounding
 _LEAST_ENERGY = 1e-3  # of a step's own, below which what stands beside it holds it
 _EDGE = 3  # cells on either side of a place that its time may lie in
@@ -147,7 +148,8 @@ class _Windows:
             k = int(np.argmax(np.where(open_, far, 0.0)))
             open_[max(k - self.width, 0) : k + self.width + 1] = False
             at = k + self.width  # the first cell behind the step
-            if self._beside_map(k, runs) < _STILL_THERE * limit * scale:
+            least = max(_STILL_THERE * limit * scale, _NOT_OF_MAP * float(abs(self.z[k])))
+            if self._beside_map(k, runs) < least:
                 continue
             placed = self._behind_gap if over_gap[k] else self._placed
             yield placed(at, scale, float(far[k]))
@@ -248,10 +250,10 @@ class _Fit:
     def without_step(self, first_s: float, time_s: Floats) -> Floats:
         """What the fit says at some times less its step from a time on, deg/h."""
         left = self.y - self.step(first_s)[0] * self._behind(first_s)
-        return np.interp(time_s, self.t, self.q @ (self.q.T @ left))
+        return np.asarray(np.interp(time_s, self.t, self.q @ (self.q.T @ left)))
 
     def _behind(self, first_s: float) -> Floats:
-        return np.clip((self.t - first_s) / self.cell_s + 0.5, 0.0, 1.0)
+        return np.asarray(np.clip((self.t - first_s) / self.cell_s + 0.5, 0.0, 1.0))
 
 
 def _fitted(

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Rows = tuple[Floats, Floats, Floats]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
 
-_BINS = 12  # over the temperatures of a window: half as many as the fewest cells that it has
+_BINS = 48  # over the temperatures of a window, which has 24 to 40 cells: a quick passage is as sharp as in its cells
 _WHOLE = 0.75  # of these temperatures, what a passage has to cover for its level to be that of the others
 _LEAST_C = 0.3  # what a chamber's ripple moves is no passage
 
