@@ -30,6 +30,7 @@ def attribution(**changes: Any) -> Any:
     plain: dict[str, Any] = {
         "detected": True,
         "causes": (SimpleNamespace(plausible=True),),
+        "p_values": (1e-3,),
         "rivals": ((),),
         "left": Misfit(0.5, 0.5, 1.0),
     }
@@ -50,6 +51,7 @@ def attribution(**changes: Any) -> Any:
         ("explained", attribution(left=Misfit(0.2, 1e-9, 0.95)), NOISE),
         ("unexplained", attribution(left=Misfit(0.2, 1e-9, 0.75)), NOISE),
         ("unexplained", attribution(causes=(SimpleNamespace(plausible=False),)), []),
+        ("unexplained", attribution(p_values=(0.98,), left=Misfit(0.06, 0.06, 0.12)), []),
         ("unexplained", attribution(causes=(), rivals=()), []),
         ("unexplained", attribution(other=SimpleNamespace(lead=1e6)), []),
         ("noise_differs", attribution(detected=False, causes=(), rivals=()), NOISE),

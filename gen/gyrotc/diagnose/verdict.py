@@ -19,15 +19,21 @@ form than the catalogue's (relays in place of a play), and the remainder is told
 """
 
 _REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much
+_SEEN = 0.05  # p-value over the whole search that at least one of the causes has itself
 _LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not hold their own
 
 
 def holds(attribution: Attribution) -> bool:
-    """Whether causes are given at all: not when most of the structure is none of them, or has another shape."""
+    """Whether causes are given at all.
+
+    Not where most of the structure is none of them, where it has another shape or a parameter that no gyro has, and
+    not where the search sees none of them: something else was detected then, in the place of which they came.
+    """
     left = attribution.left
     little = any(left.worst < p and left.share < share for p, share in _MISFITS)
     plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
-    return plausible and not little and attribution.other.lead < _LEAD
+    seen = min(attribution.p_values, default=1.0) <= _SEEN
+    return plausible and seen and not little and attribution.other.lead < _LEAD
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
