@@ -62,9 +62,18 @@ def next_steps(
 
 
 def sentence_of(
-    verdict: DiagnosisVerdict, found: Sequence[NamedCause], extended: ExtendedModel | None, undecided: str
+    verdict: DiagnosisVerdict,
+    found: Sequence[NamedCause],
+    extended: ExtendedModel | None,
+    undecided: str,
+    form: str = "",
 ) -> str:
-    """The finding in one or two sentences; `undecided` says why a single cycle cannot tell of memory."""
+    """The finding in one to three sentences.
+
+    Args:
+        undecided: Why a single cycle cannot tell of memory.
+        form: How a cause differs from the catalogue's.
+    """
     why = f" about memory of the temperature: {undecided}" if undecided else ""
     causes = [c for c in found if c.family != "noise"]
     names = "; ".join(
@@ -81,6 +90,7 @@ def sentence_of(
         "unexplained": "There is structure that no cause of the catalogue explains.",
         "not_testable": f"The recordings cannot decide{why}.",
     }[verdict]
+    text += f" Here {form}." if form else ""
     share = extended.gain.share_of_excess_removed if extended is not None else None
     if share is None:
         return text

@@ -13,7 +13,6 @@ from ..terms import CATALOGUE
 from .attribute.attribution import Attribution, attribute
 from .attribute.gains import Gains
 from .attribute.overlap import overlap
-from .attribute.refine import model_columns
 from .detect.detection_limits import CauseLimit, detection_limits
 from .detect.joined import Channels
 from .detect.search import Search, open_search
@@ -109,7 +108,7 @@ def _extended(
     refuted = any(n.id in ("noise_level", "noise_colour") for n in noise)
     if not attribution.causes and not refuted:
         return None
-    beside = model_columns(attribution.causes) if attribution.causes else None
+    beside = attribution.columns if attribution.causes else None
     return ensemble_of(after, declared, beside=beside, estimated=refuted)
 
 
@@ -189,4 +188,4 @@ def _of_map(candidate: Candidate) -> bool:
 
 def _after(search: Search, attribution: Attribution) -> Search:
     """The search with the causes found taken out."""
-    return search.extended(model_columns(attribution.causes)) if attribution.causes else search
+    return search.extended(attribution.columns) if attribution.causes else search

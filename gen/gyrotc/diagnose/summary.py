@@ -119,7 +119,13 @@ def result_of(  # long: one line for each field of the result
         single_cycle=None if cycle is None else _single_cycle(cycle, extension),
         shipping=extension.crossed.result(),
         unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
-        text=sentence_of(verdict, listed, extended, cycle.not_testable if cycle is not None else ""),
+        text=sentence_of(
+            verdict,
+            listed,
+            extended,
+            cycle.not_testable if cycle is not None else "",
+            _form(analysis, causes),
+        ),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
         next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
@@ -184,6 +190,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
     near = attribution.rivals[k]
     rivals = tuple(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
     words = CATALOGUE[id].words
+    form = _form(analysis, [cause])
     named = NamedCause(
         id=id,
         family=CATALOGUE[id].family,
@@ -193,7 +200,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         equivalent=rivals,
         separate_by=separate_by(id, rivals[0]) if rivals else None,
         gain=extension.steps[k].result(),
-        signature=words.signature,
+        signature=f"{words.signature}; here {form}" if form else words.signature,
         remedy=words.remedy,
         separable_from_d=analysis.separations[k],
     )
@@ -207,6 +214,13 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         "equivalent_channels": channels or None,
     }
     return named.model_copy(update={name: value for name, value in told.items() if value is not None})
+
+
+def _form(analysis: Analysis, causes: Sequence[Refined]) -> str:
+    """How hysteresis among causes differs from the play that stands for it; empty where it does not."""
+    wide = analysis.attribution.wide
+    loops = any(CATALOGUE[c.candidate.id].family == "hysteresis" for c in causes)
+    return wide.text if wide is not None and loops else ""
 
 
 def _estimate(interval: Interval) -> Estimate:

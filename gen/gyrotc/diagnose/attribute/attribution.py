@@ -7,11 +7,12 @@ dictionary (lack of fit).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...terms import CATALOGUE
 from ..detect.detection import Found, detect
 from ..detect.joined import Held
 from ..detect.search import Search
@@ -20,10 +21,11 @@ from .contest import Contest, contest
 from .gains import Gains, Point
 from .marginal_likelihood import MarginalLikelihood
 from .misfit import Misfit, explained, misfit
-from .pairs import clear_pair, makes_sense
+from .pairs import best_of, clear_pair, makes_sense
 from .refine import Refined, model_columns, refine, sized
-from .rivals import Rival, near_of, probabilities_of, ranked_rivals
+from .rivals import Rival, near_of, odds_of, probabilities_of, ranked_rivals
 from .simulated_odds import calibrated
+from .wide_memory import WideMemory, outlasts, rate_independent
 
 __all__ = ["Attribution", "attribute", "choose"]
 
@@ -49,6 +51,7 @@ class Attribution:
         left: What all causes leave.
         last: The search after the last cause.
         other: The best shape that no cause has, and its lead over the causes.
+        wide: Hysteresis of any form, by which `left` is judged where one play leaves something; else None.
     """
 
     first: list[Found]
@@ -60,6 +63,12 @@ class Attribution:
     last: list[Found]
     other: Contest
     probabilities: tuple[dict[str, float], ...] = ()
+    wide: WideMemory | None = None
+
+    @property
+    def columns(self) -> Array:
+        """All columns that stand in the model when the causes are named, shape (N, k)."""
+        return _columns(self.causes, self.wide)
 
     @property
     def detected(self) -> bool:
@@ -75,6 +84,7 @@ class _Stage:
     found: list[Found]
     gain: float
     left: Misfit
+    wide: WideMemory | None = None
 
     @property
     def remains(self) -> bool:
@@ -94,17 +104,18 @@ def attribute(search: Search) -> Attribution:
     gains = Gains(search)
     singles = list(gains.single())
     weigher = MarginalLikelihood(gains)
-    stage = _stage(search, gains, weigher.preferred(singles).members)
+    stage = _stage(search, gains, _single(gains, singles, weigher).members)
     pairs: list[Point] = []
     if stage.remains:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
         pair = clear_pair(singles, weigher.preferred(pairs), gains.size)
         if pair is not None:
             stage = _deeper(search, gains, stage, pair.members)
+    stage = _widened(search, gains, stage)
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
     taken = tuple(stage.chosen[k] for k in order)
-    ranked, likely = _rivals(weigher, singles, pairs, taken)
+    ranked, likely = _rivals(weigher, singles, pairs, taken, _ahead(gains, stage, singles))
     return Attribution(
         first=first,
         causes=refined,
@@ -113,26 +124,70 @@ def attribute(search: Search) -> Attribution:
         gain=stage.gain,
         left=stage.left,
         last=stage.found,
-        other=_contest(gains, refined, tuple(map(near_of, ranked))),
+        other=_contest(gains, stage.wide, refined, tuple(map(near_of, ranked))),
         probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
+        wide=stage.wide,
     )
 
 
+def _single(gains: Gains, singles: list[Point], weigher: MarginalLikelihood) -> Point:
+    """The best single cause; whether a memory fades is asked with hypotheses that are equally wide."""
+    best = weigher.preferred(singles)
+    if CATALOGUE[best.members[0].id].family != "thermal_memory":
+        return best
+    near = ranked_rivals(singles, [], best.members, gains.size)[0]
+    behind = [r.distance for r in weigher.judged(singles, best.members, 0, near) if _loops(r.id)]
+    rival = max(best.criterion(gains.size), weigher.criterion(best.members, np.zeros(gains.size, dtype=bool)))
+    if not behind or not outlasts(gains, behind[0], rival):
+        return best
+    return best_of([p for p in singles if _loops(p.members[0].id)], gains.size)
+
+
+def _loops(cause: str) -> bool:
+    return CATALOGUE[cause].family == "hysteresis"
+
+
 def _rivals(
-    weigher: MarginalLikelihood, singles: list[Point], pairs: list[Point], taken: tuple[Candidate, ...]
+    weigher: MarginalLikelihood,
+    singles: list[Point],
+    pairs: list[Point],
+    taken: tuple[Candidate, ...],
+    ahead: float,
 ) -> tuple[list[tuple[Rival, ...]], list[tuple[Rival, ...]]]:
-    """Of each cause, nearest first; and with odds that simulation bears out, likeliest first."""
+    """Of each cause, nearest first; and with odds that simulation bears out, likeliest first.
+
+    Args:
+        ahead: By how much hysteresis in the form that it was found in is ahead of the play that stands for it.
+    """
     gains = weigher.gains
     pool = singles if len(taken) == 1 else pairs
-    near = ranked_rivals(singles, pairs, taken, gains.size)
-    ranked = [weigher.judged(pool, taken, k, rivals) for k, rivals in enumerate(near)]
+    ranked = []
+    for k, near in enumerate(ranked_rivals(singles, pairs, taken, gains.size)):
+        more = ahead if _loops(taken[k].id) else 0.0
+        judged = weigher.judged(pool, taken, k, near)
+        ranked.append(tuple(_behind(rival, more) for rival in judged))
     return ranked, [calibrated(gains, pool, taken, k, rivals) for k, rivals in enumerate(ranked)]
 
 
-def _contest(gains: Gains, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]) -> Contest:
+def _behind(rival: Rival, more: float) -> Rival:
+    """A rival that is not ahead, and farther behind by some criterion."""
+    moved = replace(rival, distance=max(rival.distance, 0.0) + more, odds=None)
+    return moved if rival.odds is None else replace(moved, odds=odds_of(moved))
+
+
+def _ahead(gains: Gains, stage: _Stage, singles: list[Point]) -> float:
+    if stage.wide is None or len(stage.chosen) > 1:
+        return 0.0
+    play = best_of([p for p in singles if p.members == stage.chosen], gains.size)
+    return max(stage.wide.criterion(gains.size) - play.criterion(gains.size), 0.0)
+
+
+def _contest(
+    gains: Gains, wide: WideMemory | None, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]
+) -> Contest:
     """The best shape that no cause has, against the causes or any other one that does as well in their place."""
     others = [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(causes, rivals, strict=True)]
-    return contest(gains, causes, others)
+    return contest(gains, causes, others, wide)
 
 
 def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
@@ -140,6 +195,23 @@ def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stag
     current, held = _with(search, refined)
     gain = explained(current, current.likeliest, held)
     return _Stage(chosen, refined, detect(current, held), gain, misfit(current, held, refined))
+
+
+def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
+    """With what a play leaves judged beside hysteresis of any form, where the recordings speak for such a memory.
+
+    The family is one name for every memory with loops that do not depend on the rate; a table's play is but one.
+    """
+    loops = [_loops(c.id) for c in stage.chosen]
+    if stage.left.worst >= _WELL or not any(loops) or any(c.role == "input" for c in stage.chosen):
+        return stage
+    beside = [c.columns for c, loop in zip(stage.refined, loops, strict=True) if not loop]
+    wide = rate_independent(gains, beside)
+    if wide is None:
+        return stage
+    current, held = _with(search, stage.refined, wide)
+    left = misfit(current, held, stage.refined, chance=wide.columns.shape[1])
+    return replace(stage, found=detect(current, held), left=left, wide=wide)
 
 
 def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
@@ -184,11 +256,15 @@ def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | Non
     return top.candidate
 
 
-def _with(search: Search, causes: tuple[Refined, ...]) -> tuple[Search, Held]:
+def _with(search: Search, causes: tuple[Refined, ...], wide: WideMemory | None = None) -> tuple[Search, Held]:
     """The search with the causes' columns and tangents as part of every model, and what a model then holds."""
-    current = search.extended(model_columns(causes))
+    current = search.extended(_columns(causes, wide))
     swapped = any(c.candidate.role == "input" for c in causes)  # the replaced map stands beside the plain one
     return current, "beside" if swapped else "map and beside"
+
+
+def _columns(causes: tuple[Refined, ...], wide: WideMemory | None) -> Array:
+    return model_columns(causes) if wide is None else np.column_stack([model_columns(causes), wide.columns])
 
 
 def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:

@@ -17,6 +17,7 @@ from ..signatures.changed_input import proportional_map
 from ..signatures.signature_bank import Alternative
 from .gains import Gains
 from .refine import Refined
+from .wide_memory import WideMemory
 
 __all__ = ["Contest", "contest"]
 
@@ -35,16 +36,22 @@ class Contest:
     lead: float
 
 
-def contest(gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[str]]) -> Contest:
+def contest(
+    gains: Gains, causes: Sequence[Refined], rivals: Sequence[Sequence[str]], wide: WideMemory | None = None
+) -> Contest:
     """Each other shape alone and in the place of each of the causes, against all of them together.
 
     The criterion is that of the search: twice the log-likelihood less log N for every parameter. The causes
     have their parameters at the optimum, the others on their grid. A cause may stand back for one of its
-    `rivals` (ids, for each cause): what matters is whether any causes do as well as the other shape.
+    `rivals` (ids, for each cause): what matters is whether any causes do as well as the other shape. Hysteresis
+    stands as the form that it was found in (`wide`): a switch with a gap is one of its kind.
     """
     models = _NestedModels(gains, causes)
     every = range(len(causes))
     own = max(models.criterion(every), *(models.instead(k, ids) for k, ids in enumerate(rivals)))
+    if wide is not None:
+        beside = [k for k in every if CATALOGUE[causes[k].candidate.id].family != "hysteresis"]
+        own = max(own, models.criterion(beside) + wide.criterion(gains.size))
     local = any(CATALOGUE[c.candidate.id].kind == "static" for c in causes)
     shapes = gains.search.bank.alternative_groups
     found = []

@@ -55,23 +55,24 @@ class Misfit:
     share: float
 
 
-def misfit(current: Search, held: Held, causes: Sequence[Refined]) -> Misfit:
+def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int = 0) -> Misfit:
     """Whether anything is left.
 
     Args:
         current: The search with the causes taken.
         held: What the model holds: not the map where a cause replaces its input.
         causes: The causes that were taken.
+        chance: Energy that the model explains of noise alone, where it has many columns beside the causes' own.
     """
     changed = _changed(current, causes)
     views = [current.views[k] for k in current.allowed]
     weight = np.exp([view.log_likelihood - current.likeliest.log_likelihood for view in views])
-    p_value, share = _told(current, views, weight / weight.sum(), held, changed)
+    p_value, share = _told(current, views, weight / weight.sum(), held, changed, chance)
     if current.declared is None:
         return Misfit(p_value, p_value, share)
     view = current.view_of(current.declared)
     declared = replace(view, scale=max(view.scale, 1.0))
-    own_p, own_share = _told(current, [declared], np.ones(1), held, changed)
+    own_p, own_share = _told(current, [declared], np.ones(1), held, changed, chance)
     worst = min(1.0, 2.0 * min(p_value, own_p))
     if current.contradicts(view):
         return Misfit(p_value, worst, share)
@@ -79,12 +80,12 @@ def misfit(current: Search, held: Held, causes: Sequence[Refined]) -> Misfit:
 
 
 def _told(
-    current: Search, views: Sequence[View], weight: Array, held: Held, changed: Array
+    current: Search, views: Sequence[View], weight: Array, held: Held, changed: Array, chance: int
 ) -> tuple[float, float]:
     """The same where the noise has one of some colours, each as likely as its weight says."""
     tests = np.array([_tests(current, view, held, changed) for view in views])
     p_values, left = np.einsum("v,vtk->kt", weight, tests)
-    gain = float(weight @ [explained(current, view, held) for view in views])
+    gain = max(float(weight @ [explained(current, view, held) for view in views]) - chance, 0.0)
     return min(1.0, _TESTS * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
 
 

@@ -135,7 +135,7 @@ class Cycle:
     def attribution(self, before: Attribution) -> Attribution:
         """The attribution with this cycle's causes in place of those of the search."""
         if self.chosen is None or not self.causes:
-            return replace(before, causes=(), p_values=(), rivals=(), probabilities=())
+            return replace(before, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
         share = 1.0 - (self.chosen.rms_dph / self.rms_dph) ** 2
         count = len(self.causes)
         return replace(
@@ -145,6 +145,7 @@ class Cycle:
             rivals=(self.rivals, *((),) * (count - 1)),
             probabilities=(),
             left=replace(before.left, share=share),
+            wide=None,
         )
 
 
