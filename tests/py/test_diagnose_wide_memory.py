@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from gyrotc.diagnose.advice import sentence_of, shows_as
 from gyrotc.diagnose.attribute.attribution import Attribution, attribute
 from gyrotc.diagnose.attribute.gains import Gains
 from gyrotc.diagnose.attribute.marginal_likelihood import MarginalLikelihood
-from gyrotc.diagnose.attribute.wide_memory import outlasts, rate_independent
+from gyrotc.diagnose.attribute.wide_memory import WideMemory, outlasts, rate_independent
 from gyrotc.diagnose.detect.search import Search
 from gyrotc.diagnose.screen.blocks import Records
 from gyrotc.diagnose.verdict import holds, verdict_of
+from gyrotc.terms import CATALOGUE
 from gyrotc.terms.base import History
 from gyrotc.terms.operators import first_order, play
 from numpy.typing import NDArray
@@ -131,3 +133,14 @@ def test_what_is_beside_is_not_counted_again(campaign: Campaign) -> None:
     gains = Gains(measured(campaign, column[:, 0], 40.0, 1))
     assert rate_independent(gains, ()) is not None
     assert rate_independent(gains, (column,)) is None
+
+
+def test_the_page_says_what_a_table_does_not_hold() -> None:
+    """In the finding and in how the cause shows; a cause of another family shows as it always does."""
+    none = np.zeros((3, 0))
+    goes, more = WideMemory(100.0, 50.0, none), WideMemory(100.0, 99.0, none)
+    assert "goes with temperature" in shows_as("hysteresis", goes)
+    assert "more than a single play" in shows_as("hysteresis", more)
+    assert shows_as("warm_up", goes) == CATALOGUE["warm_up"].words.signature
+    assert "goes with temperature" in sentence_of("explained", (), None, "", goes)
+    assert sentence_of("explained", (), None, "") == sentence_of("explained", (), None, "", None)

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from ..results.diagnosed import DiagnosisVerdict, ExtendedModel, NamedCause
 from ..terms import CATALOGUE
+from .attribute.wide_memory import WideMemory
+from .signatures.candidates import searched
 
-__all__ = ["VERDICTS", "next_steps", "sentence_of"]
+__all__ = ["VERDICTS", "next_steps", "sentence_of", "shows_as"]
 
 _WHOLE = 0.995  # a share of the removable error that shows as 100 %
 
@@ -66,13 +68,13 @@ def sentence_of(
     found: Sequence[NamedCause],
     extended: ExtendedModel | None,
     undecided: str,
-    form: str = "",
+    wide: WideMemory | None = None,
 ) -> str:
     """The finding in one to three sentences.
 
     Args:
         undecided: Why a single cycle cannot tell of memory.
-        form: How a cause differs from the catalogue's.
+        wide: The form of hysteresis that is among the causes, where it is more than one play.
     """
     why = f" about memory of the temperature: {undecided}" if undecided else ""
     causes = [c for c in found if c.family != "noise"]
@@ -90,12 +92,20 @@ def sentence_of(
         "unexplained": "There is structure that no cause of the catalogue explains.",
         "not_testable": f"The recordings cannot decide{why}.",
     }[verdict]
-    text += f" Here {form}." if form else ""
+    text += f" Here {wide.text}." if wide is not None else ""
     share = extended.gain.share_of_excess_removed if extended is not None else None
     if share is None:
         return text
     amount = "all" if share >= _WHOLE else f"{share:.0%}"
     return f"{text} On unseen runs the extension removes {amount} of the removable error."
+
+
+def shows_as(cause: str, wide: WideMemory | None) -> str:
+    """How a cause shows; of hysteresis (`wide`: of a form that is more than one play) also how it differs from that."""
+    words = CATALOGUE[cause].words
+    if wide is None or not searched(cause).loops:
+        return words.signature
+    return f"{words.signature}; here {wide.text}"
 
 
 def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:

@@ -26,7 +26,7 @@ from ..results.diagnosed import (
 from ..results.planned import DetectionLimit
 from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end
-from .advice import VERDICTS, next_steps, sentence_of
+from .advice import VERDICTS, next_steps, sentence_of, shows_as
 from .attribute.cycle_fits import memories
 from .attribute.intervals import Interval
 from .attribute.refine import Refined
@@ -100,6 +100,7 @@ def result_of(  # long: one line for each field of the result
     listed += tuple(_noise_cause(n) for n in analysis.noise)
     untestable = _untestable(analysis, cycle)
     extended = _extended(extension)
+    undecided = cycle.not_testable if cycle is not None else ""
     return Diagnosed(
         gyrotc_version=__version__,
         serial=dataset.serial,
@@ -119,13 +120,7 @@ def result_of(  # long: one line for each field of the result
         single_cycle=None if cycle is None else _single_cycle(cycle, extension),
         shipping=extension.crossed.result(),
         unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
-        text=sentence_of(
-            verdict,
-            listed,
-            extended,
-            cycle.not_testable if cycle is not None else "",
-            _form(analysis, causes),
-        ),
+        text=sentence_of(verdict, listed, extended, undecided, analysis.attribution.wide if causes else None),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
         next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
@@ -190,7 +185,6 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
     near = attribution.rivals[k]
     rivals = tuple(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
     words = CATALOGUE[id].words
-    form = _form(analysis, [cause])
     named = NamedCause(
         id=id,
         family=CATALOGUE[id].family,
@@ -200,7 +194,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         equivalent=rivals,
         separate_by=separate_by(id, rivals[0]) if rivals else None,
         gain=extension.steps[k].result(),
-        signature=f"{words.signature}; here {form}" if form else words.signature,
+        signature=shows_as(id, attribution.wide),
         remedy=words.remedy,
         separable_from_d=analysis.separations[k],
     )
@@ -214,13 +208,6 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         "equivalent_channels": channels or None,
     }
     return named.model_copy(update={name: value for name, value in told.items() if value is not None})
-
-
-def _form(analysis: Analysis, causes: Sequence[Refined]) -> str:
-    """How hysteresis among causes differs from the play that stands for it; empty where it does not."""
-    wide = analysis.attribution.wide
-    loops = any(CATALOGUE[c.candidate.id].family == "hysteresis" for c in causes)
-    return wide.text if wide is not None and loops else ""
 
 
 def _estimate(interval: Interval) -> Estimate:

@@ -70,6 +70,7 @@ CAUSE = Cause(
         grid=geometric(_WIDTH, 20),
         over=_WIDTH.name,
         imitates=True,
+        loops=True,
         shown=(4.0, 12.0),
         cycle=SingleCycle(points=24, usual=False),
     ),

@@ -60,6 +60,7 @@ class SearchRule:
         shown: Values of `over` at which it stands for itself in a plan.
         rival_every: A plan looks at one point in this many of its grid as a rival.
         cycle: How it is looked for in a single chamber cycle; None: it is not.
+        loops: It stands for every memory with loops that do not depend on the rate, and is judged by them all.
     """
 
     price: int
@@ -74,6 +75,7 @@ class SearchRule:
     shown: tuple[float, ...] = ()
     rival_every: int = 1
     cycle: SingleCycle | None = None
+    loops: bool = False
 
 
 def anywhere(reach: Reach) -> list[Mapping[str, float]]:

@@ -16,7 +16,7 @@ from ...terms import CATALOGUE
 from ..detect.detection import Found, detect
 from ..detect.joined import Held
 from ..detect.search import Search
-from ..signatures.candidates import Candidate
+from ..signatures.candidates import Candidate, searched
 from .contest import Contest, contest
 from .gains import Gains, Point
 from .marginal_likelihood import MarginalLikelihood
@@ -136,15 +136,11 @@ def _single(gains: Gains, singles: list[Point], weigher: MarginalLikelihood) -> 
     if CATALOGUE[best.members[0].id].family != "thermal_memory":
         return best
     near = ranked_rivals(singles, [], best.members, gains.size)[0]
-    behind = [r.distance for r in weigher.judged(singles, best.members, 0, near) if _loops(r.id)]
+    behind = [r.distance for r in weigher.judged(singles, best.members, 0, near) if searched(r.id).loops]
     rival = max(best.criterion(gains.size), weigher.criterion(best.members, np.zeros(gains.size, dtype=bool)))
     if not behind or not outlasts(gains, behind[0], rival):
         return best
-    return best_of([p for p in singles if _loops(p.members[0].id)], gains.size)
-
-
-def _loops(cause: str) -> bool:
-    return CATALOGUE[cause].family == "hysteresis"
+    return best_of([p for p in singles if searched(p.members[0].id).loops], gains.size)
 
 
 def _rivals(
@@ -163,7 +159,7 @@ def _rivals(
     pool = singles if len(taken) == 1 else pairs
     ranked = []
     for k, near in enumerate(ranked_rivals(singles, pairs, taken, gains.size)):
-        more = ahead if _loops(taken[k].id) else 0.0
+        more = ahead if searched(taken[k].id).loops else 0.0
         judged = weigher.judged(pool, taken, k, near)
         ranked.append(tuple(_behind(rival, more) for rival in judged))
     return ranked, [calibrated(gains, pool, taken, k, rivals) for k, rivals in enumerate(ranked)]
@@ -202,7 +198,7 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
 
     The family is one name for every memory with loops that do not depend on the rate; a table's play is but one.
     """
-    loops = [_loops(c.id) for c in stage.chosen]
+    loops = [searched(c.id).loops for c in stage.chosen]
     if stage.left.worst >= _WELL or not any(loops) or any(c.role == "input" for c in stage.chosen):
         return stage
     beside = [c.columns for c, loop in zip(stage.refined, loops, strict=True) if not loop]

@@ -50,7 +50,7 @@ def contest(
     every = range(len(causes))
     own = max(models.criterion(every), *(models.instead(k, ids) for k, ids in enumerate(rivals)))
     if wide is not None:
-        beside = [k for k in every if CATALOGUE[causes[k].candidate.id].family != "hysteresis"]
+        beside = [k for k in every if not searched(causes[k].candidate.id).loops]
         own = max(own, models.criterion(beside) + wide.criterion(gains.size))
     local = any(CATALOGUE[c.candidate.id].kind == "static" for c in causes)
     shapes = gains.search.bank.alternative_groups
