@@ -13,6 +13,7 @@ from gyrotc.diagnose.attribute.marginal_likelihood import MarginalLikelihood
 from gyrotc.diagnose.attribute.wide_memory import WideMemory, outlasts, rate_independent
 from gyrotc.diagnose.detect.search import Search
 from gyrotc.diagnose.screen.blocks import Records
+from gyrotc.diagnose.signatures.candidates import columns_of
 from gyrotc.diagnose.verdict import holds, verdict_of
 from gyrotc.terms import CATALOGUE
 from gyrotc.terms.base import History
@@ -83,6 +84,19 @@ def test_relays_are_hysteresis(campaign: Campaign, seed: int) -> None:
     assert named(found) == ["hysteresis"] and found.wide is not None
     assert found.left.share > 0.8 and verdict_of(found, ()) in ("explained", "partial")
     assert found.columns.shape[1] > found.wide.columns.shape[1], "the play itself stays in the model"
+
+
+def test_relays_need_no_second_cause(campaign: Campaign) -> None:
+    """A lag and a finer map beside a play came as near to these, and stood with it as three causes."""
+    found = attribute(measured(campaign, relays(campaign.records, 0), 25.0, 0))
+    assert named(found) == ["hysteresis"]
+
+
+def test_a_wave_beside_a_play_stays_a_cause_of_its_own(campaign: Campaign) -> None:
+    wave = columns_of(campaign.records, "path_length_periodicity", {"period_c": 9.0})[:, 0]
+    effect = campaign.records.columns(loop)[:, 0] / 6.0 + wave
+    found = attribute(measured(campaign, effect, 40.0, 3))
+    assert set(named(found)) == {"hysteresis", "path_length_periodicity"}
 
 
 @pytest.mark.parametrize("seed", range(2))

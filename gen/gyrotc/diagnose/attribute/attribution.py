@@ -110,7 +110,7 @@ def attribute(search: Search) -> Attribution:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
         pair = clear_pair(singles, weigher.preferred(pairs), gains.size)
         if pair is not None:
-            stage = _deeper(search, gains, stage, pair.members)
+            stage = _beside(search, gains, stage, pair)
     stage = _widened(search, gains, stage)
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
@@ -199,7 +199,12 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
     The family is one name for every memory with loops that do not depend on the rate; a table's play is but one.
     """
     loops = [searched(c.id).loops for c in stage.chosen]
-    if stage.left.worst >= _WELL or not any(loops) or any(c.role == "input" for c in stage.chosen):
+    if (
+        stage.wide is not None
+        or stage.left.worst >= _WELL
+        or not any(loops)
+        or any(c.role == "input" for c in stage.chosen)
+    ):
         return stage
     beside = [c.columns for c, loop in zip(stage.refined, loops, strict=True) if not loop]
     wide = rate_independent(gains, beside)
@@ -208,6 +213,14 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
     current, held = _with(search, stage.refined, wide)
     left = misfit(current, held, stage.refined, chance=wide.columns.shape[1])
     return replace(stage, found=detect(current, held), left=left, wide=wide)
+
+
+def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:
+    """What a second cause makes of a first; not where that is hysteresis of a form that does as well as both."""
+    widened = _widened(search, gains, one)
+    if widened.wide is not None and widened.wide.criterion(gains.size) >= pair.criterion(gains.size):
+        return widened
+    return _deeper(search, gains, one, pair.members)
 
 
 def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
