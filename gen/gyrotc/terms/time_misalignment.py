@@ -15,7 +15,9 @@ from .words import Wording
 
 __all__ = ["CAUSE"]
 
-_SHIFT_S, _SHIFTS = 50.0, 12  # of the grid, to either side
+_NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
+_FAR_S = np.arange(700.0, 1201.0, 100.0)  # a queue of minutes: coarser, for what is left of a map is large there
+_FAR_SHARE = 0.1  # of the longest run: farther shifts put too much of a run's ends out of sight
 _MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
 
 
@@ -32,7 +34,7 @@ def _features(history: History, values: Values) -> Features:
 
 
 def _grid(reach: Reach) -> list[Values]:
-    steps = _SHIFT_S * np.arange(1, _SHIFTS + 1)
+    steps = np.concatenate([_NEAR_S, _FAR_S[_FAR_S <= _FAR_SHARE * reach.longest_s]])
     return [{"shift_s": float(s)} for s in np.concatenate([-steps[::-1], steps])]
 
 

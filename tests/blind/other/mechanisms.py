@@ -97,15 +97,15 @@ def _delay_of(scene: Scene, part: str) -> float:
 
 
 def late_record(scene: Scene, rng: np.random.Generator) -> Effect:
-    """The recorder's queue: temperatures are stamped late or early, by up to 20 minutes."""
-    shift = float(np.exp(rng.uniform(np.log(200), np.log(1200)))) * float(rng.choice([-1, 1]))
+    """The recorder's queue: temperatures are stamped late or early, by up to half an hour."""
+    shift = float(np.exp(rng.uniform(np.log(200), np.log(1800)))) * float(rng.choice([-1, 1]))
     out = []
     for h in scene.heat:
         t = h.sensor
         at = np.arange(t.size) * STEP_S
         true = np.interp(at + shift, at, t)
         out.append(scene.map(true, rate_of(true)) - scene.map(t, rate_of(t)))
-    return out, abs(shift) > 600.0
+    return out, abs(shift) > 1200.0
 
 
 def relays(scene: Scene, rng: np.random.Generator) -> Effect:

@@ -127,7 +127,7 @@ class MarginalLikelihood:
         behind = [
             other for key in keys[:_MOST_BEHIND] for other in _behind(key) if best.get(other, 0.0) > 0.0
         ]
-        return {key: _few(ranked[key]) for key in dict.fromkeys([*keys, *behind])}
+        return {key: _few(ranked[key], size) for key in dict.fromkeys([*keys, *behind])}
 
     def _weighed(self, near: _Near) -> dict[_Kinds, tuple[Point, float]]:
         """Of each kind its best point and criterion, all on the blocks that each of them knows."""
@@ -203,18 +203,18 @@ def _price(candidate: Candidate) -> int:
     return 1 if candidate.role == "input" else searched(candidate.id).price
 
 
-def _few(points: Sequence[Point]) -> list[Point]:
+def _few(points: Sequence[Point], size: int) -> list[Point]:
     """The best of one kind; where it hides blocks, all that hide some at the same end of each run.
 
-    Those that hide fewer seem better by what they gain on the others.
+    Those that hide fewer seem better by what they gain on the others; that leaves none that is no better than the map.
     """
     hiding = [m for m in points[0].members if _hides(m.id)]
     if not hiding:
         return list(points[:_POINTS])
     rest = [m for m in points[0].members if not _hides(m.id)]
-    return [
-        p for p in points if [m for m in p.members if not _hides(m.id)] == rest and _end(p) == _end(points[0])
-    ]
+    beside = [p for p in points if [m for m in p.members if not _hides(m.id)] == rest]
+    same = [p for p in beside if _end(p) == _end(points[0])]
+    return [p for p in same if p.criterion(size) > 0.0] or same[:1]
 
 
 def _end(point: Point) -> list[float]:

@@ -21,6 +21,7 @@ __all__ = ["Found", "detect"]
 Array = NDArray[np.float64]
 
 _SEED = 20140916  # any: it fixes the draws, so that a diagnosis repeats to the last digit
+_PLACES = 9  # of an adjusted p-value: below every draw all are alike, and the sum's rounding is no order
 _DEPENDENT = 1e-4  # eigenvalues of a group's inner products below this share of the largest add no parameter
 
 
@@ -59,7 +60,7 @@ def detect(search: Search, held: Held) -> list[Found]:
         inside = 2.0 * behind <= CHI2_95_TWO
         adjusted = np.where(inside, tail, 0.0).max(axis=0)
         log_p = np.where(inside, own, np.inf).min(axis=0)
-    order = np.lexsort((-log_p, adjusted))
+    order = np.lexsort((-log_p, np.round(adjusted, _PLACES)))
     return [Found(search.joined.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
 
 
