@@ -53,7 +53,7 @@ def left(search: Search) -> Misfit:
     return misfit(search.extended(model_columns(causes)), "map and beside", causes)
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3, 5])
+@pytest.mark.parametrize("seed", [2, 3, 5, 7])
 def test_noise_that_the_declaration_lacks_is_no_structure(campaign: Campaign, seed: int) -> None:
     """The declared white noise, contradicted by the data, made 1e-11 to 1e-47 of what a true cause left."""
     search = measured(campaign, FLICKER, seed, WHITE)

@@ -59,7 +59,7 @@ def test_the_criterion_of_a_place_is_that_of_the_search(campaign: Campaign) -> N
     found = _Simulated(place, models).measured
     assert {"cavity_lag", "turn_on_offset", "map_too_coarse", "hysteresis"} <= {id for id, _ in kinds}
     for kind in kinds:
-        assert found[kind][0] == pytest.approx(best[kind], abs=0.2), kind
+        assert found[kind][0] == pytest.approx(best[kind], abs=0.5), kind
 
 
 def test_beside_another_cause_it_is_that_of_the_pairs(campaign: Campaign) -> None:
