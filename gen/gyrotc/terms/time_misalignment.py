@@ -16,7 +16,7 @@ from .words import Wording
 __all__ = ["CAUSE"]
 
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
-_FAR_S = np.arange(700.0, 1201.0, 100.0)  # a queue of minutes: coarser, for what is left of a map is large there
+_FAR_S = np.arange(700.0, 1201.0, 100.0)  # coarser: what a shift leaves of a map is large there
 _FAR_SHARE = 0.1  # of the longest run: farther shifts put too much of a run's ends out of sight
 _MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
 
@@ -34,7 +34,8 @@ def _features(history: History, values: Values) -> Features:
 
 
 def _grid(reach: Reach) -> list[Values]:
-    steps = np.concatenate([_NEAR_S, _FAR_S[_FAR_S <= _FAR_SHARE * reach.longest_s]])
+    most = _FAR_SHARE * reach.longest_s
+    steps = np.concatenate([_NEAR_S, [s for s in _FAR_S if s <= most]])
     return [{"shift_s": float(s)} for s in np.concatenate([-steps[::-1], steps])]
 
 
