@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 FALSE_ALARMS = 0.005  # records of which one has a step by chance: with drifts one in a hundred has an event
 _HALVES_S = (120.0, 600.0, 3000.0)  # half windows: short ones place a large step, long ones find a small one
 _CELLS = 20  # of a half window
+_LEAST_CELLS = 8  # of a half window, where rows are long: eight columns are fitted to twice as many cells
 _LEAST_WINDOWS = 4.0  # a run shorter than this many windows does not show what noise makes
 _KNOWN = 6.0  # degrees of freedom of a scale from a median, for each window: 0.4 for each of 15 places
 _STILL_THERE = 0.8  # of the limit, what is to be left beside other passages: their own noise costs some
@@ -129,7 +130,7 @@ class _Windows:
         windows = float(time[-1] - time[0]) / (2.0 * half_s)
         cell = max(float(np.median(np.diff(time))), half_s / _CELLS)
         t, x, y = cell_means(cell, time, temperature, rate)
-        width = max(round(half_s / cell), 4)
+        width = max(round(half_s / cell), _LEAST_CELLS)
         if min(windows, len(t) / (2 * width)) < _LEAST_WINDOWS:
             return None
         size, spread = _fitted(t, x, y, width)
