@@ -86,7 +86,7 @@ def test_one_record_in_as_many_as_is_said_has_a_step_by_chance(
     records = [(time, temperature, rng.standard_normal(time.size)) for _ in range(200)]
     alarms = sum(bool(steps_of([record])) for record in records)
     print(f"{alarms} of 200 records with a step")
-    assert alarms <= 36, alarms
+    assert alarms <= 44, alarms
 
 
 def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None:
@@ -241,14 +241,15 @@ def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path
     return folder
 
 
-def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
+@pytest.mark.parametrize("factor", [1.15, 1.3])
+def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path, factor: float) -> None:
     def louder(columns: Columns) -> None:
-        columns["rate_dph"] = 1.3 * columns["rate_dph"]
+        columns["rate_dph"] = factor * columns["rate_dph"]
 
     dataset = load(ramps(tmp_path, louder))
     (event,) = turned_runs(dataset)
     assert (event.id, event.file, event.unit) == ("gain_changed", "2.csv", "times")
-    assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
+    assert event.size[1] <= factor <= event.size[2] and event.size[0] == pytest.approx(factor, abs=0.05)
     assert event.result().exclude is None, "the whole run goes, by its entry"
     assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
 

@@ -32,9 +32,8 @@ def evidence_beside_memories(
 ) -> float:
     """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
 
-    The memories are plays, lags, and both, each with a slow drift, beside a level, the temperature's rate and what is
-    `known`, free in all their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am.
-    Stat. Assoc. 90
+    The memories are plays, lags, and both, each beside a level, the temperature's rate and what is `known`, free in all
+    their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am. Stat. Assoc. 90
     (1995) 773). Means that resemble their neighbours count for less, as of a first-order process.
 
     Args:
@@ -46,8 +45,7 @@ def evidence_beside_memories(
     t, x, y = means
     left, rank, alike = _left(change[used], y[used])
     independent = float(used.sum()) * (1.0 - alike) / (1.0 + alike)
-    u = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
-    plain = [np.ones_like(t), np.gradient(x, t), u, u**2, *known.T]
+    plain = [np.ones_like(t), np.gradient(x, t), *known.T]
     plays = [play(width, x) - x for width in _WIDTHS_C]
     lags = [first_order(tau, t, x) - x for tau in _LAGS_S]
     found = []

@@ -134,10 +134,12 @@ def another_gain_throughout(runs: Sequence[Run], number: int) -> bool:
 
 
 def _beside_memories(own: _Means, usual: tuple[Floats, Floats], at_s: float) -> float:
-    """Evidence for levels, factors and rates that differ before and behind a time, against memories of the run."""
+    """Evidence for other levels, factors and rates from a time on, against memories of the run with a slow drift."""
     curve, used, side = _beside(own, usual)
     behind = (own[0] >= at_s)[:, None]
-    return evidence_beside_memories(own, used, np.hstack([side * ~behind, side * behind]), curve[:, None])
+    u = (own[0] - own[0][0]) / float(np.ptp(own[0]))
+    known = np.column_stack([curve, u, u**2])
+    return evidence_beside_memories(own, used, np.hstack([side * ~behind, side * behind]), known)
 
 
 def _beside(own: _Means, usual: tuple[Floats, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
