@@ -11,7 +11,7 @@ import pytest
 from gyrotc.dataset import load
 from gyrotc.diagnose.screen.events import Event, accepted, events_of
 from gyrotc.diagnose.screen.turned import turned_runs
-from gyrotc.diagnose.screen.turned_within import gain_changes
+from gyrotc.diagnose.screen.turned_within import another_gain_throughout, gain_changes
 from gyrotc.frontend import lasting_steps
 from gyrotc.frontend.beginning_drifts import drifts_of
 from gyrotc.frontend.lasting_steps import steps_of
@@ -241,17 +241,24 @@ def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path
     return folder
 
 
-@pytest.mark.parametrize("factor", [1.15, 1.3])
-def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path, factor: float) -> None:
+def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
     def louder(columns: Columns) -> None:
-        columns["rate_dph"] = factor * columns["rate_dph"]
+        columns["rate_dph"] = 1.3 * columns["rate_dph"]
 
     dataset = load(ramps(tmp_path, louder))
     (event,) = turned_runs(dataset)
     assert (event.id, event.file, event.unit) == ("gain_changed", "2.csv", "times")
-    assert event.size[1] <= factor <= event.size[2] and event.size[0] == pytest.approx(factor, abs=0.05)
+    assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
     assert event.result().exclude is None, "the whole run goes, by its entry"
     assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.15, 1.3])
+def test_no_memory_stands_for_another_gain(tmp_path: Path, factor: float) -> None:
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = factor * columns["rate_dph"]
+
+    assert another_gain_throughout(load(ramps(tmp_path, louder)).runs, 2)
 
 
 def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path) -> None:
