@@ -60,12 +60,18 @@ def _level_told(row: Row) -> bool:
     return bool(row["noise"])
 
 
+def _event_told(row: Row) -> bool:
+    return bool(row.get("events"))
+
+
 _CHECKS: list[tuple[str, str, Chosen, Callable[[Row], bool], float, str]] = [
     ("a cause named, clean", "≤ 2 %", _of("clean"), _named, 0.02, "max"),
     ("... noise declared wrong", "≤ 2 %", _of("clean", declared="wrong"), _named, 0.02, "max"),
     ("... noise declared right", "≤ 2 %", _of("clean", declared="right"), _named, 0.02, "max"),
     ("... not declared", "≤ 2 %", _of("clean", declared="none"), _named, 0.02, "max"),
     ("a cause or structure claimed, clean", "≤ 2 %", _of("clean"), alarmed, 0.02, "max"),
+    ("an event told, clean", "≤ 2 %", _of("clean"), _event_told, 0.02, "max"),
+    ("an event told, a catalogue effect hidden", "≤ 2 %", _of("one"), _event_told, 0.02, "max"),
     ("wrong declaration told, clean", "-", _of("clean", declared="wrong"), _level_told, 0.0, "min"),
     ("right declaration doubted, clean", "-", _of("clean", declared="right"), _level_told, 1.0, "max"),
     ("foreign given a name", "≤ 10 %", _of("foreign"), _named, 0.10, "max"),
