@@ -17,8 +17,10 @@ sys.path.insert(0, str(ROOT))
 
 from tests.blind.other import heat, noise  # noqa: E402
 from tests.blind.other.grade import table  # noqa: E402
+from tests.blind.other.mechanisms import Scene, draw_map  # noqa: E402
 from tests.blind.other.record import IMITATED, draw_recording  # noqa: E402
 from tests.blind.other.run import orders, run  # noqa: E402
+from tests.blind.other.yardstick import Yardstick  # noqa: E402
 
 WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
 SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind-other`
@@ -69,6 +71,23 @@ def test_a_seed_gives_the_same_recording_and_foreign_ones_are_foreign() -> None:
     assert one.truth.kind == again.truth.kind and one.truth.imitated <= IMITATED
     wanted = orders(100)
     assert [sum(s == name for s, _ in wanted) for name in ("clean", "foreign", "one")] == [45, 30, 25]
+
+
+def test_a_map_of_a_late_temperature_is_no_foreign_effect() -> None:
+    """Polynomials of degree 6 and clocks 300 s apart took less than half of a saturation that comes 240 s late."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    body = heat.draw_body(rng)
+    runs = [heat.run_heat(body, *heat.programme(rng, 3.0), rng) for _ in range(3)]
+    zeros = [np.zeros(h.sensor.size) for h in runs]
+    scene = Scene(runs, lambda: runs, [0.0, 1.0, 2.0], draw_map(rng), zeros)
+    stick = Yardstick(scene, [0, 1, 2], noise.PowerLaw(1e-3, 2e-4, 1.0))
+    edge = float(np.mean(runs[0].sensor))
+    lag = round(240 / heat.STEP_S)
+    late = [np.concatenate([np.full(lag, h.sensor[0]), h.sensor[:-lag]]) for h in runs]
+    assert stick.imitated([np.tanh((t - edge) / 6.0) for t in late]) > 0.8
+    noises = [np.repeat(rng.normal(size=t.size // 100 + 1), 100)[: t.size] for t in late]
+    assert stick.imitated(noises) < 0.5, "noise is nobody's"
 
 
 def test_a_slice_of_the_world_is_diagnosed(tmp_path: Path) -> None:

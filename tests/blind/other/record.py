@@ -119,7 +119,8 @@ def _hidden(
                 return [size * s for s in shape], size
             scene.map = draw_map(rng)
             continue
-        truth.imitated = yardstick.imitated(rest) if truth.stratum == "foreign" and left >= _LEFT else 0.0
+        far = truth.stratum == "foreign" and left >= _LEFT
+        truth.imitated = yardstick.imitated([size * s for s in shape]) if far else 0.0
         if truth.stratum != "foreign" or (left >= _LEFT and truth.imitated <= IMITATED):
             size *= float(rng.choice([-1.0, 1.0]))
             return [size * s for s in shape], 1.0

@@ -38,8 +38,10 @@ and mirror with properties that depend on temperature, a chamber that switches, 
 noise of 1/f^alpha with alpha from 0.5 to 1.5, converters with steps, rows of 1, 10 or 60 s, the noise declared wrong
 in half, parameters that may lie beyond what is searched, and a campaign of temperatures for each recording. Foreign
 effects are drawn from a grammar of operators (integrate, saturate, threshold, delay, relax, multiply); of none of them
-can one cause of the catalogue imitate more than half of the energy beside the map. k = d / 6 as above. Limits: 95 %,
-by recording (Clopper and Pearson). The detector was not tuned on this world.
+can one cause of the catalogue imitate more than half of the energy beside the map. Up to seed 1636088912 lags and late
+clocks were held to imitate by polynomials of degree 6 and at six shifts, so that maps of a late temperature passed for
+foreign; now they have the same functions as the plain map, at 36 shifts. k = d / 6 as above. Limits: 95 %, by recording
+(Clopper and Pearson). The detector was not tuned on this world.
 """
 
 

@@ -15,6 +15,9 @@ from .noise import PowerLaw, covariance
 BLOCK_S = 100
 _PER_BLOCK = round(BLOCK_S / STEP_S)
 _KEPT = 1e-3  # of the strongest direction of the map's functions
+_NODE_C = 4.0  # distance of the map's nodes over temperature
+_LAGS_S = np.geomspace(60.0, 8000.0, 20)
+_SHIFTS_S = tuple(s for s in range(-1800, 1801, 100) if s)
 
 
 def block_means(x: Array) -> Array:
@@ -26,23 +29,26 @@ def block_means(x: Array) -> Array:
 class Yardstick:
     """Of the training runs of one recording.
 
-    The static map is a polynomial of T to degree 9 with a rate term to degree 3, and its square.
+    The static map is linear between nodes over T, with a rate term to degree 3 of T, and its square.
     """
 
     def __init__(self, scene: Scene, train: Sequence[int], noise: PowerLaw) -> None:
         self.scene, self.train = scene, list(train)
-        t = [block_means(scene.heat[k].sensor) for k in train]
-        r = [block_means(rate_of(scene.heat[k].sensor)) for k in train]
-        self.lengths = [x.size for x in t]
+        self.lengths = [block_means(scene.heat[k].sensor).size for k in train]
         self.factor = {n: np.linalg.cholesky(covariance(noise, n, BLOCK_S)) for n in set(self.lengths)}
-        x, rate = (
-            _unit(np.concatenate(t)),
-            np.concatenate(r) / max(float(np.abs(np.concatenate(r)).max()), 1e-9),
-        )
-        low = np.polynomial.chebyshev.chebvander(x, 3)
-        parts = [np.polynomial.chebyshev.chebvander(x, 9), low * rate[:, None], low * rate[:, None] ** 2]
+        self.map = self._map_of([scene.heat[k].sensor for k in train])
+
+    def _map_of(self, seen: Sequence[Array]) -> Array:
+        """White orthonormal functions of the map over a temperature of each run at `STEP_S`, shape (N, m)."""
+        x = np.concatenate([block_means(t) for t in seen])
+        rate = np.concatenate([block_means(rate_of(t)) for t in seen])
+        rate /= max(float(np.abs(rate).max()), 1e-9)
+        nodes = np.linspace(x.min(), x.max(), max(round(float(np.ptp(x)) / _NODE_C), 4) + 1)
+        hats = np.maximum(1.0 - np.abs(x[:, None] - nodes) / max(float(nodes[1] - nodes[0]), 1e-9), 0.0)
+        low = np.polynomial.chebyshev.chebvander(_unit(x), 3)
+        parts = [hats, low * rate[:, None], low * rate[:, None] ** 2]
         left, size, _ = np.linalg.svd(self.white(np.column_stack(parts)), full_matrices=False)
-        self.map = left[:, size > _KEPT * size[0]]
+        return np.asarray(left[:, size > _KEPT * size[0]])
 
     def white(self, columns: Array) -> Array:
         """Columns of block means, shape (N, k), with noise of unit variance and no correlation."""
@@ -59,35 +65,53 @@ class Yardstick:
 
     def seen(self, effect: Sequence[Array]) -> tuple[Array, float]:
         """An effect beside the map, shape (N,), and the share of its energy that the map has left."""
-        column = np.concatenate([block_means(effect[k]) for k in self.train])[:, None]
+        column = self._column(effect)
         rest = self.beside_map(column)[:, 0]
         whole = self.white(column - column.mean())[:, 0]
         return rest, float(rest @ rest / max(whole @ whole, 1e-300))
 
-    def imitated(self, rest: Array) -> float:
-        """Largest share of an effect that one cause of the catalogue can have, with any parameter."""
+    def _column(self, effect: Sequence[Array]) -> Array:
+        return np.concatenate([block_means(effect[k]) for k in self.train])[:, None]
+
+    def imitated(self, effect: Sequence[Array]) -> float:
+        """Largest share of an effect beside the map that one cause of the catalogue can have, with any parameter.
+
+        Args:
+            effect: Of each run at `STEP_S`, deg/h, at its true size: a cause that changes the map's input has to hold
+                the map, too.
+        """
+        rest, _ = self.seen(effect)
         shares = []
         for columns in self._imitators():
             q, size, _ = np.linalg.svd(self.beside_map(columns), full_matrices=False)
             q = q[:, size > 1e-6 * max(size[0], 1e-300)]
             shares.append(float(((q.T @ rest) ** 2).sum() / (rest @ rest)))
-        return max(shares)
+        return max([*shares, self._of_another_input(effect, float(rest @ rest))])
+
+    def _of_another_input(self, effect: Sequence[Array], energy: float) -> float:
+        """Share of what map and effect leave of the plain map that the same map of a lagged or shifted T takes."""
+        runs = [self.scene.heat[k] for k in self.train]
+        static = self.white(
+            self._column([self.scene.map(h.sensor, rate_of(h.sensor)) for h in self.scene.heat])
+        )
+        held = (self.map @ (self.map.T @ static))[:, 0]
+        own = self.white(self._column(effect))[:, 0]
+        moved = [[_follow(h.sensor, tau) for h in runs] for tau in _LAGS_S]
+        moved += [[_shifted(h.sensor, shift) for h in runs] for shift in _SHIFTS_S]
+        most = 0.0
+        for seen in moved:
+            q = self._map_of(seen)
+            for whole in (held + own, held - own):
+                left = whole - q @ (q.T @ whole)
+                most = max(most, 1.0 - float(left @ left) / energy)
+        return most
 
     def _imitators(self) -> Iterator[Array]:
-        """Columns of lags, shifts, plays, power-on, runs and dates, waves."""
+        """Columns of lags, plays, power-on, runs and dates, waves."""
         runs = [self.scene.heat[k] for k in self.train]
-        for tau in np.geomspace(60.0, 8000.0, 14):
-            late = [_follow(h.sensor, tau) for h in runs]
-            lag = np.concatenate([block_means(z) for z in late])
-            own = np.concatenate([block_means(h.sensor) for h in runs])
-            yield (lag - own)[:, None]
-            yield np.polynomial.chebyshev.chebvander(_unit(lag), 6)[:, 1:]
+        for tau in _LAGS_S:
+            yield np.concatenate([block_means(_follow(h.sensor, tau) - h.sensor) for h in runs])[:, None]
             yield np.concatenate([block_means(np.exp(-h.on_s / tau)) for h in runs])[:, None]
-        for shift in (-1200, -600, -300, 300, 600, 1200):
-            moved = [np.roll(h.sensor, round(shift / STEP_S)) for h in runs]
-            yield np.polynomial.chebyshev.chebvander(
-                _unit(np.concatenate([block_means(m) for m in moved])), 6
-            )[:, 1:]
         for width in np.geomspace(0.5, 30.0, 9):
             yield np.concatenate([_play(block_means(h.sensor), width) for h in runs])[:, None]
         yield np.concatenate([np.eye(len(runs))[np.full(n, k)] for k, n in enumerate(self.lengths)])
@@ -105,6 +129,11 @@ def _unit(x: Array) -> Array:
 def _follow(t: Array, tau: float) -> Array:
     keep = float(np.exp(-STEP_S / tau))
     return np.asarray(t[0] + lfilter([1.0 - keep], [1.0, -keep], t - t[0]))
+
+
+def _shifted(t: Array, shift_s: float) -> Array:
+    """Temperature some time before, held at the ends."""
+    return np.asarray(t[np.clip(np.arange(t.size) - round(shift_s / STEP_S), 0, t.size - 1)])
 
 
 def _play(t: Array, width: float) -> Array:
