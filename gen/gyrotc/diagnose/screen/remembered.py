@@ -15,14 +15,7 @@ __all__ = ["evidence_beside_memories"]
 
 Floats = NDArray[np.float64]
 
-_WIDTHS_C = (
-    0.7,
-    1.5,
-    3.0,
-    6.0,
-    12.0,
-    24.0,
-)  # of plays: octaves over what the catalogue's hysteresis looks through
+_WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `terms.hysteresis` looks through
 _LAGS_S = (200.0, 600.0, 1800.0, 5400.0)  # over what its lags look through, by factors of three
 _RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play that is never pushed
 
