@@ -83,6 +83,21 @@ def test_normal_noise_has_no_finding(records: Records) -> None:
     assert found.n_outliers <= 4.0 * found.expected_outliers + 4.0
 
 
+@pytest.mark.parametrize("share", [0.2, 0.4, 0.55, 0.7, 0.8, 1.0, 1.3, 2.0])
+def test_steps_of_a_converter_are_no_outliers_and_hide_none(records: Records, share: float) -> None:
+    """A lattice's median is short of the noise by up to half a step: 40 rows of 10,000 were told as outliers."""
+    step = share * 1e-3
+    runs = []
+    for run in records.runs:
+        rate = np.round(run.rate_dph / step) * step
+        rate[100:1000:100] += round(0.02 / step) * step
+        runs.append(replace(run, rate_dph=rate))
+    found = screen(Records(tuple(runs), records.block_s))
+    for run, mask in zip(records.runs, found.masks, strict=True):
+        assert not mask[100:1000:100].any()
+        assert (~mask[run.usable]).sum() <= 9 + 2, "of normal noise one in 10,000 is beyond"
+
+
 def test_noise_that_grows_with_the_rate_becomes_weights(records: Records) -> None:
     runs = []
     for run in records.runs:

@@ -74,8 +74,17 @@ def _detrended(rate: Array) -> Array:
     return np.asarray(rate - median_filter(rate, _MEDIAN_ROWS, mode="reflect"))
 
 
+def _step(rate: Array) -> float:
+    """What lies between two neighbouring values that occur, in the middle of all; of fine rows next to nothing."""
+    values = np.unique(rate)
+    return float(np.median(np.diff(values))) if values.size > 1 else 0.0
+
+
 def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, float]:
-    """Hampel's rule with a scale that follows slow changes of the noise."""
+    """Hampel's rule with a scale that follows slow changes of the noise.
+
+    The median of rows that a converter has rounded is one of its steps, and may be half a step short of the noise.
+    """
     masks, found, expected = [], 0, 0.0
     tail = 2.0 * float(ndtr(-_OUTLIER))
     for run in records.runs:
@@ -85,7 +94,7 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
         if rate.size > 4 * _MEDIAN_ROWS:
             rest = np.abs(_detrended(rate))
             window = min(_SCALE_ROWS, rate.size // 2 * 2 - 1)
-            scale = MAD_TO_SIGMA * median_filter(rest, window, mode="reflect")
+            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + 0.5 * _step(rate))
             far = rest > _OUTLIER * np.maximum(scale, 0.5 * float(rest.mean()))
             keep[np.flatnonzero(usable)[far]] = False
             found += int(far.sum())
