@@ -89,7 +89,8 @@ def test_steps_of_a_converter_are_no_outliers_and_hide_none(records: Records, sh
     step = share * 1e-3
     runs = []
     for run in records.runs:
-        rate = np.round(run.rate_dph / step) * step
+        rate = np.round(np.round(run.rate_dph / step) * step, 8)  # as it is printed
+        rate += 1e-9 * np.sin(np.arange(rate.size))  # and averaged
         rate[100:1000:100] += round(0.02 / step) * step
         runs.append(replace(run, rate_dph=rate))
     found = screen(Records(tuple(runs), records.block_s))

@@ -27,6 +27,7 @@ _MEDIAN_ROWS = (
 )
 _SCALE_ROWS = 241  # odd; 40 minutes at 10 s: the scale of the noise is known to 8 % and follows a ramp
 _OUTLIER = 4.5  # robust standard deviations
+_ALIKE = 0.01  # of the noise of a row: values that are nearer are the same step of a converter
 _P_OUTLIERS, _MANY = 1e-7, 8  # eight or more, and hardly by chance: single ones are left out in silence
 _P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is told: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
@@ -74,10 +75,14 @@ def _detrended(rate: Array) -> Array:
     return np.asarray(rate - median_filter(rate, _MEDIAN_ROWS, mode="reflect"))
 
 
-def _step(rate: Array) -> float:
-    """What lies between two neighbouring values that occur, in the middle of all; of fine rows next to nothing."""
-    values = np.unique(rate)
-    return float(np.median(np.diff(values))) if values.size > 1 else 0.0
+def _step(rate: Array, noise: float) -> float:
+    """What lies between two neighbouring values that occur, in the middle of all; of fine rows next to nothing.
+
+    What is printed, or a mean of rounded rows, is beside its step by a trace of the noise: that is the same value.
+    """
+    gaps = np.diff(np.sort(rate))
+    apart = gaps[gaps > _ALIKE * noise]
+    return float(np.median(apart)) if apart.size else 0.0
 
 
 def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, float]:
@@ -94,7 +99,7 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
         if rate.size > 4 * _MEDIAN_ROWS:
             rest = np.abs(_detrended(rate))
             window = min(_SCALE_ROWS, rate.size // 2 * 2 - 1)
-            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + 0.5 * _step(rate))
+            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + 0.5 * _step(rate, float(rest.mean())))
             far = rest > _OUTLIER * np.maximum(scale, 0.5 * float(rest.mean()))
             keep[np.flatnonzero(usable)[far]] = False
             found += int(far.sum())
