@@ -99,8 +99,10 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
         if rate.size > 4 * _MEDIAN_ROWS:
             rest = np.abs(_detrended(rate))
             window = min(_SCALE_ROWS, rate.size // 2 * 2 - 1)
-            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + 0.5 * _step(rate, float(rest.mean())))
-            far = rest > _OUTLIER * np.maximum(scale, 0.5 * float(rest.mean()))
+            mean = float(rest.mean())
+            rounded = 0.5 * _step(rate, mean)
+            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + rounded)
+            far = rest > _OUTLIER * np.maximum(scale, 0.5 * mean)
             keep[np.flatnonzero(usable)[far]] = False
             found += int(far.sum())
             expected += 3.0 * tail * rate.size  # the running median and scale add to the tails
