@@ -27,8 +27,7 @@ def main() -> None:
 
     raise_on_signals()
     try:
-        status = _status()
-        status = _flushed(status)
+        status = _flushed(run(sys.argv[1:]))
     except Interrupted as end:
         with contextlib.suppress(OSError):  # the terminal may be gone
             print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
@@ -100,8 +99,11 @@ def _hoisted(arguments: list[str]) -> list[str]:
     return [*front, *(a for a in arguments[:end] if a not in _ANYWHERE), *arguments[end:]]
 
 
-def _status() -> int:
-    """Runs the command; errors become one message on stderr and their exit status."""
+def run(arguments: list[str]) -> int:
+    """Runs one command in this process and returns its exit status; errors become one message on stderr.
+
+    Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
+    """
     try:
         from .commands import app
 
@@ -109,7 +111,7 @@ def _status() -> int:
             from typer._completion_classes import completion_init
 
             completion_init()
-        app(_hoisted(sys.argv[1:]), standalone_mode=True)
+        app(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
     except GyrotcError as error:
         shown = (
             terminal_line if isinstance(error, InputError) else terminal_text

@@ -189,7 +189,8 @@ def _key(path: Path) -> Path:
 
 def command(*arguments: object) -> None:
     """A command line, in this process."""
-    from gyrotc.cli import _status
+    from gyrotc.cli import run
 
-    sys.argv = ["gyrotc", *(str(a) for a in arguments)]
-    raise SystemExit(_status())  # `main` leaves at once: the calls could not be counted
+    raise SystemExit(
+        run([str(a) for a in arguments])
+    )  # `main` leaves at once: the calls could not be counted

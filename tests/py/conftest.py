@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
 # Whoever imports numpy first decides, so it stands above everything else.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+os.environ["COLUMNS"] = "200"  # rich asks once, when the command line is imported
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = Path(__file__).resolve().parent / "golden"
@@ -26,13 +30,30 @@ EXAMPLE = ROOT / "examples" / "minimal"
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """The installed command, as a user types it."""
+def run_process(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """The installed command in a process of its own: about a second of start-up, for what only a process shows."""
     program = Path(sys.executable).with_name("gyrotc")
-    environment = os.environ | {"COLUMNS": "200"}
     return subprocess.run(
-        [str(program), *map(str, args)], capture_output=True, text=True, check=False, cwd=cwd, env=environment
+        [str(program), *map(str, args)], capture_output=True, text=True, check=False, cwd=cwd
     )
+
+
+def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """The command as a user types it, run in this process: its exit status and what it prints."""
+    from gyrotc import cli
+
+    words, out, err = [str(a) for a in args], io.StringIO(), io.StringIO()
+    before = Path.cwd()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore"
+        )  # as the program does; those of our own code fail the tests of that code
+        os.chdir(cwd or before)
+        try:
+            status = cli.run(words)
+        finally:
+            os.chdir(before)
+    return subprocess.CompletedProcess(["gyrotc", *words], status, out.getvalue(), err.getvalue())
 
 
 def invoked(*args: object) -> Result:
@@ -55,6 +76,11 @@ def run_here(*args: str | Path) -> str:
 @pytest.fixture(scope="session")
 def gyrotc() -> Command:
     return run_gyrotc
+
+
+@pytest.fixture(scope="session")
+def gyrotc_process() -> Command:
+    return run_process
 
 
 @pytest.fixture

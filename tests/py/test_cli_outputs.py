@@ -14,15 +14,14 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import Command, invoked
+from conftest import Command
 from gyrotc import cli
-from gyrotc.errors import GyrotcError
 from gyrotc.outputs import MARKER, Lock, faults
 from recordings import columns, toml, write_csv
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> Path:
     """Two small gyros in `A` and `B`, and a result of the first in `result`."""
     folder = tmp_path_factory.mktemp("outputs")
     table = columns(360)
@@ -30,16 +29,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_csv(folder / serial / "run-01.csv", table | {"rate_dph": table["rate_dph"] - 20.0})
         head = f'schema = 1\nserial = "{serial}"\nearth_rate = "removed"'
         (folder / serial / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
-    assert here("fit", folder / "A", "--out", folder / "result").returncode == 0
+    assert gyrotc("fit", folder / "A", "--out", folder / "result").returncode == 0
     return folder
-
-
-def here(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """What the command says in this process; errors are told as `gyrotc.cli` does."""
-    done = invoked(*arguments)
-    if isinstance(done.exception, GyrotcError):
-        return subprocess.CompletedProcess((), done.exception.exit_status, "", f"gyrotc: {done.exception}\n")
-    return subprocess.CompletedProcess((), done.exit_code, done.stdout, repr(done.exception))
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -67,21 +58,25 @@ def test_a_firmware_project_is_not_taken_for_a_result(
     (project / decoy).mkdir() if decoy == "c" else (project / decoy).write_text("{}")
     (project / "thesis.tex").write_text("years of work")
     for command in ("build", "fit", "compare", "diagnose") if decoy == "c" else ("build",):
-        refused(here, tmp_path, command, made / "A", "--out", project, told="was not written by gyrotc")
+        refused(gyrotc, tmp_path, command, made / "A", "--out", project, told="was not written by gyrotc")
     if decoy != "c":
         return
-    refused(here, tmp_path, "simulate", "paper", "--out", project, told="was not written by gyrotc")
-    refused(here, tmp_path, "plan", "paper", "--out", project, told="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "simulate", "paper", "--out", project, told="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", project, told="was not written by gyrotc")
 
 
-def test_recordings_are_no_place_for_a_result(made: Path) -> None:
+def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> None:
     data = made / "A"
     for command in ("build", "fit", "compare", "diagnose"):
-        refused(here, made, command, data, "--out", data, told="is the data set")
-        refused(here, made, command, data, "--out", data / "x", told="inside the data set")
-        refused(here, made, command, data, "--out", made, told="above the data set")
-    refused(here, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", told="run-01.csv")
-    refused(here, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", told="is a file")
+        refused(gyrotc, made, command, data, "--out", data, told="is the data set")
+        refused(gyrotc, made, command, data, "--out", data / "x", told="inside the data set")
+        refused(gyrotc, made, command, data, "--out", made, told="above the data set")
+    refused(
+        gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", told="run-01.csv"
+    )
+    refused(
+        gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", told="is a file"
+    )
 
 
 def test_emit_puts_code_beside_the_users_own_and_deletes_none(
@@ -89,20 +84,20 @@ def test_emit_puts_code_beside_the_users_own_and_deletes_none(
 ) -> None:
     (tmp_path / "src.c").write_text("mine")
     for _ in range(2):
-        assert here("emit", made / "result", "--out", tmp_path, "--numeric", "f32").returncode == 0
+        assert gyrotc("emit", made / "result", "--out", tmp_path, "--numeric", "f32").returncode == 0
     assert (tmp_path / "src.c").read_text() == "mine" and (tmp_path / "c" / "gtc.c").is_file()
     (tmp_path / "c" / "main.c").write_text("edited")
-    refused(here, tmp_path, "emit", made / "result", "--out", tmp_path, told="c/main.c")
+    refused(gyrotc, tmp_path, "emit", made / "result", "--out", tmp_path, told="c/main.c")
 
 
-def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path) -> None:
+def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     out = tmp_path / "result"
-    assert here("fit", made / "A", "--out", out).returncode == 0
-    refused(here, tmp_path, "fit", made / "B", "--out", out, told="holds the result of serial A")
-    refused(here, tmp_path, "plan", "paper", "--out", out, told="holds the result of gyrotc fit")
-    refused(here, tmp_path, "compare", made / "A", "--out", out, told="holds the result of gyrotc fit")
+    assert gyrotc("fit", made / "A", "--out", out).returncode == 0
+    refused(gyrotc, tmp_path, "fit", made / "B", "--out", out, told="holds the result of serial A")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", out, told="holds the result of gyrotc fit")
+    refused(gyrotc, tmp_path, "compare", made / "A", "--out", out, told="holds the result of gyrotc fit")
     (out / MARKER).unlink()
-    refused(here, tmp_path, "fit", made / "A", "--out", out, told=MARKER)
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, told=MARKER)
 
 
 def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
@@ -117,32 +112,32 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
         ("verify", out, "--target", "host-gcc-O2"),
     )
     for step in (*steps, *steps[1:4]):
-        done = here(*step)
+        done = gyrotc(*step)
         assert done.returncode == 0, done.stderr
         assert not faults(out)
     assert {p.name for p in out.iterdir()} == {
         MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "more.json", "verify.json",
     }  # fmt: skip
     (out / "trace" / "notes.txt").write_text("mine")
-    refused(here, tmp_path, *steps[2], told="trace/notes.txt")
+    refused(gyrotc, tmp_path, *steps[2], told="trace/notes.txt")
     (out / "trace" / "notes.txt").unlink()
     for trace in (out, out / "c"):
-        refused(here, tmp_path, "evaluate", out, made / "A", "--trace", trace, told="--trace")
-    refused(here, tmp_path, "evaluate", out, made / "A", "--trace", made / "A", told="is the data set")
-    assert here(*steps[0]).returncode == 0
+        refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", trace, told="--trace")
+    refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", made / "A", told="is the data set")
+    assert gyrotc(*steps[0]).returncode == 0
     assert {p.name for p in out.iterdir()} == {MARKER, "model.json", "training.json"}
     assert json.loads((out / MARKER).read_text())["serial"] == "A"
 
 
-def test_two_jobs_into_one_place(made: Path, tmp_path: Path) -> None:
+def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     lock = Lock(tmp_path / "out", "build")
     try:
         refused(
-            here, tmp_path, "fit", made / "A", "--out", tmp_path / "out", told=f"process {os.getpid()} on"
+            gyrotc, tmp_path, "fit", made / "A", "--out", tmp_path / "out", told=f"process {os.getpid()} on"
         )
     finally:
         lock.release()
-    assert here("fit", made / "A", "--out", tmp_path / "out").returncode == 0
+    assert gyrotc("fit", made / "A", "--out", tmp_path / "out").returncode == 0
 
 
 def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Path, gyrotc: Command) -> None:

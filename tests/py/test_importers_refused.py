@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from conftest import Command
 from gyrotc.dataset import load
 from gyrotc.importers import ImportOptions, Map, import_files, load_map
 from gyrotc.results.base import read_result
@@ -20,15 +21,12 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """The command as a user types it, in this process: exit status, stdout, stderr."""
-    from gyrotc.cli import _status
+def run(gyrotc: Command) -> Run:
+    """The command as a user types it: exit status, stdout, stderr."""
 
-    def one(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr("sys.argv", ["gyrotc", *map(str, arguments)])
-        status = _status()
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
+    def one(*arguments: str | Path) -> tuple[int, str, str]:
+        done = gyrotc(*arguments)
+        return done.returncode, done.stdout, done.stderr
 
     return one
 
@@ -356,7 +354,7 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
                     row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000)
                 )
         program = (
-            "import sys; from gyrotc.cli import _status; sys.argv[0] = 'gyrotc'; status = _status(); "
+            "import sys; from gyrotc.cli import run; status = run(sys.argv[1:]); "
             "facts = dict(line.split(':') for line in open('/proc/self/status')); "  # ru_maxrss has the parent's, too
             "print(status, int(facts['VmHWM'].split()[0]) // 1024)"
         )
