@@ -109,6 +109,9 @@ BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, 
 NumericOption = Annotated[
     str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
 ]
+TargetOption = Annotated[
+    list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
+]
 LotOption = Annotated[
     Path | None,
     typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs."),

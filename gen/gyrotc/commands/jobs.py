@@ -27,6 +27,7 @@ from .base import (
     PriorOption,
     RhoOption,
     SeedOption,
+    TargetOption,
     TrustUnitsOption,
     app,
     applied_in,
@@ -69,6 +70,7 @@ def build(
     average_s: AverageOption = 100.0,
     channels: ChannelsOption = False,
     numeric: NumericOption = None,
+    target: TargetOption = None,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     extend: Annotated[
@@ -104,6 +106,7 @@ def build(
             options,
             axis=axis,
             numerics=numerics_of(numeric),
+            targets=target or (),
             applied=applied,
             trust_units=trust_units,
             extend=extend,

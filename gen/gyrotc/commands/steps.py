@@ -29,6 +29,7 @@ from .base import (
     PriorOption,
     RhoOption,
     SeedOption,
+    TargetOption,
     TrustOption,
     TrustUnitsOption,
     app,
@@ -155,9 +156,7 @@ def emit(
 @app.command()
 def verify(  # long: the parts of a command in the order in which they are printed
     folder: DirArg,
-    target: Annotated[
-        list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
-    ] = None,
+    target: TargetOption = None,
     dataset: Annotated[
         Path | None, typer.Option("--dataset", help="Replay these recordings on every target besides.")
     ] = None,

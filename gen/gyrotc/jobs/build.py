@@ -31,7 +31,7 @@ from ..results.manifest import Manifest
 from ..results.training import Training
 from ..results.verification import Verification
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
-from ..verify import verify
+from ..verify import chosen_targets, verify
 from .axes import join_axes
 from .recalibration import refuse_together, with_prior
 
@@ -73,6 +73,7 @@ class _Order:
     ageing_dph: float | None = None
     compiled: bool = True
     watch: Watch | None = None
+    targets: Sequence[str] = ()
 
 
 def build(
@@ -82,6 +83,7 @@ def build(
     *,
     axis: str | None = None,
     numerics: Sequence[str] | None = None,
+    targets: Sequence[str] = (),
     applied: Path | None = None,
     trust_units: bool = False,
     extend: bool = False,
@@ -99,6 +101,7 @@ def build(
     Args:
         axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
             `out/c` the runtime once with all tables.
+        targets: Names of the targets that the code is verified on; none: as `verify`.
         applied: Model that was subtracted while recording.
         trust_units: Values that contradict their units are taken nevertheless.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
@@ -115,12 +118,13 @@ def build(
     """
     say = progress or (lambda _: None)
     say("reading")
+    chosen_targets(targets)
     known = applied_of(applied) if applied else None
     if extend and (options.lot is not None or prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
     refuse_together(options, prior, ageing_dph)
     held = load_limits(limits) if limits else None
-    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph)
+    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph, targets=targets)
     axes = axes_of(source) if axis == "all" else ()
     if axis == "all" and not axes:
         raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
@@ -187,7 +191,12 @@ def _build_axis(
     _write(work / "training.json", fitted.training.content())
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics)
-    verification = verify(work, compiled=order.compiled, progress=lambda name: say(f"verifying {name}"))
+    verification = verify(
+        work,
+        targets=order.targets,
+        compiled=order.compiled,
+        progress=lambda name: say(f"verifying {name}"),
+    )
     _write(work / "verify.json", verification.content())
     evaluation = evaluate(
         work,

@@ -40,7 +40,7 @@ from .recordings import replay_dataset
 from .signature import check_signature, load_public_key
 from .toolchain import Target, all_targets
 
-__all__ = ["file_entries", "verify"]
+__all__ = ["chosen_targets", "file_entries", "verify"]
 
 Progress = Callable[[str], None]
 
@@ -81,7 +81,7 @@ def verify(  # long: the order of the checks, then one line for each field of th
     _check_edited(edited)
     key = load_public_key(signature) if signature is not None else None
     model = load_model(folder / "model.json")
-    chosen = _choose(targets) if compiled and (targets or log is None) else []
+    chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
     say("comparing files")
     options, emission = made_again(folder / "c", model)
     tables = emission.tables
@@ -134,7 +134,8 @@ def verify(  # long: the order of the checks, then one line for each field of th
     )
 
 
-def _choose(names: Sequence[str]) -> list[Target]:
+def chosen_targets(names: Sequence[str]) -> list[Target]:
+    """The targets of these names or of `all`; without a name the default ones. Raises InputError on an unknown name."""
     known = all_targets()
     for name in names:
         if name != "all" and name not in known:
