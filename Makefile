@@ -42,17 +42,28 @@ formats:
 	@.venv/bin/python tools/formats.py
 	@.venv/bin/python tools/reference.py
 
-## all tests (CTest for the C library, pytest for the generator); installs its own tools
+# The C library's tests and its fuzzers' saved inputs, built as far as something changed.
+define c-tests
+@tools/setup.sh test
+@mkdir -p build
+@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
+@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
+@ctest --test-dir build/ctest -j2 --output-on-failure
+@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
+@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
+@ctest --test-dir build/fuzz -j2 --output-on-failure
+endef
+
+## what to run before a commit: C library, generator, one of each command; five minutes on two cores
 test:
-	@tools/setup.sh test
-	@mkdir -p build
-	@cmake -S tests/c -B build/ctest -DCMAKE_BUILD_TYPE=Debug >build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
-	@cmake --build build/ctest -j2 >>build/ctest.log 2>&1 || { cat build/ctest.log; exit 1; }
-	@ctest --test-dir build/ctest --output-on-failure
-	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
-	@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
-	@ctest --test-dir build/fuzz --output-on-failure
+	$(c-tests)
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile -m "not slow" tests/py
+
+## everything: `make test` with the slow tests, then `make check`, `make cov`, `make targets`; an hour on two cores
+test-all:
+	$(c-tests)
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py
+	@$(MAKE) --no-print-directory check cov targets
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
 targets:
@@ -206,4 +217,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo formats test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist release lock offline site clean

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import io
 import os
 import subprocess
@@ -26,6 +27,8 @@ os.environ["COLUMNS"] = "200"  # rich asks once, when the command line is import
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = Path(__file__).resolve().parent / "golden"
 EXAMPLE = ROOT / "examples" / "minimal"
+#: Options of a build whose targets are not the point: one arithmetic, one compiler.
+HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -127,12 +130,29 @@ def model_dict() -> dict[str, Any]:
     }
 
 
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """A folder that `make` fills once, for all processes of a run of pytest. It is read only: copy what you change."""
+    base = factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name
+    folder.mkdir(exist_ok=True)
+    with (folder / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / ".made").exists():
+            make(folder)
+            (folder / ".made").touch()
+    return folder
+
+
+def _demo(folder: Path) -> None:
+    for arguments in (
+        ("simulate", "paper", "--seed", "1", "--out", folder / "data"),
+        ("build", folder / "data", "--out", folder / "result"),
+    ):
+        done = run_gyrotc(*arguments)
+        assert done.returncode == 0, done.stderr
+
+
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `data` (the simulated paper scenario) and `result` (what build made of it)."""
-    folder = tmp_path_factory.mktemp("demo")
-    made = run_gyrotc("simulate", "paper", "--seed", "1", "--out", folder / "data")
-    assert made.returncode == 0, made.stderr
-    built = run_gyrotc("build", folder / "data", "--out", folder / "result")
-    assert built.returncode == 0, built.stderr
-    return folder
+    return made_once(tmp_path_factory, "demo", _demo)

@@ -63,7 +63,7 @@ def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Cause) 
     assert list(plan_parts(planned))
     assert "slow rate" in write_plan(tmp_path / "plan", planned).read_text()
 
-    (built,) = build(tmp_path / "data", out, FitOptions(), extend=True)
+    (built,) = build(tmp_path / "data", out, FitOptions(), targets=["host-gcc-O2"], extend=True)
     assert not built.failures
     diagnosis = built.diagnosis
     assert diagnosis is not None and diagnosis.verdict in ("explained", "ambiguous")

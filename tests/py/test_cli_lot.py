@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import run_here
+from conftest import HOST, run_here
 from gyrotc.dataset import load
 from gyrotc.diagnose.extend.refitting import Refitting
 from gyrotc.diagnose.screen.gather import records_of
@@ -86,7 +86,7 @@ def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world:
 def test_header_and_report_show_the_lot(world: Path) -> None:
     out = world / "built"
     unit = world / "short" / "LOT-0005-006"
-    run_here("build", unit, "--lot", world / "lot.json", "--numeric", "f32", "--out", out)
+    run_here("build", unit, "--lot", world / "lot.json", *HOST, "--out", out)
     assert "a lot of 5 units leaves" in next((out / "c").glob("gtc_lot*.h")).read_text()
     page = (out / "report.html").read_text()
     assert "<h2>The lot</h2>" in page and "the lot alone, 5 units" in page

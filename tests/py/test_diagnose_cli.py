@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from campaigns import GRADIENT, simulated
-from conftest import Command
+from conftest import HOST, Command
 from gyrotc.simulate import read
 
 
@@ -18,7 +18,7 @@ def built(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> Path:
     """A folder with `data` (a gyro with a thermal gradient) and `result` (what build --extend made of it)."""
     folder = tmp_path_factory.mktemp("extended")
     data = simulated(folder, GRADIENT)
-    done = gyrotc("build", data, "--out", folder / "result", "--extend", "--numeric", "f32")
+    done = gyrotc("build", data, "--out", folder / "result", "--extend", *HOST)
     assert done.returncode == 0, done.stderr
     (folder / "stdout").write_text(done.stdout)
     return folder

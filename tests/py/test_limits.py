@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from conftest import Command
+from conftest import HOST, Command
 from gyrotc.errors import InputError
 from gyrotc.judge.limits import AtLeast, AtMost, held_against, load_limits
 from gyrotc.model import Model
@@ -192,7 +192,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     recording(tmp_path / "first", "RLG-1")
     product = tmp_path / "product.toml"
     product.write_text('schema = 1\nproduct = "NAV"\n[at_most]\ntable_bytes = 20\nrms_dph = 1.0\n')
-    build = ("build", "--numeric", "f32", "--limits", product)
+    build = ("build", *HOST, "--limits", product)
     done = gyrotc(*build, tmp_path / "first", "--out", tmp_path / "one")
     assert done.returncode == 1
     assert "limit at_most.table_bytes = 20.0 is not met" in done.stderr and "rms_dph" not in done.stderr

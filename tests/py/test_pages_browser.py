@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from browser import CHROMIUM, Browser, browser
-from conftest import Command
+from conftest import HOST, Command
 from recordings import columns, toml, write_csv
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
@@ -58,7 +58,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> dict[str
     folder = tmp_path_factory.mktemp("pages")
     limits = folder / "product.toml"
     limits.write_text('schema = 1\nproduct = "NAV"\n[at_most]\nrms_dph = 1.0\ntable_bytes = 20\n')
-    build = ("build", "--numeric", "f32", "--limits", limits)
+    build = ("build", *HOST, "--limits", limits)
     _axis(folder / "a" / "RLG-1", "rate_dph", 1)
     gyrotc(*build, folder / "a" / "RLG-1", "--out", folder / "before")
     _axis(folder / "b" / "RLG-1", "rate_dph", 2, shift=0.01)

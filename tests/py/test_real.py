@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT, Command
+from conftest import HOST, ROOT, Command
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")
@@ -20,7 +20,7 @@ def built(name: str, out: Path, gyrotc: Command) -> dict[str, dict[str, Any]]:
     """Evaluation and model of every axis."""
     if name in ABSENT:
         pytest.skip(SKIPPED)
-    done = gyrotc("build", REAL / name, "--axis", "all", "--out", out, "--numeric", "f32")
+    done = gyrotc("build", REAL / name, "--axis", "all", "--out", out, *HOST)
     assert done.returncode == 0, done.stderr
     return {
         axis: {
@@ -73,7 +73,7 @@ def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Co
     folder = tmp_path / SETS[1]
     folder.mkdir()
     (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")
-    assert gyrotc("build", folder, "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    assert gyrotc("build", folder, "--out", tmp_path / "out", *HOST).returncode == 0
     result = {"evaluate": json.loads((tmp_path / "out" / "evaluate.json").read_text())}
     assert {"does_not_generalise", "jump_in_temperature", "earth_rate_not_stated"} <= found(result)
     assert "no_temperature_information" not in found(result)
@@ -82,5 +82,5 @@ def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Co
 def test_simulated_data_under_a_real_name_have_no_findings(tmp_path: Path, gyrotc: Command) -> None:
     folder = tmp_path / SETS[1]
     assert gyrotc("simulate", "paper", "--seed", 5, "--out", folder).returncode == 0
-    assert gyrotc("build", folder, "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    assert gyrotc("build", folder, "--out", tmp_path / "out", *HOST).returncode == 0
     assert found({"evaluate": json.loads((tmp_path / "out" / "evaluate.json").read_text())}) == set()

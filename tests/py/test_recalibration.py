@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import run_here
+from conftest import HOST, run_here
 from gyrotc.emit import emitted_tables
 from gyrotc.errors import InputError
 from gyrotc.model import load_model
@@ -235,7 +235,7 @@ def proven(result: Path) -> None:
 def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: Path, tmp_path: Path) -> None:
     out = tmp_path / "built"
     block = ("--block-s", "50")
-    run_here("build", world / "check", "--prior", world / "old", "--numeric", "f32", "--out", out, *block)
+    run_here("build", world / "check", "--prior", world / "old", *HOST, "--out", out, *block)
     proven(out)
     prior = read_result(out / "training.json", Training).prior
     assert prior is not None and prior.accepted
@@ -254,7 +254,7 @@ def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: P
 def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path) -> None:
     out = tmp_path / "built"
     bumped = dataset(tmp_path / "bumped", 15, "2026-06-01", check=True, change=CHANGES["local"])
-    run_here("build", bumped, "--prior", world / "old", "--numeric", "f32", "--out", out, "--block-s", "50")
+    run_here("build", bumped, "--prior", world / "old", *HOST, "--out", out, "--block-s", "50")
     proven(out)
     prior = read_result(out / "training.json", Training).prior
     assert prior is not None and not prior.accepted and prior.change is not None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Command
+from conftest import HOST, Command
 from gyrotc.errors import InputError
 from gyrotc.jobs.build import build
 from gyrotc.train.fitting import FitOptions
@@ -72,7 +72,7 @@ def test_a_refused_build_leaves_an_older_result_alone(tmp_path: Path, gyrotc: Co
     described(tmp_path / "RLG-1")
     small = columns() | {"rate_dph": columns()["rate_dph"] - 20.0}
     write_csv(tmp_path / "RLG-1" / "run-01.csv", small)
-    assert gyrotc("build", tmp_path / "RLG-1", "--out", tmp_path / "out", "--numeric", "f32").returncode == 0
+    assert gyrotc("build", tmp_path / "RLG-1", "--out", tmp_path / "out", *HOST).returncode == 0
     before = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}
     write_csv(tmp_path / "RLG-1" / "run-01.csv", columns(4))
     assert gyrotc("build", tmp_path / "RLG-1", "--out", tmp_path / "out").returncode == 2
@@ -90,7 +90,7 @@ def test_fit_takes_what_check_accepts(case: str, tmp_path: Path, gyrotc: Command
 
 def quiet_build(folder: Path, out: Path, gyrotc: Command) -> dict[str, Any]:
     """Evaluation of a build that says nothing on stderr."""
-    done = gyrotc("build", folder, "--out", out, "--numeric", "f32")
+    done = gyrotc("build", folder, "--out", out, *HOST)
     assert (done.returncode, done.stderr) == (0, "")
     result: dict[str, Any] = json.loads((out / "evaluate.json").read_text())
     return result
