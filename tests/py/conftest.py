@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +74,12 @@ def run_here(*args: str | Path) -> str:
         raise done.exception
     assert done.exit_code == 0, done.output
     return done.output
+
+
+def quick_and_slow(quick: Sequence[Any], slow: Sequence[Any]) -> list[Any]:
+    """Cases of a parametrised test, of which `make test` runs the quick ones and `make test-all` all."""
+    marked = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in slow)
+    return [*quick, *marked]
 
 
 @pytest.fixture(scope="session")

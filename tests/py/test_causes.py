@@ -52,6 +52,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[Cause]:
     CATALOGUE.update(whole)
 
 
+@pytest.mark.slow
 def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Cause) -> None:
     """Simulated, planned, found, named, put into the table, emitted, verified on the host, reported."""
     scenario, out = tmp_path / "made-up.toml", tmp_path / "out"

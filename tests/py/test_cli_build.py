@@ -127,6 +127,7 @@ def test_ten_gyros_reach_the_floor(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not (REAL / "mpu6000-chamber-cycle").is_dir(), reason="no real recordings here")
+@pytest.mark.slow
 def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyrotc: Command) -> None:
     done = gyrotc("build", REAL / "mpu6000-chamber-cycle", "--axis", "x", *HOST, "--out", tmp_path / "r")
     assert done.returncode == 0, done.stderr
@@ -182,6 +183,7 @@ def _three_axes(source: Path, folder: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
     _three_axes(demo / "data", tmp_path / "triad")
     done = gyrotc("build", tmp_path / "triad", "--axis", "all", *HOST, "--out", tmp_path / "r")

@@ -420,6 +420,7 @@ def test_a_channel_that_not_every_run_has_is_left_out_and_told(tmp_path: Path) -
 # ---- size ----
 
 
+@pytest.mark.slow
 def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path) -> None:
     n = 2_880_000
     folder = tmp_path / "RLG-1"

@@ -184,6 +184,7 @@ profiles = ["nested loops"]
 """
 
 
+@pytest.mark.slow
 def test_a_gap_in_every_run_costs_an_extension_next_to_nothing(tmp_path: Path) -> None:
     """200 s without rows: with a channel of 0 in their place the extension made five times its gain of new error."""
     (tmp_path / "short.toml").write_text(SCENARIO)
@@ -200,6 +201,7 @@ def test_a_gap_in_every_run_costs_an_extension_next_to_nothing(tmp_path: Path) -
     assert left[1] < 1.02 * left[0]
 
 
+@pytest.mark.slow
 def test_a_lost_channel_costs_an_extension_no_more_than_2_percent_over_one_thermometer(
     tmp_path: Path,
 ) -> None:

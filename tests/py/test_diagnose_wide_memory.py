@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from conftest import quick_and_slow
 from gyrotc.diagnose.advice import sentence_of, shows_as
 from gyrotc.diagnose.attribute.attribution import Attribution, attribute
 from gyrotc.diagnose.attribute.gains import Gains
@@ -77,7 +78,7 @@ def named(found: Attribution) -> list[str]:
     return [c.candidate.id for c in found.causes] if holds(found) else []
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick_and_slow([0], [1, 2, 3]))
 def test_relays_are_hysteresis(campaign: Campaign, seed: int) -> None:
     """One play leaves what one finds with certainty, and is not four fifths of it: it was told as unexplained."""
     found = attribute(measured(campaign, relays(campaign.records, seed), 40.0, seed))
@@ -99,14 +100,14 @@ def test_a_wave_beside_a_play_stays_a_cause_of_its_own(campaign: Campaign) -> No
     assert set(named(found)) == {"hysteresis", "path_length_periodicity"}
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", quick_and_slow([0], [1]))
 def test_a_strength_that_goes_with_temperature_is_told(campaign: Campaign, seed: int) -> None:
     found = attribute(measured(campaign, campaign.records.columns(local_loop)[:, 0], 25.0, seed))
     assert named(found) == ["hysteresis"] and found.wide is not None
     assert found.wide.varies and "goes with temperature" in found.wide.text
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", quick_and_slow([2], [3]))
 def test_a_loop_about_one_temperature_is_no_lag(campaign: Campaign, seed: int) -> None:
     """A lag of the whole map came nearer to it than one play of one strength, and was named."""
     search = measured(campaign, campaign.records.columns(local_loop)[:, 0], 40.0, seed)

@@ -39,6 +39,7 @@ def test_a_dead_link_and_a_dead_heading_are_seen(tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.parametrize("page", RUNNING, ids=_name)
+@pytest.mark.slow
 def test_what_a_page_shows_is_what_happens(page: Path) -> None:
     told = list(documents.run(page))
     assert [text for text in told if not text.startswith("skipped")] == []

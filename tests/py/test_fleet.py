@@ -69,6 +69,7 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     assert {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")} == before
 
 
+@pytest.mark.slow
 def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyrotc: Command) -> None:
     """What the reference says that the C code does is what the C code does."""
     fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
@@ -140,6 +141,7 @@ def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     assert "serial RLG-1 is also that of another" in (entries[0].reason or "")
 
 
+@pytest.mark.slow
 def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) -> None:
     for k in range(4):
         gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
@@ -186,6 +188,7 @@ def test_no_file_of_the_summary_outlives_what_it_says(
     assert "unfinished" in (out / "fleet.html").read_text()
 
 
+@pytest.mark.slow
 def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(tmp_path: Path) -> None:
     """Also beside a result whose gyro is no longer in the manifest; locks of others stay."""
     for k in (1, 2):

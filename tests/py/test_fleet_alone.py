@@ -318,6 +318,7 @@ def _dies(task: Any) -> FleetEntry:
     return FleetEntry(name=task.unit.name, axis=None, status="done")
 
 
+@pytest.mark.slow
 def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "do_unit", _dies)
     units = tuple(Unit(tmp_path / f"RLG-{k}", None) for k in range(4))
@@ -401,6 +402,7 @@ def _agrees(out: Path) -> int:
     return len(done)
 
 
+@pytest.mark.slow
 def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
     """Everything in its process group is killed: of each gyro the earlier result or the new one, and nothing else."""
     seed = random.SystemRandom().randrange(10**6)

@@ -340,6 +340,7 @@ def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) ->
     assert error.splitlines()[-1].startswith("gyrotc: ") and not (tmp_path / "R").exists()
 
 
+@pytest.mark.slow
 def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
     """Twelve megabytes and four times that need the same memory within 60 MiB: nothing is kept of the rows."""
     peaks = []

@@ -332,6 +332,7 @@ def test_runs_of_a_data_set_have_a_ceiling(tmp_path: Path, monkeypatch: pytest.M
     assert "4 runs; expected at most 3" in refused(lambda: load(tmp_path))
 
 
+@pytest.mark.slow
 def test_mutants_of_every_reader() -> None:
     """A slice of `make fuzz`: no exception but those meant for users, no hang, no more than 2 GiB."""
     command = [sys.executable, str(Path(__file__).with_name("mutants.py")), "--count", "420", "--seed", "1"]

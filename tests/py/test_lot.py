@@ -147,6 +147,7 @@ def test_a_unit_with_one_run_gains_what_its_lot_knows() -> None:
     assert 0.4 < np.median(inside) < 2.0  # the table's sigma is of the size of the error
 
 
+@pytest.mark.slow
 def test_scores_of_the_lots_own_units_are_as_expected() -> None:
     """p-values of units drawn from the prior itself are uniform, whatever their runs tell."""
     _, prior, _ = family(11)
@@ -174,6 +175,7 @@ def test_a_stranger_is_told_and_calibrated_without_the_lot() -> None:
     assert coverage(data, with_lot) == coverage(data, alone)
 
 
+@pytest.mark.slow
 def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
     rng = np.random.default_rng(31)
     units = []
@@ -187,6 +189,7 @@ def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
     assert len(found.state.means) == 1
 
 
+@pytest.mark.slow
 def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     seed = secrets.randbits(30)
     print("seed", seed)
@@ -211,6 +214,7 @@ def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     assert lot.units[4].cluster is None and "U4" in lot.told
 
 
+@pytest.mark.slow
 def test_a_lot_of_few_units_knows_its_mean_badly() -> None:
     few, many = family(51, units=4)[1], family(51, units=40)[1]
     assert few.alone().rms_sigma_dph() > many.alone().rms_sigma_dph()

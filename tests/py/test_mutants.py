@@ -15,6 +15,8 @@ sys.path.insert(0, str(ROOT))
 from tests.mutants.page import section  # noqa: E402
 from tests.mutants.run import MODELS, Fault, House, faults, tried  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 FAULTS = faults()
 
 

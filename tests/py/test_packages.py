@@ -36,6 +36,8 @@ import version  # noqa: E402
 
 import packages  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 #: What packages/rust/example and packages/ada/example do, in C.
 RAMP = r"""
 #include <inttypes.h>

@@ -20,6 +20,8 @@ import objects  # noqa: E402
 import origins  # noqa: E402
 import source  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 CRC = "libc/gtc_crc.c"
 
 

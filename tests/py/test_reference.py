@@ -147,6 +147,7 @@ def test_self_test_finds_fused_multiply_add() -> None:
     assert fused.check(quantise(random_model(0), "f32")) == -3
 
 
+@pytest.mark.slow
 def test_the_fixed_point_gaussian_is_within_its_bound_for_every_argument() -> None:
     """All u below 1 (2^24 of them), then a stretch of each further octave, at both ends of what truncates to u."""
     octaves = [np.arange(k << 24, (k << 24) + (1 << 24 if k == 0 else 1 << 16)) for k in range(32)]

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from conftest import quick_and_slow
 from gyrotc.emit.amalgamate import amalgamate
 from gyrotc.reference.runtime import runtime_folders
 from gyrotc.verify.functions import PUBLIC
@@ -50,8 +51,18 @@ COMPILERS = {
 }
 
 
-@pytest.mark.parametrize("level", ["-O0", "-O2", "-Os", "-O3"])
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize(
+    ("compiler", "level"),
+    quick_and_slow(
+        [("gcc", "-O0"), ("Cortex-M4F", "-O2")],
+        [
+            (compiler, level)
+            for compiler in COMPILERS
+            for level in ("-O0", "-O2", "-Os", "-O3")
+            if (compiler, level) not in {("gcc", "-O0"), ("Cortex-M4F", "-O2")}
+        ],
+    ),
+)
 def test_a_program_links_without_a_c_library(compiler: str, level: str, tmp_path: Path) -> None:
     """With every option, and all of the runtime kept."""
     options = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")

@@ -359,6 +359,7 @@ def test_allantools_finds_the_declared_noise_in_a_recording(tmp_path: Path) -> N
     assert (quantum > white)[0] and (white > quantum + flicker + walk)[2] and (walk > white + flicker)[4]
 
 
+@pytest.mark.slow
 def test_the_memory_does_not_grow_with_the_rows(short: Path, tmp_path: Path) -> None:
     """2.4 million rows a run in less than 80 MB; held at once they would take some 200."""
     tracemalloc.start()

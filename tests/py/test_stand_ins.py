@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import quick_and_slow
 from gyrotc.dataset import Rows, load
 from gyrotc.model import Model, Network, Scale, Term
 from gyrotc.quantise import NUMERICS, quantise
@@ -31,7 +32,7 @@ from bench.signals import rms_of, scenario_of, without
 Array = np.ndarray[Any, Any]
 
 _SAMPLES_PER_BLOCK = 4
-_SEEDS = (701, 702)  # worlds that neither bench nor method was tried on
+_SEEDS = quick_and_slow([701], [702])  # worlds that neither bench nor method was tried on
 
 
 def with_two_channels(seed: int, **changes: Any) -> Model:

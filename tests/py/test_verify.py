@@ -35,6 +35,7 @@ def copy(whole: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole, tmp_path / "copy"))
 
 
+@pytest.mark.slow
 def test_every_target_of_the_common_tools_agrees_in_every_bit(whole: Path) -> None:
     """Two byte orders, two word lengths, hardware, software and double evaluation of float."""
     names = ["cortex-m0", "cortex-m4f", "s390x", *(n for n in all_targets() if n.startswith("host-"))]
@@ -141,6 +142,7 @@ def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
         assert (result["failed"] > 0) == bool(failed)
 
 
+@pytest.mark.slow
 def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path: Path) -> None:
     """Host, emulated board, the other byte order; a wrong constant of the front end is seen in the rows."""
     names = [FAST, "cortex-m4f", "s390x"]
