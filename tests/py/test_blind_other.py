@@ -90,6 +90,7 @@ def test_a_map_of_a_late_temperature_is_no_foreign_effect() -> None:
     assert stick.imitated(noises) < 0.5, "noise is nobody's"
 
 
+@pytest.mark.slow
 def test_a_slice_of_the_world_is_diagnosed(tmp_path: Path) -> None:
     rows = run(SEED, RECORDS, tmp_path, hours=2.0)
     assert len(rows) == RECORDS and table(rows)

@@ -280,6 +280,7 @@ def test_an_interval_holds_every_top_that_reaches_as_far_as_its_likelihood() -> 
     assert high == pytest.approx(7.0 + np.sqrt((drop - 2.0) / 40.0), abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_weak_waves_period_is_taken_over_the_whole_grid(case: Case) -> None:
     """Of a weak wave another period may do as well: about the best one alone the interval missed it."""
     print("seed", SEED + 5)

@@ -106,6 +106,7 @@ def scaled(noise: Declared, factor: float) -> Declared:
     return Declared(*(factor * v for v in values))
 
 
+@pytest.mark.slow
 def test_what_is_hidden_is_named_in_the_first_place(made: Callable[[str], Case]) -> None:
     assert made("hysteresis").answer.causes == ["hysteresis"]
     assert made("auxiliary").answer.causes == ["auxiliary"]
@@ -186,6 +187,7 @@ def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str],
     assert rival.distance == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
     made: Callable[[str], Case], drawing: Drawing, tmp_path: Path
 ) -> None:
@@ -211,6 +213,7 @@ def test_noise_declared_twice_too_high_or_low_is_told(made: Callable[[str], Case
         assert found.analysis.noise[0].parameters["ratio"] == pytest.approx(1.0 / factor, rel=0.05)
 
 
+@pytest.mark.slow
 def test_truth_beside_the_recordings_is_not_looked_at(made: Callable[[str], Case]) -> None:
     folder = made("hysteresis").folder
     before = diagnose(load(folder)).result

@@ -77,6 +77,7 @@ def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> No
     assert left(louder).p_value >= left(search).p_value
 
 
+@pytest.mark.slow
 def test_a_likeliest_colour_that_is_too_fast_is_not_believed_alone(campaign: Campaign) -> None:
     """Of twelve recordings of a true cause in a random walk, 5 left less than 1 % by the likeliest colour."""
     p_values = [left(measured(campaign, Colour(walk=0.3), seed, None)).p_value for seed in range(12)]

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from conftest import ROOT, Command
 
+pytestmark = pytest.mark.slow
+
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 STATIC_MAP_DPH = 1311.0  # a map of (T, dT/dt) on the x axis of the branch that it has not seen
 

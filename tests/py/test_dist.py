@@ -19,6 +19,8 @@ sys.path.insert(0, str(ROOT / "tools"))
 import archives  # noqa: E402
 import version  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 TOP = f"gyrotc-{version.header_version(ROOT)}"
 
 

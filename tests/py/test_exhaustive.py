@@ -41,6 +41,7 @@ def test_sample_of_all_inputs_agrees_and_keeps_the_bound(tmp_path: Path) -> None
     assert abs(visited.mean_dph) <= visited.arithmetic_dph
 
 
+@pytest.mark.slow
 def test_worst_error_is_that_of_the_model(tmp_path: Path) -> None:
     """The figures of the C program against numpy, at inputs that it visits (one slice of slopes)."""
     folder = emitted(tmp_path)
@@ -58,6 +59,7 @@ def test_worst_error_is_that_of_the_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 5])
+@pytest.mark.slow
 def test_sample_agrees_for_other_tables(seed: int, tmp_path: Path) -> None:
     folder = emitted(tmp_path, random_model(seed))
     visited = _visit(folder)
@@ -65,6 +67,7 @@ def test_sample_agrees_for_other_tables(seed: int, tmp_path: Path) -> None:
     assert visited.worst_dph <= job_of(folder).tables["q31"].error_bound_dph
 
 
+@pytest.mark.slow
 def test_one_wrong_bit_of_the_gaussians_table_is_seen(tmp_path: Path) -> None:
     folder = emitted(tmp_path)
     spoil(folder / "c" / "gtc.c", "0x3DD4FFA7UL", "0x3DD4FFA6UL")
@@ -73,12 +76,14 @@ def test_one_wrong_bit_of_the_gaussians_table_is_seen(tmp_path: Path) -> None:
     assert "reference" in visited.first[0]
 
 
+@pytest.mark.slow
 def test_wrong_status_is_seen(tmp_path: Path) -> None:
     folder = emitted(tmp_path)
     spoil(folder / "c" / "gtc.c", r"\|= GTC_UNCOVERED;", "|= GTC_OK;", count=0)
     assert _visit(folder).mismatches > 0
 
 
+@pytest.mark.slow
 def test_table_that_is_not_the_model_leaves_the_bound(tmp_path: Path) -> None:
     """C and integers agree on a table whose constant is wrong: only the model tells."""
     folder = emitted(tmp_path)

@@ -253,6 +253,7 @@ def test_the_sources_are_those_of_the_result_and_compile_by_the_description_alon
     assert ctypes.CDLL(str(library)).fmi3DoStep and gyro.root.attrib["fmiVersion"] == "3.0"
 
 
+@pytest.mark.slow
 def test_the_same_result_gives_the_same_bytes_and_a_changed_one_none(plain: Path, tmp_path: Path) -> None:
     for _ in range(2):  # the second one replaces what gyrotc wrote
         export(plain, "fmu", tmp_path / "gyro.fmu")

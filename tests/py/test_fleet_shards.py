@@ -104,6 +104,7 @@ def _dies_once(task: Task) -> FleetEntry:
     return do_unit(task)
 
 
+@pytest.mark.slow
 def test_a_unit_whose_process_is_killed_is_done_again(
     lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

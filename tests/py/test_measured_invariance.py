@@ -22,6 +22,8 @@ from gyrotc.diagnose.screen.gather import records_of
 from gyrotc.train.fitting import FitOptions
 from recordings import write_csv
 
+pytestmark = pytest.mark.slow
+
 SOURCE = (
     Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
     / "mpu6000-chamber-cycle"

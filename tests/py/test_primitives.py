@@ -11,6 +11,8 @@ import pytest
 from emitted import spoil
 from gyrotc.reference.q31 import GAUSS_ERROR
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 #: Largest departure of the float32 Gaussian from the exact one that docs/numerics.md allows.
 F32_GAUSS_ERROR = 1.9e-7

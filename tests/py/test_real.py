@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from conftest import HOST, ROOT, Command
 
+pytestmark = pytest.mark.slow
+
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")
 ABSENT = [name for name in SETS if not (REAL / name).is_dir()]

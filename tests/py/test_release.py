@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
+pytestmark = pytest.mark.slow
+
 TOOLS = ("release.sh", "version.py", "archives.py", "packages.py")
 
 
