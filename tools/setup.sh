@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Installs what gyrotc needs: system packages (Debian, Ubuntu) that are missing, then the virtual environment .venv.
 #
-#   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt
-#   tools/setup.sh firmware   besides, the ARM compiler and the emulator of docs/tutorial.md
+#   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt; the ARM compiler and its emulator
 #   tools/setup.sh test       besides, what `make test` uses
 #   tools/setup.sh check      besides, the cross compilers of `make check`
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
@@ -12,7 +11,7 @@
 # `locked` behind a level takes the versions of gen/requirements.lock, each file held against its SHA-256.
 #
 # No release's number stands in a package's name here: what belongs to one version of a compiler is asked of that compiler.
-# Without the packages of `demo` nothing works; any other that this release does not have is named, and what needs it is skipped.
+# Without the packages of `base` nothing works; any other that this release does not have is named, and what needs it is skipped.
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -21,8 +20,8 @@ locked=${2:-}
 [ -z "$locked" ] || [ "$locked" = locked ] || { echo "setup: unknown word '$locked' (locked)" >&2; exit 2; }
 
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
-firmware=(gcc-arm-none-eabi qemu-system-arm)
-test=(clang cmake cppcheck "${firmware[@]}" gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
+arm=(gcc-arm-none-eabi qemu-system-arm)
+test=(clang cmake cppcheck gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
       clang-tidy lcov pkg-config openssl meson ninja-build)
 check=(gcc-aarch64-linux-gnu gcc-avr avr-libc)
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
@@ -31,22 +30,22 @@ targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6
 prove=(frama-c-base gappa z3)
 
 case $level in
-  demo) packages=("${base[@]}") ;;
-  firmware) packages=("${base[@]}" "${firmware[@]}") ;;
-  test) packages=("${base[@]}" "${test[@]}") ;;
-  check) packages=("${base[@]}" "${test[@]}" "${check[@]}") ;;
-  targets) packages=("${base[@]}" "${test[@]}" "${targets[@]}") ;;
-  prove) packages=("${base[@]}" "${test[@]}" "${prove[@]}") ;;
-  picture) packages=("${base[@]}" chromium) ;;
-  *) echo "setup: unknown level '$level' (demo, firmware, test, check, targets, prove, picture)" >&2; exit 2 ;;
+  demo) packages=() ;;
+  test) packages=("${test[@]}") ;;
+  check) packages=("${test[@]}" "${check[@]}") ;;
+  targets) packages=("${test[@]}" "${targets[@]}") ;;
+  prove) packages=("${test[@]}" "${prove[@]}") ;;
+  picture) packages=(chromium) ;;
+  *) echo "setup: unknown level '$level' (demo, test, check, targets, prove, picture)" >&2; exit 2 ;;
 esac
+packages=("${base[@]}" "${arm[@]}" "${packages[@]}")
 
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'install ok installed'; }
 
 # Names of the packages that belong to the compilers installed by now: the sanitizers of clang, the 32-bit part of gcc
 # (gcc-multilib would bring it too, but is in conflict with the cross compilers).
 belonging() {
-  case $level in demo | firmware | picture) return 0 ;; esac
+  case $level in demo | picture) return 0 ;; esac
   if command -v clang >/dev/null; then echo "libclang-rt-$(clang -dumpversion | cut -d. -f1)-dev"; fi
   if [ "$level" = targets ]; then echo "lib32gcc-$(gcc -dumpversion | cut -d. -f1)-dev"; fi
 }
@@ -95,7 +94,7 @@ fi
 
 # The environment is made again when what it is made of has changed.
 extras=""
-case $level in demo | firmware | picture) ;; *) extras="[test]" ;; esac
+case $level in demo | picture) ;; *) extras="[test]" ;; esac
 stamp=.venv/.gyrotc$extras
 fingerprint=$({ echo "$locked"; cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
 if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The way of a newcomer on this machine, timed step by step: README's first command, the compiler and emulator for
-# firmware, then every command of docs/tutorial.md (own files, firmware in QEMU). Prints a section for docs/walk.md;
+# The way of a newcomer on this machine, timed step by step: README's first command, then every command of
+# docs/tutorial.md (own files, firmware in QEMU). Prints a section for docs/walk.md;
 # what the commands say goes to build/walk.log. For a machine on which nothing is installed yet; exit status 1 if a
 # step fails, with the end of the log.
 set -euo pipefail
@@ -30,9 +30,8 @@ echo "## $system, $(uname -m), $(nproc) processors: $(date -u +%F), commit $(git
 echo
 echo "| step | s | s of processor time |"
 echo "| --- | ---: | ---: |"
-step '`make setup`: packages of the system, `.venv`, core' make setup
+step '`make setup`: packages of the system (ARM compiler and emulator among them), `.venv`, core' make setup
 step '`make demo`: simulated recordings to verified C and a report' make demo
-step '`tools/setup.sh firmware`: ARM compiler, emulator' tools/setup.sh firmware
 step '[tutorial.md](tutorial.md): own files to firmware in QEMU' tutorial
 echo
 echo "Commands of the tutorial that took a second or more:"

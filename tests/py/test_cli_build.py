@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from gyrotc.dataset import load
 from gyrotc.emit.files import emit
 from gyrotc.judge.evaluate import evaluate
 from gyrotc.model import load_model
+from gyrotc.pages.report import write_report
 from gyrotc.simulate import simulate
 from gyrotc.train.fitting import FitOptions, fit_dataset
 
@@ -96,6 +98,23 @@ def test_report_is_one_self_contained_page(demo: Path) -> None:
     assert "SIM-0001" in page and "host-gcc-O2" in page
     outside = re.findall(r'(?:src|href)="(?!#)([^"]+)"', page)
     assert not [link for link in outside if not link.startswith("data:")], outside
+
+
+def test_targets_that_are_not_installed_are_one_line_under_the_proof(demo: Path, tmp_path: Path) -> None:
+    """Neither rows of the table nor counted as a pass."""
+    folder = Path(shutil.copytree(demo / "result", tmp_path / "result"))
+    record = json.loads((folder / "verify.json").read_text())
+    absent = [
+        {"name": name, "numeric": numeric, "status": "missing", "package": "no-compiler no-emulator"}
+        for name in ("pdp-11", "vax")
+        for numeric in ("f32", "q31")
+    ]
+    record["targets"] += absent
+    (folder / "verify.json").write_text(json.dumps(record))
+    page = write_report(folder).read_text("utf-8")
+    line = next(line for line in page.splitlines() if "pdp-11" in line)
+    assert "pdp-11, vax" in line and "apt-get install no-compiler no-emulator" in line
+    assert page.count("pdp-11") == 1 and "pdp-11" not in (demo / "result" / "report.html").read_text("utf-8")
 
 
 def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:

@@ -170,9 +170,14 @@ def test_exit_status_of_the_command(copy: Path, gyrotc: Command) -> None:
 def test_named_target_without_its_compiler_exits_1_and_names_the_package(copy: Path) -> None:
     """The command with a PATH on which there is nothing."""
     command = [str(Path(sys.executable).with_name("gyrotc")), "verify", str(copy), "--target", "s390x"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env={"PATH": str(copy)})
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env={"PATH": str(copy), "COLUMNS": "200"}
+    )
     assert done.returncode == 1
-    assert "gcc-s390x-linux-gnu" in done.stdout
+    named = [line for line in done.stdout.splitlines() if "s390x" in line]
+    assert named == [
+        "not installed: s390x: apt-get install gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user"
+    ], "one line, no rows of the table"
 
 
 # ---- the board test's own output ----

@@ -46,6 +46,7 @@ from .results import (
     ladder_lines,
     limit_lines,
     lot_lines,
+    not_installed_lines,
     span_lines,
     summary,
     verify_table,
@@ -139,6 +140,7 @@ def _print_built(result: Built) -> None:
     show(evaluation_table(result.evaluation))
     show(verify_table(result.verification))
     for line in (
+        *not_installed_lines(result.verification),
         *span_lines(result.training),
         *ladder_lines(result.training),
         *channel_lines(result.training),

@@ -115,6 +115,8 @@ def verify_table(result: Verification) -> RichTable:
     for name in ("vectors", "rows", "differ", "map call", "code", "stack"):
         table.add_column(name, justify="right", no_wrap=True)
     for entry in result.targets:
+        if entry.status == "missing":
+            continue  # `not_installed_lines` names it
         replayed, counted = entry.replayed, entry.map_cost
         differ = (
             None if entry.mismatches is None else entry.mismatches + (replayed.mismatches if replayed else 0)
@@ -132,12 +134,18 @@ def _known(number: int | None) -> str:
     return "-" if number is None else str(number)
 
 
+def not_installed_lines(result: Verification) -> Iterator[str]:
+    """One line with the targets whose tools are not installed, where there are some."""
+    names, packages = result.not_installed
+    if names:
+        yield f"not installed: {', '.join(names)}: apt-get install {' '.join(packages)}"
+
+
 def verify_notes(result: Verification) -> Iterator[str]:
-    """What is missing, and what differs, with all bits; one line each."""
+    """What is not installed, and what differs, with all bits; one line each."""
+    yield from not_installed_lines(result)
     for entry in result.targets:
         who = f"{entry.name} {entry.numeric}"
-        if entry.status == "missing":
-            yield f"{who}: missing; it needs the packages {entry.package}"
         replayed = entry.replayed
         found = [entry.error, replayed.error if replayed else None, *entry.first_mismatches]
         yield from (f"{who}: {text}" for text in found if text)

@@ -198,6 +198,13 @@ class Verification(_Counted):
     error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")
     worst_error_dph: WorstError = Field(description="largest departure that was found")
 
+    @property
+    def not_installed(self) -> tuple[list[str], list[str]]:
+        """Targets whose tools are not installed, and the packages that bring them."""
+        missing = [entry for entry in self.targets if entry.status == "missing"]
+        packages = {word for entry in missing for word in (entry.package or "").split()}
+        return list(dict.fromkeys(entry.name for entry in missing)), sorted(packages)
+
 
 class JointVerification(_Counted):
     """The same for a folder with several axes."""

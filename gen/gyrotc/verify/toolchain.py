@@ -76,7 +76,9 @@ class Target(BaseModel):
         tools = [self.compiler, *self.run[:1]]
         if all(shutil.which(tool) for tool in tools) and _links(self):
             return None
-        return self.package
+        if shutil.which("gcc") is None:
+            return self.package
+        return self.package.replace("<version of gcc>", compiler_version("gcc").split()[-1].split(".")[0])
 
     @property
     def all_flags(self) -> tuple[str, ...]:
