@@ -6,11 +6,9 @@ import errno
 import io
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -181,17 +179,23 @@ def test_a_closed_pipe_is_told_as_shells_expect(made: Path) -> None:
 def test_a_signal_cleans_up_and_ends_as_shells_expect(
     number: signal.Signals, made: Path, tmp_path: Path
 ) -> None:
+    """While it waits for a compiler, which says that it was started and then never ends."""
+    tools, started, place = tmp_path / "tools", tmp_path / "started", tmp_path / "place"
+    for folder in (tools, place):
+        folder.mkdir()
+    os.mkfifo(started)
+    (tools / "gcc").write_text(f"#!/bin/sh\necho >'{started}'\nexec sleep 600\n")
+    (tools / "gcc").chmod(0o755)
     program = Path(sys.executable).with_name("gyrotc")
     # A job in the background of a shell inherits that SIGINT is ignored; env undoes it, and becomes the program.
-    command = ["env", "--default-signal", program, "build", made / "A", "--out", tmp_path / "out"]
-    for _ in range(20):
-        job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        while job.poll() is None and not list(tmp_path.glob(".out.gyrotc-part-*")):
-            time.sleep(0.005)
-        job.send_signal(number)
-        _, told = job.communicate()
-        if job.returncode != 0:
-            break
-        shutil.rmtree(tmp_path / "out")  # it had ended before the signal came, which says nothing
+    job = subprocess.Popen(
+        ["env", "--default-signal", program, "build", made / "A", "--out", place / "out"],
+        env=os.environ | {"PATH": f"{tools}:{os.environ['PATH']}"},
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    started.read_text()
+    writing = list(place.glob(".out.gyrotc-part-*"))
+    job.send_signal(number)
+    _, told = job.communicate()
     assert (job.returncode, told) == (-number, f"gyrotc: interrupted ({number.name})\n")
-    assert list(tmp_path.iterdir()) == []
+    assert writing and list(place.iterdir()) == []

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +43,10 @@ from .toolchain import Target, all_targets
 __all__ = ["chosen_targets", "file_entries", "verify"]
 
 Progress = Callable[[str], None]
+
+_NEXT_PROGRAM_S = (
+    0.05  # between two looks at threads that are ended: nobody sees the delay, and it costs no work
+)
 
 
 def verify(  # long: the order of the checks, then one line for each field of the result
@@ -171,11 +175,14 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[V
         return board_entries(job, target)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        tests = [pool.submit(one, target) for target in targets]
         try:
-            return [entry for entries in pool.map(one, targets) for entry in entries]
+            return [entry for test in tests for entry in test.result()]
         except BaseException:  # one failed, or the user stops: the others end now, not with their queue
             pool.shutdown(wait=False, cancel_futures=True)
-            end_all()
+            while not all(test.done() for test in tests):  # a thread may go on with a next program
+                end_all()
+                wait(tests, timeout=_NEXT_PROGRAM_S)
             raise
 
 

@@ -47,6 +47,7 @@ C_FLAGS = (
 _HERE = Path(__file__).resolve().parent
 _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
+_VERSION_OF_GCC = "<version of gcc>"  # in `package`: stands for the number of the installed release
 _SHOWN_LINES = 12  # of what a compiler says: the first error stands there
 _SYMBOL = re.compile(r"(?P<address>[0-9A-Fa-f]+) (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
@@ -76,9 +77,9 @@ class Target(BaseModel):
         tools = [self.compiler, *self.run[:1]]
         if all(shutil.which(tool) for tool in tools) and _links(self):
             return None
-        if shutil.which("gcc") is None:
-            return self.package
-        return self.package.replace("<version of gcc>", compiler_version("gcc").split()[-1].split(".")[0])
+        if _VERSION_OF_GCC in self.package and shutil.which("gcc"):
+            return self.package.replace(_VERSION_OF_GCC, compiler_version("gcc").split()[-1].split(".")[0])
+        return self.package
 
     @property
     def all_flags(self) -> tuple[str, ...]:
