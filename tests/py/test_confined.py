@@ -20,7 +20,7 @@ def _python(code: str, folder: Path) -> tuple[int, str]:
 def _ended(pid: int) -> None:
     """The process is gone, or waits for its parent to take note of its end."""
     stat = Path(f"/proc/{pid}/stat")
-    for _ in range(500):
+    for _ in range(6000):
         try:
             if stat.read_text().rpartition(")")[2].split()[0] == "Z":
                 return
