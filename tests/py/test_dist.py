@@ -35,8 +35,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def unpacked(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("unpacked")
-    with tarfile.open(archive) as opened:
-        opened.extractall(folder, filter="data")
+    archives.unpack(archive, folder)
     return folder / TOP
 
 
