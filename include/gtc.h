@@ -264,24 +264,25 @@ typedef struct {
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS (37 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
-/* What the functions below take on a Cortex-M4F (arm-none-eabi-gcc, -O2), about, bytes: code with all that it
- * calls, which is linked once; stack at the deepest call, whatever terms a table has. Other targets:
- * docs/results.md of gyrotc.
+/* What the functions below take on a Cortex-M4F with arm-none-eabi-gcc 12.2 or 14.2 and -O2, the larger of the two
+ * rounded up, bytes: code with all that it calls, which is linked once; stack at the deepest call, whatever terms
+ * a table has. Another release or option makes other code: `gyrotc verify` measures it with the compiler that is
+ * installed, and the report shows it. Other targets: docs/results.md of gyrotc.
  *               f32 code  stack   q31 code  stack
- *   check           4450    410       3550    430
- *   open            2720    440       2490    460
- *   map              910     20        790    120
- *   init            2560    260       2360    290
- *   sample          5480    210       5840    370
- *   sample_at       5810    220       6170    380
- *   missed          4700    200       5240    360
- *   bias              80      0         70     10
- *   snapshot        1180     40       1900    140
- *   rezero          1430     40       2290    140
- *   unzero           120      0        110     10
- *   angle            340      0        180     20
- *   save             560     30        550     30
- *   restore         4310    770       3970    830 */
+ *   check           4460    450       3570    470
+ *   open            2760    500       2540    520
+ *   map              920     20        790    120
+ *   init            2600    310       2420    320
+ *   sample          5480    210       5840    380
+ *   sample_at       5810    230       6170    400
+ *   missed          4700    210       5250    370
+ *   bias              80      0         80     10
+ *   snapshot        1180     50       1900    140
+ *   rezero          1440     50       2290    140
+ *   unzero           120     10        120     10
+ *   angle            340      0        180     30
+ *   save             600     40        600     40
+ *   restore         4390    820       4140    880 */
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every

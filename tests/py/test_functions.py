@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
-from emitted import emitted
+from emitted import emitted, measured
 from gyrotc.errors import CheckFailed
 from gyrotc.verify.functions import PUBLIC, function_costs, parse_graph
 from gyrotc.verify.toolchain import all_targets
@@ -71,20 +71,18 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
     for numeric in ("f32", "q31"):
         found = costs[numeric]
         assert list(found) == list(PUBLIC)
-        assert found["sample"].stack_bytes > found["map"].stack_bytes > 0
-        assert found["sample_at"].code_bytes > found["sample"].code_bytes > found["map"].code_bytes
-        assert found["restore"].stack_bytes <= 1000, "one state on the stack, not two"
-        assert found["save"].stack_bytes <= 100
         assert all(cost.code_bytes > 0 for cost in found.values())
         assert all("gtc_" not in helper for cost in found.values() for helper in cost.helpers)
-        for name, (code, stack) in _said_by_the_header(numeric).items():
-            # the header tells what GCC 12 made; GCC 14 makes up to 14 bytes less
-            assert found[name].code_bytes == pytest.approx(code, rel=0.1, abs=16), name
-            assert found[name].stack_bytes == pytest.approx(stack, rel=0.1, abs=16), name
+        for name, stated in _stated_by_the_header(numeric).items():
+            for most, size in zip(stated, (found[name].code_bytes, found[name].stack_bytes), strict=True):
+                print(f"gtc_{numeric}_{name}: {size} bytes, at most {most} stated")
+                # Who sizes a stack by the header must have enough. GCC 12.2 and 14.2 differ by up to 15 %; the
+                # header states the larger figure, rounded up to tens.
+                assert not measured(target) or size <= most <= 1.2 * size + 30, name
 
 
-def _said_by_the_header(numeric: str) -> dict[str, tuple[int, int]]:
-    """Bytes of code and stack in the comment of gtc.h; compilers of other versions differ by some of them."""
+def _stated_by_the_header(numeric: str) -> dict[str, tuple[int, int]]:
+    """Bytes of code and stack in the comment of gtc.h."""
     header = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
     rows = re.findall(r"^ \*   (\w+) +(\d+) +(\d+) +(\d+) +(\d+)(?: \*/)?$", header, re.MULTILINE)
     assert [row[0] for row in rows] == list(PUBLIC)
