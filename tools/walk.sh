@@ -23,7 +23,7 @@ step() {
   awk -v text="$text" -v r="$real" -v u="$user" -v s="$sys" 'BEGIN {printf "| %s | %.0f | %.0f |\n", text, r, u + s}'
 }
 
-tutorial() { .venv/bin/python tools/documents.py --times docs/tutorial.md >build/walk-tutorial.txt; }
+tutorial() { .venv/bin/python tools/documents.py --times docs/tutorial.md | tee build/walk-tutorial.txt; }
 
 system=$(. /etc/os-release && echo "$PRETTY_NAME")
 echo "## $system, $(uname -m), $(nproc) processors: $(date -u +%F), commit $(git rev-parse --short HEAD), load $(cut -d' ' -f1 /proc/loadavg) at the start"
