@@ -17,6 +17,7 @@ sys.path.insert(0, str(TOOL))
 import analysers  # noqa: E402
 import lengths  # noqa: E402
 import objects  # noqa: E402
+import oldest  # noqa: E402
 import origins  # noqa: E402
 import source  # noqa: E402
 
@@ -251,3 +252,29 @@ def test_a_number_without_its_origin_is_named(name: str, text: str, untold: int,
     (tmp_path / place / name).write_text(text)
     found = [line for line in origins.unexplained_numbers(tmp_path) if "no constant" not in line]
     assert len(found) == untold, found
+
+
+def test_what_the_oldest_python_lacks_is_found(tmp_path: Path) -> None:
+    """A module, a function, a method, an argument; not what stands behind a look at the release."""
+    (tmp_path / "gen").mkdir()
+    shutil.copy(ROOT / "gen/pyproject.toml", tmp_path / "gen")
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "young.py").write_text(
+        "import contextlib\n"
+        "import sys\n"
+        "import tarfile\n"
+        "from datetime import UTC\n"
+        "from pathlib import Path\n\n"
+        "if sys.version_info >= (3, 11):\n"
+        "    import tomllib\n\n\n"
+        "def young(archive: Path):\n"
+        "    with contextlib.chdir(archive.parent):\n"
+        "        list(archive.walk())\n"
+        "    with tarfile.open(archive) as opened:\n"
+        '        opened.extractall(archive.parent, filter="data")\n'
+        "    error = ValueError(sys.version, UTC)\n"
+        '    error.add_note("x")\n'
+        "    unknown: int = 'a type that is wrong in every release'\n"
+    )
+    found = sorted(int(text.split(":")[1]) for text in oldest.younger_than_supported(tmp_path))
+    assert found == [4, 12, 13, 15, 17]

@@ -1,6 +1,6 @@
 """What the C runtime and the generator promise, checked on text, objects and by analysers: `python tools/promises`.
 
-Prints what is broken, one line each; exit status 1 if there is anything. Standard library only.
+Prints what is broken, one line each; exit status 1 if there is anything. Standard library only, but for mypy.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 import analysers
 import lengths
 import objects
+import oldest
 import origins
 import source
 
@@ -21,6 +22,7 @@ CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "functions": source.long_functions,
     "lengths": lengths.long_python,
     "origins": origins.unexplained_numbers,
+    "oldest": oldest.younger_than_supported,
     "warnings": objects.warnings,
     "cplusplus": objects.cplusplus,
     "symbols": objects.symbols,
