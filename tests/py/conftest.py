@@ -150,15 +150,18 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
 
 
 def _demo(folder: Path) -> None:
+    printed = ""
     for arguments in (
         ("simulate", "paper", "--seed", "1", "--out", folder / "data"),
         ("build", folder / "data", "--out", folder / "result"),
     ):
         done = run_gyrotc(*arguments)
         assert done.returncode == 0, done.stderr
+        printed += done.stdout
+    (folder / "printed.txt").write_text(printed)
 
 
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with `data` (the simulated paper scenario) and `result` (what build made of it)."""
+    """A folder with `data` (the simulated paper scenario), `result` (what build made of it), `printed.txt` (both)."""
     return made_once(tmp_path_factory, "demo", _demo)

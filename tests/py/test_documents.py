@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from gyrotc.verify.toolchain import all_targets, compiler_version
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools" / "promises")]
@@ -45,6 +46,32 @@ def test_what_a_page_shows_is_what_happens(page: Path) -> None:
     assert [text for text in told if not text.startswith("skipped")] == []
     if told:
         pytest.skip("; ".join(told))
+
+
+def test_the_readme_shows_what_make_demo_prints(demo: Path) -> None:
+    """Figures of the emulated core are those of GCC 12.2 (Debian 12); with another release they are left out."""
+    target = all_targets()["cortex-m4f"]
+    if target.missing():
+        pytest.skip(f"{target.missing()} is not installed")
+    printed = (demo / "printed.txt").read_text("utf-8")
+    for own, shown in (("data", "build/demo-data"), ("result", "build/demo")):
+        printed = printed.replace(str(demo / own), shown)
+    block = re.search(r"^\$ make demo\n(.*?)^\$ ", (ROOT / "README.md").read_text("utf-8"), re.M | re.S)
+    assert block is not None
+    shown = block[1]
+    if "not installed" not in printed:
+        shown = re.sub("^not installed.*\n", "", shown, flags=re.M)
+    if not compiler_version(target.compiler).endswith(" 12.2.1"):
+        printed, shown = (
+            re.sub(r"^( cortex-m4f( +\w+){3} +- +0) .*", r"\1", t, flags=re.M) for t in (printed, shown)
+        )
+    assert documents.agrees(_words(printed), _words(shown).splitlines()), printed
+
+
+def _words(text: str) -> str:
+    """Lines with a word in them, as words with one blank between: widths of columns go with what is installed."""
+    lines = (" ".join(line.split()) for line in text.splitlines())
+    return "".join(f"{line}\n" for line in lines if re.search(r"\w|\.\.\.", line))
 
 
 def test_commands_output_and_status_of_a_page() -> None:
