@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -328,8 +329,9 @@ def test_json_replaces_only_what_gyrotc_wrote(tmp_path: Path) -> None:
             write_result(tmp_path / other, "{}")
     assert (tmp_path / "run-01.csv").read_text() == "time_s\n"
     write_result(Path("/dev/null"), "{}")
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError) as full:
         write_result(Path("/dev/full"), "{}")
+    assert full.value.errno == errno.ENOSPC
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["x.json"]
 
 
@@ -351,5 +353,5 @@ def test_json_text_is_that_of_the_standard_library(seed: int) -> None:
     for content in (drawn(5) for _ in range(300)):
         assert json_text(content) == json.dumps(content, indent=1) + "\n"
     for wrong in (float("nan"), [1.0, float("inf")], {"a": [[float("-inf")]]}):
-        with pytest.raises(ValueError, match="not JSON compliant"):
+        with pytest.raises(ValueError):
             json_text(wrong)
