@@ -44,9 +44,8 @@ __all__ = ["chosen_targets", "file_entries", "verify"]
 
 Progress = Callable[[str], None]
 
-_NEXT_PROGRAM_S = (
-    0.05  # between two looks at threads that are ended: nobody sees the delay, and it costs no work
-)
+# Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
+_NEXT_PROGRAM_S = 0.05
 
 
 def verify(  # long: the order of the checks, then one line for each field of the result
