@@ -34,7 +34,7 @@ def sign(
         check_emitted(folder, "not signed", say)
     for part in [*parts, *([folder] if axes else [])]:
         with result_folder(part, "sign", entries=("c",)) as stage:
-            shutil.copytree(part / "c", stage.folder / "c")
+            shutil.copytree(part / "c", stage.folder / "c", ignore=shutil.ignore_patterns(SIGNATURE))
             sign_record(stage.folder / "c", private)
         tell(f"{part / 'c' / SIGNATURE}: signed")
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import CheckFailed, InputError
 from ..model import Model
-from ..outputs import result_folder
+from ..outputs import result_folder, write_own
 from ..quantise import NUMERICS, Table, quantise
 from ..quantise.authority import MARGIN
 from ..quantise.channel_error import channel_error_dph
@@ -122,7 +122,7 @@ def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
         stage.of(model.serial, model.axis)
         (stage.folder / "c").mkdir()
         for name, data in texts.items():
-            (stage.folder / "c" / name).write_bytes(data)
+            write_own(stage.folder / "c" / name, data)
 
 
 def emit_texts(

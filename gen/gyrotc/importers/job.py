@@ -13,7 +13,7 @@ from ..dataset.plausible import Suspicion, suspicions
 from ..dataset.schema import FILE
 from ..dataset.values import MIN_ROWS
 from ..errors import InputError
-from ..outputs import result_folder
+from ..outputs import result_folder, write_own
 from ..results.imported import ImportedFile, ImportedFiles, OriginalFile
 from .described import description_of, kept_map, run_name, serial_of, sha256_of, size_of
 from .formats import open_logger_file
@@ -135,8 +135,8 @@ def _imported(
                 target = folder / f"{run_name(path, names)}.{options.format}"
                 entries.append(_run(file, rows, target, chosen, options, tell, progress))
         chosen = chosen.model_copy(update={"serial": serial})
-        (folder / MAP_FILE).write_text(map_text(chosen), "utf-8")
-        (folder / FILE).write_text(description_of(serial, chosen, entries), "utf-8")
+        write_own(folder / MAP_FILE, map_text(chosen))
+        write_own(folder / FILE, description_of(serial, chosen, entries))
     for line in summary(out, entries):
         tell(line)
     return Imported(serial, chosen, tuple(entries))

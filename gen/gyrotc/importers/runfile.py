@@ -12,6 +12,8 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
+from ..outputs import create
+
 __all__ = ["Format", "RunFile"]
 
 Format = Literal["csv", "parquet"]
@@ -30,7 +32,7 @@ class RunFile:
     def __init__(self, path: Path, format: Format, names: Sequence[str]) -> None:
         types = [(name, pa.int64() if name == "pulses" else pa.float64()) for name in names]
         self._schema = pa.schema(types)
-        self._sink = path.open("wb")
+        self._sink = create(path)
         self._writer: Any
         if format == "csv":
             self._sink.write((",".join(names) + "\n").encode())

@@ -11,7 +11,7 @@ from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..emit.record import RECORD, joint_record_text
 from ..errors import CheckFailed, InputError
 from ..model import Model, load_model
-from ..outputs import scratch_folder, write_atomically
+from ..outputs import scratch_folder, write_atomically, write_own
 from ..pages.report import axes_page
 from ..reference.runtime import runtime_folders
 from ..results.verification import JointVerification, Verification
@@ -40,7 +40,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     c = folder / "c"
     c.mkdir()
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
-        (c / name).write_bytes(data)
+        write_own(c / name, data)
     _run_together(c, [m.id for m in models.values()])
     write_atomically(folder / "report.html", axes_page(folder, axes))
 

@@ -22,6 +22,7 @@ from ..emit import emitted_tables
 from ..errors import CheckFailed, GyrotcError
 from ..metrics import Averages, average, pooled, statistics, time_statistics
 from ..model import Model, load_model
+from ..outputs import create
 from ..quantise import Table
 from ..results.base import read_result
 from ..results.evaluation import (
@@ -251,7 +252,7 @@ def _write_trace(path: Path, rows: Rows, replayed: ReplayedRun, span: slice | ND
     rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]
     options = pacsv.WriteOptions(include_header=False, quoting_style="none")
     part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
+    with create(part) as stream:
         stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
         for start in range(0, time.size, _TRACE_ROWS):
             k = slice(start, start + _TRACE_ROWS)

@@ -12,6 +12,7 @@ from .interrupts import Interrupted, deferred, die_of, raise_on_signals
 from .jsontext import canonical_json, digest_of, json_text
 from .lock import Lock
 from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
+from .opening import check_own, create, open_or_create, write_own
 from .scratch import scratch_folder
 
 __all__ = [
@@ -23,19 +24,23 @@ __all__ = [
     "Marker",
     "Stage",
     "canonical_json",
+    "check_own",
     "check_replaceable",
     "clean",
+    "create",
     "deferred",
     "die_of",
     "digest_of",
     "faults",
     "json_text",
     "leftovers",
+    "open_or_create",
     "raise_on_signals",
     "read_marker",
     "result_folder",
     "scratch_folder",
     "sha256",
     "write_atomically",
+    "write_own",
     "write_result",
 ]

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from .opening import write_own
+
 __all__ = ["can_exchange", "exchange"]
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
@@ -50,7 +52,7 @@ def can_exchange(folder: Path) -> bool:
     names = [folder / ".gyrotc-try-1", folder / ".gyrotc-try-2"]  # see marker.OWN
     try:
         for name in names:
-            name.touch()
+            write_own(name, b"")
         return exchange(*names)
     finally:
         for name in names:

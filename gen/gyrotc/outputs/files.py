@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import InputError
 from .interrupts import deferred
 from .lock import Lock
+from .opening import create, open_stream, write_own
 
 __all__ = ["check_replaceable", "sync_folder", "unfinished", "write_atomically"]
 
@@ -33,21 +34,22 @@ unfinished: list[Path] = []
 def write_atomically(path: Path, data: str | bytes) -> None:
     """Writes a file under a temporary name beside it and renames it into place, on disk when this returns.
 
-    A device or a pipe is written as it is.
+    A device or a pipe is written as it is; a link is replaced, and where it led stays as it was.
 
     Raises:
+        InputError: A file that gyrotc did not write has a name that it needs meanwhile; nobody reads the pipe.
         OSError: It cannot be written; then what was there still is.
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
-        if _is_device(path):
-            with path.open("wb", buffering=0) as stream:
+        if _is_stream(path):
+            with open_stream(path) as stream:
                 stream.write(content)
             return
-        path = path.resolve()
+        path = path.parent.resolve() / path.name
         path.parent.mkdir(parents=True, exist_ok=True)
         if any(folder in path.parents for folder in unfinished):
-            path.write_bytes(content)
+            write_own(path, content)
         else:
             _replace(path, content)
     except OSError as error:
@@ -60,33 +62,40 @@ def _replace(path: Path, content: bytes) -> None:
         lock = Lock(path, "output", wait=True)
         part = path.with_name(f".{path.name}.gyrotc-part")
         try:
-            part.unlink(missing_ok=True)  # of a job that was killed
-            with part.open("xb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-            part.replace(path)
-            sync_folder(path.parent)
-        finally:
-            try:
+            if lock.inherited:
                 part.unlink(missing_ok=True)
+            try:
+                stream = create(part)
+            except FileExistsError:
+                found = "is in the way, and gyrotc did not write it"
+                raise InputError(str(part), found, "nothing of that name; move it away") from None
+            try:
+                with stream:
+                    stream.write(content)
+                    stream.flush()
+                    os.fsync(stream.fileno())
+                part.replace(path)
+                sync_folder(path.parent)
             finally:
-                lock.release()
+                part.unlink(missing_ok=True)
+        finally:
+            lock.release()
 
 
 def check_replaceable(path: Path) -> None:
     """Refuses to replace a file, named by `--json`, `--plots` or `export --out`, that gyrotc did not write.
 
     Raises:
-        InputError: There is such a file, or a folder.
+        InputError: There is such a file, a folder, or a link to a device or a pipe.
     """
-    if _is_device(path):
+    if _is_stream(path):
         return
     try:
+        if not path.is_file() and path.exists():
+            found = "is a folder" if path.is_dir() else "is a link to a device or a pipe"
+            raise InputError(str(path), found, "the name of a file")
         if path.stat().st_size == 0:
             return
-        if not path.is_file():
-            raise InputError(str(path), "is a folder", "the name of a file")
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
             if _PAGE in head or head.startswith(_EXPORTED) or (head.startswith(_UNIT) and _MADE_BY in head):
@@ -103,12 +112,14 @@ def check_replaceable(path: Path) -> None:
         )
 
 
-def _is_device(path: Path) -> bool:
+def _is_stream(path: Path) -> bool:
+    """Whether it is a device or a pipe; behind a link only where that is the system's, such as `/dev/stdout`."""
     try:
         mode = path.stat().st_mode
     except OSError:
         return False
-    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
+    known = not path.is_symlink() or path.parent.resolve().parts[1:2] in (("dev",), ("proc",))
+    return known and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
 
 
 def sync_folder(folder: Path) -> None:

@@ -28,6 +28,7 @@ from .marker import (
     sha256,
     walk,
 )
+from .opening import write_own
 from .places import check_apart, check_contents, check_serial, final_place, prefix_of
 from .update import Update, write_marker
 
@@ -174,7 +175,7 @@ class _Job:
         work = self.place.parent / f"{self._prefix}{secrets.token_hex(4)}"
         work.mkdir(mode=0o755)
         try:
-            (work / MARKER).write_text(marker_text(self.parts[""].but(unfinished=True)), encoding="utf-8")
+            write_own(work / MARKER, marker_text(self.parts[""].but(unfinished=True)))
         except BaseException:
             (work / MARKER).unlink(missing_ok=True)
             work.rmdir()

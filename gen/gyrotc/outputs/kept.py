@@ -58,7 +58,7 @@ def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
         if head == _MAGIC + hashlib.sha256(content).digest():
             found = content_of(content)
             if found is not None:
-                path.touch()
+                os.utime(path, follow_symlinks=False)
                 return found
     except (InputError, OSError):
         return None
@@ -71,7 +71,7 @@ def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
 
 def keep(name: str, content: bytes) -> None:
     """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
-    with contextlib.suppress(OSError):  # a cache that cannot be written costs time, nothing else
+    with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
         if _is_own():
             write_atomically(folder() / name, _packed(content))
             _trim()

@@ -11,8 +11,11 @@ from pathlib import Path
 
 from ..errors import InputError
 from .jsontext import json_text
+from .opening import open_or_create
 
 __all__ = ["Lock"]
+
+_MOST_BYTES = 4096  # of a lock: names of a command and a host, a number and a time are far fewer
 
 
 class Lock:
@@ -21,18 +24,22 @@ class Lock:
     A second job is refused, for it would replace what the first has just made; `wait` is for a single file, which
     is written in a moment.
 
+    Attributes:
+        inherited: Its last holder was killed; what that was writing may still be there.
+
     Raises:
-        InputError: Another job holds it.
+        InputError: Another job holds it; what has its name is no lock of gyrotc.
         OSError: The folder that the place lies in cannot be written.
     """
 
     def __init__(self, place: Path, command: str, *, wait: bool = False) -> None:
         self._path = place.parent / f".{place.name}.lock"
         while True:
-            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            self._file, self.inherited = open_or_create(self._path)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
                 if self._still_there():
+                    self._refuse_foreign()
                     break
             except BlockingIOError:
                 holder = _holder(self._file)
@@ -53,9 +60,15 @@ class Lock:
     def _still_there(self) -> bool:
         """Whether the file that is locked is the one of this name: its last holder may have removed it."""
         try:
-            return os.path.samestat(os.fstat(self._file), self._path.stat())
+            return os.path.samestat(os.fstat(self._file), self._path.lstat())
         except FileNotFoundError:
             return False
+
+    def _refuse_foreign(self) -> None:
+        """A file of this name that says something else is left as it is; a power cut leaves nothing, or zeros."""
+        text = os.pread(self._file, _MOST_BYTES + 1, 0)
+        if len(text) > _MOST_BYTES or (text.strip(b"\0") and _parsed(text) is None):
+            raise InputError(str(self._path), "is no lock of gyrotc", "none, or gyrotc's own; move it away")
 
     def release(self) -> None:
         """Removes the file while it is held, then lets go."""
@@ -74,7 +87,18 @@ def _who(command: str) -> str:
 def _holder(file: int) -> str:
     """Who holds a lock, as far as its file says."""
     try:
-        who = json.loads(os.pread(file, 4096, 0))
-        return f"gyrotc {who['command']}, process {who['pid']} on {who['host']}, since {who['since']}"
-    except (OSError, ValueError, KeyError, TypeError):
+        who = _parsed(os.pread(file, _MOST_BYTES, 0))
+    except OSError:
+        who = None
+    if who is None:
         return "a job that has just begun"
+    return f"gyrotc {who['command']}, process {who['pid']} on {who['host']}, since {who['since']}"
+
+
+def _parsed(text: bytes) -> dict[str, object] | None:
+    """What a lock file says; None where it is none."""
+    try:
+        who = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return who if isinstance(who, dict) and list(who) == ["command", "pid", "host", "since"] else None

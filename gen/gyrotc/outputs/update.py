@@ -10,6 +10,7 @@ from pathlib import Path
 from .exchange import can_exchange, exchange
 from .files import sync_folder
 from .marker import MARKER, NEW, OWN, Marker, marker_text, sha256, walk
+from .opening import create
 
 __all__ = ["Update", "write_marker"]
 
@@ -17,8 +18,9 @@ __all__ = ["Update", "write_marker"]
 def write_marker(work: Path, folder: Path, marker: Marker) -> None:
     """Writes a folder's marker, on disk; `work` is a folder of the job's own on the same file system."""
     new = work / NEW
-    with new.open("w", encoding="utf-8") as stream:
-        stream.write(marker_text(marker))
+    new.unlink(missing_ok=True)
+    with create(new) as stream:
+        stream.write(marker_text(marker).encode("utf-8"))
         stream.flush()
         os.fsync(stream.fileno())
     new.replace(folder / MARKER)

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ..outputs import scratch_folder
+from ..outputs import scratch_folder, write_own
 
 __all__ = ["print_to_pdf"]
 
@@ -29,7 +29,7 @@ def print_to_pdf(page: Path, pdf: Path) -> bool:
         ]  # fmt: skip
         try:
             subprocess.run(command, check=True, timeout=_LONGEST_S, capture_output=True)
-            shutil.copyfile(work / "page.pdf", pdf)
+            write_own(pdf, (work / "page.pdf").read_bytes())
         except (OSError, subprocess.SubprocessError):
             return False
     return True

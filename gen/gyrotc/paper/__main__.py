@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from ..outputs import write_atomically
 from ..simulate import read
 from ..simulate.campaign import Noise, campaign, with_noise
 from .experiment import Experiment, experiment
@@ -40,7 +41,7 @@ def _write_paper(page: Path) -> None:
         "scatter": scatter_table(paper[0]),
         "times": times_table(_measured(page.parent / "results" / "bench.json")),
     }
-    page.write_text(filled(page.read_text("utf-8"), parts), "utf-8")
+    write_atomically(page, filled(page.read_text("utf-8"), parts))
     draw(paper[0], page.with_suffix(""))
 
 

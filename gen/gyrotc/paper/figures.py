@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..outputs import write_atomically
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
 from ..pages.published import ENVIRONMENTS
 from ..simulate.instrument import SimulatedRecord
@@ -61,7 +62,7 @@ def draw(result: Experiment, folder: Path, numbers: Iterable[int] = tuple(FIGURE
     written = []
     for number in numbers:
         path = folder / f"figure-{number:02d}.svg"
-        path.write_text(_figure(result, number), "utf-8")
+        write_atomically(path, _figure(result, number))
         written.append(path)
     return written
 
@@ -119,4 +120,4 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         for ax in (above, below):
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        path.write_text(svg(figure), "utf-8")
+        write_atomically(path, svg(figure))

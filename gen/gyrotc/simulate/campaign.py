@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..dataset.text import dataset_toml
 from ..errors import InputError
-from ..outputs import json_text, result_folder
+from ..outputs import create, json_text, result_folder, write_own
 from ..results.truth import SimulatedTruth, TrueLot, TrueRun
 from .biasmap import BiasMap, draw
 from .instrument import SimulatedRecord, record
@@ -233,7 +234,7 @@ def _truth_of_run(
         edges = weight * np.floor(edges / weight)
     noise = (np.diff(edges) - np.diff(made.true_arcsec[:: length.cells])) / step_s
     path = f"truth/{Path(file).stem}.noise.npy"
-    np.save(folder / path, noise.astype(np.float32))
+    _save(folder / path, noise)
     bias = float(made.bias_dph.min()), float(made.bias_dph.max())
     true = TrueRun(file=file, noise=path, noise_step_s=step_s, bias_dph=bias)
     if not made.states:
@@ -246,8 +247,13 @@ def _written_states(folder: Path, file: str, made: SimulatedRecord, cells: int) 
     paths = {name: f"truth/{Path(file).stem}.{name}.npy" for name in made.states}
     for name, values in made.states.items():
         whole = values[: len(values) - len(values) % cells]
-        np.save(folder / paths[name], whole.reshape(-1, cells).mean(axis=1).astype(np.float32))
+        _save(folder / paths[name], whole.reshape(-1, cells).mean(axis=1))
     return paths
+
+
+def _save(path: Path, values: NDArray[np.float64]) -> None:
+    with create(path) as stream:
+        np.save(stream, values.astype(np.float32))
 
 
 def _write_texts(
@@ -271,7 +277,7 @@ def _write_texts(
         "meta": {"simulated": True},
         "noise": {key: levels[key] for key in _DECLARED if levels[key]},
     }
-    (folder / "dataset.toml").write_text(dataset_toml(head, tables, runs), "utf-8")
+    write_own(folder / "dataset.toml", dataset_toml(head, tables, runs))
     truth = SimulatedTruth(
         scenario=gyro.scenario,
         seed=gyro.seed,
@@ -286,7 +292,7 @@ def _write_texts(
         runs=tuple(truths),
     )
     truth = truth.model_copy(update={"lot": gyro.lot}) if gyro.lot else truth
-    (folder / TRUTH_FILE).write_text(json_text(truth.content()), "ascii")
+    write_own(folder / TRUTH_FILE, json_text(truth.content()))
 
 
 def _serial(plan: Scenario, seed: int) -> str:

@@ -12,6 +12,7 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
+from ..outputs import create
 from .recording import RecordingPart
 
 __all__ = ["Format", "SimulatedRunFile"]
@@ -49,13 +50,12 @@ class SimulatedRunFile:
         floats = [(name, pa.float64()) for name in channels]
         self._schema = pa.schema([("time_s", pa.float64()), ("temperature_c", pa.float64()), value, *floats])
         self._writer: _Writer
+        self._sink = create(path)
         if format == "csv":
-            path.write_text(",".join(self._schema.names) + "\n", "utf-8")
-            self._sink = path.open("ab")
+            self._sink.write((",".join(self._schema.names) + "\n").encode("utf-8"))
             plain = pyarrow.csv.WriteOptions(include_header=False, quoting_style="none")
             self._writer = pyarrow.csv.CSVWriter(self._sink, self._schema, write_options=plain)
         else:
-            self._sink = path.open("wb")
             self._writer = pyarrow.parquet.ParquetWriter(self._sink, self._schema, use_dictionary=False)
 
     def write(self, chunk: RecordingPart) -> None:

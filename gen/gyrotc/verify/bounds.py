@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..outputs import write_own
 from ..reference.table import Table
 from .flow import parse_flows
 from .functions import PUBLIC
@@ -89,7 +90,7 @@ def _linked(target: Target, c_folder: Path, numerics: list[str], symbol: str, ru
         f"(void *)gtc_{n}_{f}" for n in numerics for f in PUBLIC
     ]
     rows = "\n".join(f"    {name}," for name in names)
-    source.write_text(_ALL.format(symbol=symbol, rows=rows), encoding="ascii")
+    write_own(source, _ALL.format(symbol=symbol, rows=rows))
     lax = target.model_copy(update={"flags": (*target.flags, "-Wno-pedantic")})  # functions as addresses
     objects = compile_objects(lax, [c_folder / f"gtc_{symbol}.c", source], work, include=c_folder)
     placed = target.model_copy(update={"link": (*target.link, f"-Wl,--section-start=.text={_TEXT:#x}")})

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..emit import example_period_us
 from ..model import Model
-from ..outputs import scratch_folder
+from ..outputs import scratch_folder, write_own
 from ..reference.table import Table
 from ..texts import c_environment
 from .source import checked_sources, table_files
@@ -53,7 +53,7 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
     )
     with scratch_folder() as work:
         source = work / "footprint.c"
-        source.write_text(text, encoding="ascii")
+        write_own(source, text)
         c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
         return _measured(target, c, [c / "gtc.c", c / f"gtc_{model.id}.c"], source)
 

@@ -18,7 +18,7 @@ from ..dataset import Rows, Run
 from ..errors import CheckFailed, InputError
 from ..frontend import blocks_since_power_on, missed_before, period_us, samples_per_block
 from ..model import Model
-from ..outputs import scratch_folder
+from ..outputs import scratch_folder, write_own
 from ..quantise.applied import channels_of
 from ..reference import Replay, replay
 from ..reference.table import Table, Words
@@ -97,7 +97,7 @@ def replay_program(
     )
     with scratch_folder() as work:
         source = work / "replay.c"
-        source.write_text(text, encoding="ascii")
+        write_own(source, text)
         program = work / "replay"
         c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
         sources = [source, c / "gtc.c", c / f"gtc_{model.id}.c"]

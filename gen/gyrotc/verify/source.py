@@ -15,6 +15,7 @@ from ..emit import board_test_text
 from ..emit.amalgamate import ARITHMETICS, amalgamate
 from ..errors import CheckFailed
 from ..model import SERIAL, Model
+from ..outputs import write_own
 from ..reference.runtime import runtime_folders
 from ..texts import C_COMMENT, C_INITIALISER
 
@@ -115,7 +116,7 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
                 f"{path} {fault}: it is not compiled, as its code would run on this machine; "
                 "emit it again, or say --trust-code if it is your own"
             )
-        (work / name).write_bytes(data)
+        write_own(work / name, data)
     return work
 
 

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import CheckFailed, InputError
 from ..inputs import read_toml
-from ..outputs import scratch_folder
+from ..outputs import scratch_folder, write_own
 from .confined import ProgramRun, run_to_end
 
 __all__ = [
@@ -166,7 +166,7 @@ def run_program(target: Target, program: Path, data: bytes = b"") -> ProgramRun:
     """
     with tempfile.TemporaryFile() as stdin:
         if target.bare:
-            (program.parent / _STDIN).write_bytes(data)
+            write_own(program.parent / _STDIN, data)
         else:
             stdin.write(data)
             stdin.seek(0)
@@ -235,7 +235,7 @@ def _links(target: Target) -> bool:
     """Whether an empty program can be built: a compiler may lack the C library of the target."""
     with scratch_folder() as work:
         source = work / "empty.c"
-        source.write_text("int main(void)\n{\n    return 0;\n}\n", encoding="ascii")
+        write_own(source, "int main(void)\n{\n    return 0;\n}\n")
         try:
             compile_c(target, [source], work / "empty", include=work)
         except CheckFailed:

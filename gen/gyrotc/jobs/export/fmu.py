@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from ...emit import example_period_us
 from ...errors import CheckFailed
 from ...model import Model, table_id
-from ...outputs import scratch_folder
+from ...outputs import scratch_folder, write_own
 from ...quantise.guards import guard_of
 from ...quantise.sigma import sigma_cells
 from ...quantise.terms import channel_names
@@ -200,7 +200,7 @@ def _binary(sources: Mapping[str, bytes]) -> tuple[bytes, str]:
     shared = target.model_copy(update={"flags": (*target.flags, *_FLAGS), "link": (*target.link, *_LINK)})
     with scratch_folder() as work:
         for name, data in sources.items():
-            (work / name).write_bytes(data)
+            write_own(work / name, data)
         compile_c(
             shared, [work / name for name in sources if name.endswith(".c")], work / "fmu.so", include=work
         )

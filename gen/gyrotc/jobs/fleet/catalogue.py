@@ -6,6 +6,7 @@ tables for other programs.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -15,7 +16,7 @@ from pathlib import Path
 from ... import __version__
 from ...errors import GyrotcError, InputError
 from ...model import Model, load_model
-from ...outputs import sha256, write_atomically
+from ...outputs import check_own, open_or_create, sha256, write_atomically
 from ...results.base import read_optional
 from ...results.budget import Budget
 from ...results.catalogue import CatalogueAnswer, Catalogued, CataloguedFile
@@ -27,6 +28,8 @@ __all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter"]
 CATALOGUE = "catalogue"
 _FILE = "catalogue.sqlite"
 _APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
+_MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
+_BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
 _TOLD = 100  # calibrations of a whole catalogue: a screen or two
 
 SCHEMA = """
@@ -98,6 +101,7 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+    _check_file(path)
     try:
         with closing(sqlite3.connect(path)) as base:
             if base.execute("PRAGMA user_version").fetchone()[0] == 0:
@@ -112,6 +116,30 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
         raise InputError(
             str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
         ) from error
+
+
+def _check_file(path: Path) -> None:
+    """Refuses what is no catalogue of gyrotc before SQLite, which follows links, opens it; none yet is made empty.
+
+    So that SQLite takes a journal for what it is, that must be one, too: another file of that name would be deleted.
+    """
+    handle, _ = open_or_create(path)
+    try:
+        head = os.pread(handle, _HEAD_BYTES, 0)
+    finally:
+        os.close(handle)
+    wanted = _MAGIC, _APPLICATION.to_bytes(4, "big")
+    if head and (head[: len(_MAGIC)], head[_APPLICATION_AT : _APPLICATION_AT + 4]) != wanted:
+        raise InputError(str(path), "is no catalogue", "a catalogue as gyrotc fleet wrote it")
+    for end, magic in _BESIDE.items():
+        beside = path.with_name(path.name + end)
+        if beside.exists() or beside.is_symlink():
+            check_own(beside)
+            with beside.open("rb") as stream:
+                if stream.read(len(magic)) not in (b"", bytes(len(magic)), magic):
+                    raise InputError(
+                        str(beside), f"is none of SQLite's {end[1:]} files", "none; move it away"
+                    )
 
 
 def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> int:
@@ -147,7 +175,10 @@ def _kept(out: Path, source: Path) -> str:
     """Puts a file among the payloads under its hash, read-only, unless it is there; returns the hash."""
     known = sha256(source)
     place = out / CATALOGUE / "payloads" / known[:2] / known
-    if not place.exists():
+    if place.exists() or place.is_symlink():
+        if not place.is_file() or sha256(place) != known:
+            raise InputError(str(place), "is not what its name says", "a catalogue as gyrotc fleet wrote it")
+    else:
         place.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(place, source.read_bytes())
         place.chmod(0o444)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ...errors import GyrotcError, InputError
 from ...inputs import checked, read_json
-from ...outputs import Lock, deferred, json_text, result_folder, write_atomically
+from ...outputs import Lock, check_own, deferred, json_text, result_folder, write_atomically
 from ...results.fleet import FleetEntry, ShardEntries
 from .aside import clean_units
 from .catalogue import enter
@@ -75,10 +75,11 @@ def run_share(
     """Does the units of one share that are not done yet, and writes no summary; arguments as of `run_fleet`.
 
     Raises:
-        InputError: As `run_fleet`; the same share is at work.
+        InputError: As `run_fleet`; the same share is at work; what it would replace is not of a share.
     """
     place, own = checked_place(fleet, out), mine(fleet, share)
     (place / SHARDS).mkdir(exist_ok=True)
+    _check_replaceable(place / SHARDS / f"{share.name}.json")
     lock = Lock(place / SHARDS / share.name, "fleet")
     try:
         say = told or (lambda _: None)
@@ -101,6 +102,12 @@ def run_share(
                 clean_units(place, [unit.folder for unit in own.units])
             finally:
                 lock.release()
+
+
+def _check_replaceable(path: Path) -> None:
+    if path.exists() or path.is_symlink():
+        check_own(path)
+        checked(ShardEntries, read_json(path, "what a share kept"), str(path))
 
 
 def _without_summary(out: Path) -> None:
