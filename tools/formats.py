@@ -32,6 +32,7 @@ from gyrotc.results.map import MapOnGrid
 from gyrotc.results.marker import Marker
 from gyrotc.results.next_run import NextRun
 from gyrotc.results.planned import Plan
+from gyrotc.results.release import Release
 from gyrotc.results.training import Training
 from gyrotc.results.truth import SimulatedTruth
 from gyrotc.results.verification import JointVerification, Verification
@@ -61,6 +62,7 @@ RESULTS: dict[str, type[Part]] = {
     "map": MapOnGrid,
     "next-run": NextRun,
     "plan": Plan,
+    "release": Release,
     "result": Marker,
     "training": Training,
     "truth": SimulatedTruth,
@@ -71,6 +73,7 @@ RESULTS: dict[str, type[Part]] = {
 
 TOLD_ABOVE: dict[str, tuple[type[Part], ...]] = {
     "next-run": (LotPlan,),
+    "release": (HeldLimits,),
     "entry": (FleetSummary,),
     "verify-axes": (Verification,),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sqlite3
 from pathlib import Path
 
@@ -75,14 +76,39 @@ def test_the_documented_sql_answers_the_same_and_its_tables_are_those_of_the_fil
 
 
 def test_a_withdrawn_table_may_not_be_carried(fleet: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "catalogue.sqlite"
-    copy.write_bytes((fleet / "catalogue" / "catalogue.sqlite").read_bytes())
+    copy = shutil.copytree(fleet / "catalogue", tmp_path / "catalogue") / "catalogue.sqlite"
     with sqlite3.connect(copy) as base:
         base.execute("UPDATE calibration SET tag = 'withdrawn' WHERE status = 'done'")
     assert catalogued(copy, "RLG-1", "2026-08-31").found == ()
     with sqlite3.connect(copy) as base:  # the failed one withdrawn, the first one governs again
         base.execute("UPDATE calibration SET tag = CASE status WHEN 'done' THEN '' ELSE 'withdrawn' END")
     assert len(catalogued(copy, "RLG-1", "2026-09-02").found) == 1
+
+
+@pytest.mark.parametrize("change", ["flip", "missing", "another"])
+def test_a_payload_that_is_not_what_its_row_says_is_refused(
+    fleet: Path, tmp_path: Path, change: str, gyrotc: Command
+) -> None:
+    """Before: exit 0 with the hash of an image that was not there, or was another gyro's."""
+    place = shutil.copytree(fleet / "catalogue", tmp_path / "catalogue")
+    [one] = catalogued(fleet, "RLG-1", "2026-08-31").found
+    path = place / "payloads" / one.model_sha256[:2] / one.model_sha256
+    if change == "missing":
+        path.unlink()
+    elif change == "flip":
+        path.chmod(0o644)
+        path.write_bytes(path.read_bytes()[:-2] + b" \n")
+    else:
+        with sqlite3.connect(place / "catalogue.sqlite") as base:
+            base.execute("UPDATE calibration SET serial = 'RLG-9'")
+    done = gyrotc(
+        "catalogue",
+        place / "catalogue.sqlite",
+        "RLG-9" if change == "another" else "RLG-1",
+        "--on",
+        "2026-08-31",
+    )
+    assert done.returncode == 2 and str(path) in done.stderr and len(done.stderr.splitlines()) == 1
 
 
 def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:

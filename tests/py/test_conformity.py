@@ -61,7 +61,7 @@ def test_an_unknown_uncertainty_cannot_pass_without_condition() -> None:
 def test_the_worst_verdict_is_that_of_the_whole() -> None:
     assert worst_of(["PASS", "CONDITIONAL PASS", "PASS"]) == "CONDITIONAL PASS"
     assert worst_of(["CONDITIONAL PASS", "FAIL", "PASS"]) == "FAIL"
-    assert worst_of([]) == "PASS"
+    assert worst_of([]) is None
 
 
 def test_the_coverage_factor_is_2_for_many_and_students_t_for_few() -> None:

@@ -10,7 +10,7 @@ import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, spoil
 from gyrotc.emit.files import emit
-from gyrotc.emit.record import RECORD, SIGNATURE
+from gyrotc.emit.record import RELEASE, SIGNATURE
 from gyrotc.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.verify import verify
@@ -42,7 +42,7 @@ def _signed(folder: Path, key: Path) -> tuple[str, int]:
 def test_gyrotc_signs_and_openssl_agrees(key: Path, tmp_path: Path, gyrotc: Command) -> None:
     folder = emitted(tmp_path / "result")
     assert gyrotc("sign", folder, "--key", key).returncode == 0
-    record, signature = folder / "c" / RECORD, folder / "c" / SIGNATURE
+    record, signature = folder / "c" / RELEASE, folder / "c" / SIGNATURE
     check = ("pkeyutl", "-verify", "-pubin", "-inkey", key.with_suffix(".pub"), "-rawin")
     assert _openssl(*check, "-in", record, "-sigfile", signature).returncode == 0
     assert _signed(folder, key) == ("pass", 0)
@@ -50,11 +50,16 @@ def test_gyrotc_signs_and_openssl_agrees(key: Path, tmp_path: Path, gyrotc: Comm
     assert verify(folder, compiled=False).content()["failed"] == 0
     done = gyrotc("verify", folder, "--signature", key.with_suffix(".pub"), "--target", "host-gcc-O2")
     assert done.returncode == 0 and "signature good" in done.stdout
+    assert "released: no limits were given" in done.stdout
 
 
-def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(key: Path, tmp_path: Path) -> None:
+def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(
+    key: Path, tmp_path: Path, gyrotc: Command
+) -> None:
     folder = emitted(tmp_path / "result")
-    record, signature = folder / "c" / RECORD, folder / "c" / SIGNATURE
+    done = gyrotc("sign", folder)
+    assert done.returncode == 0 and "not signed" in done.stdout
+    record, signature = folder / "c" / RELEASE, folder / "c" / SIGNATURE
     sign = ("pkeyutl", "-sign", "-inkey", key, "-rawin")
     assert _openssl(*sign, "-in", record, "-out", signature).returncode == 0
     assert _signed(folder, key) == ("pass", 0)
@@ -66,7 +71,12 @@ def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(key: Path, tmp_pat
     signature.unlink()
     assert _signed(folder, key) == ("fail", 1)
     # Emitted again with other options the files are gyrotc's own, but not those that were signed.
+    signature.write_bytes(right)
+    assert _signed(folder, key) == ("pass", 0)
+    released = record.read_bytes()
+    signature.unlink()
     emit(load_model(GOLDEN), folder, zero_at=20.0)
+    record.write_bytes(released)
     signature.write_bytes(right)
     assert _signed(folder, key) == ("fail", 1)
 

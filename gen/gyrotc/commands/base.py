@@ -139,6 +139,10 @@ TrustOption = Annotated[
 TrustUnitsOption = Annotated[
     bool, typer.Option("--trust-units", help="Take units that the values contradict; the result records it.")
 ]
+AcceptOption = Annotated[
+    str | None,
+    typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL; says why."),
+]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, cast, get_args
 import typer
 
 from ..errors import InputError
-from .base import DirArg, OutOption, app, progress, tell, written_place
+from .base import AcceptOption, DirArg, OutOption, app, progress, tell, written_place
 
 _MOST_POINTS = 1000  # of an axis: a table of a million is more than any control unit holds
 
@@ -25,6 +25,7 @@ def certificate(
     draft: Annotated[
         bool, typer.Option("--draft", help="Without what is missing: marked as a draft, and no DCC.")
     ] = False,
+    accept_fail: AcceptOption = None,
 ) -> None:
     """Write a certificate: a page of A4, PDF where Chromium is there, and a digital calibration certificate (DCC XML).
     What is missing for one is listed before anything is written.
@@ -35,7 +36,7 @@ def certificate(
 
     with progress() as say:
         say("writing")
-        found = run(folder, out, facts=facts, number=number, draft=draft)
+        found = run(folder, out, facts=facts, number=number, draft=draft, accept_fail=accept_fail)
     for path in found.files:
         tell(str(path))
     if not found.pdf:

@@ -10,33 +10,45 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .base import DirArg, app, progress, tell
+from ..outputs import json_text, result_folder, write_own
+from .base import AcceptOption, DirArg, app, progress, tell
 
 
 @app.command()
 def sign(
     folder: DirArg,
-    key: Annotated[Path, typer.Option("--key", help="Ed25519 private key (PEM).")],
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."
+        ),
+    ] = None,
+    accept_fail: AcceptOption = None,
 ) -> None:
-    """Sign DIR/c (with --axis all: of every axis, too): DIR/c/emission.json.sig. Only what verify passes is signed.
+    """Sign verdict, limits, uncertainty, dates and DIR/c (with --axis all: of every axis, too): DIR/c/release.json and
+    release.json.sig. Only what verify passes is signed, and what says FAIL only with --accept-fail.
 
     Example: gyrotc sign result --key lab.pem
     """
-    from ..emit.record import SIGNATURE
-    from ..jobs.axes import axes_in, check_emitted
-    from ..outputs import result_folder
+    from ..emit.record import RELEASE, SIGNATURE
+    from ..jobs.axes import check_emitted
+    from ..jobs.release import release_of
     from ..verify.signature import load_private_key, sign_record
 
-    private = load_private_key(key, lambda: _passphrase(key))
-    axes = axes_in(folder)
-    parts = [folder / axis for axis in axes] or [folder]
+    private = load_private_key(key, lambda: _passphrase(key)) if key else None
     with progress() as say:
         check_emitted(folder, "not signed", say)
-    for part in [*parts, *([folder] if axes else [])]:
+        releases = release_of(folder, accept_fail)
+    old = shutil.ignore_patterns(RELEASE, SIGNATURE)
+    for part, release in releases:
         with result_folder(part, "sign", entries=("c",)) as stage:
-            shutil.copytree(part / "c", stage.folder / "c", ignore=shutil.ignore_patterns(SIGNATURE))
-            sign_record(stage.folder / "c", private)
-        tell(f"{part / 'c' / SIGNATURE}: signed")
+            shutil.copytree(part / "c", stage.folder / "c", ignore=old)
+            write_own(stage.folder / "c" / RELEASE, json_text(release.content()))
+            if private is not None:
+                sign_record(stage.folder / "c", private)
+        verdict = release.verdict or "no limits were given"
+        written = f"{part / 'c' / SIGNATURE}: signed" if private else f"{part / 'c' / RELEASE}: not signed"
+        tell(f"{written}; {verdict}{f', accepted: {accept_fail}' if release.accepted_fail else ''}")
 
 
 def _passphrase(key: Path) -> str:

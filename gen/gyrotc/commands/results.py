@@ -188,6 +188,10 @@ def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     if signed:
         verdict = "good" if signed.status == "pass" else f"BAD: {signed.reason}"
         yield f"signature {verdict}; key sha256 {signed.key}"
+    if signed and signed.status == "pass":
+        why = f", accepted: {signed.accepted_fail}" if signed.accepted_fail else ""
+        until = f"; valid until {signed.valid_until}" if signed.valid_until else ""
+        yield f"released: {signed.verdict or 'no limits were given'}{why}{until}"
 
 
 def _difference_text(file: VerifiedFile) -> str:
@@ -228,9 +232,11 @@ _RULES = {
 def limit_lines(limits: HeldLimits) -> Iterator[str]:
     """The verdict, and every limit with what was measured and its uncertainty."""
     product = f" of {limits.product}" if limits.product else ""
-    verdict = limits.verdict or ("PASS" if limits.met else "FAIL")
+    if limits.decision is None:
+        yield f"limits{product}: the file gives none, so nothing was judged"
+        return
     rule = f" ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)" if limits.decision_rule else ""
-    yield f"limits{product}: {verdict}{rule}"
+    yield f"limits{product}: {limits.decision}{rule}"
     for check in limits.limits:
         name, bound = check.limit.replace("at_most.", "").replace("at_least.", ""), _plain(check.bound)
         sign = (

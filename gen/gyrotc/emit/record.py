@@ -1,7 +1,7 @@
 """The record that `emit` leaves in `c/`: of which model, with which options, and the hash of every file.
 
 `verify` makes the files again with the options that stand here, and then this record itself, so a changed record
-does not pass either. It is also what a signature covers (docs/signing.md). docs/FORMAT.md, section 6.
+does not pass either. A release, which is what is signed (docs/signing.md), names its hash. docs/FORMAT.md, section 6.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from ..reference.table import Numeric
 from ..results.base import Axis, Numbered
 
 __all__ = [
-    "BESIDES", "RECORD", "SIGNATURE", "EmissionRecord", "Options", "joint_record_text", "read_options", "record_text",
+    "BESIDES", "RECORD", "RELEASE", "SIGNATURE", "EmissionRecord", "Options", "joint_record_text", "read_options",
+    "record_text",
 ]  # fmt: skip
 
 RECORD = "emission.json"
-SIGNATURE = "emission.json.sig"
-#: Names in `c/` that gyrotc writes but does not make from the model: a signature, and the marker of a result.
-BESIDES = frozenset({SIGNATURE, ".gyrotc-result.json"})
+RELEASE = "release.json"
+SIGNATURE = "release.json.sig"
+#: Names in `c/` that gyrotc writes but does not make from the model: what is signed, and the marker of a result.
+BESIDES = frozenset({RELEASE, SIGNATURE, ".gyrotc-result.json"})
 
 
 class Options(BaseModel):

@@ -18,10 +18,11 @@ from ..inputs import checked, read_toml
 from ..outputs import result_folder, sha256, write_atomically
 from ..pages.certificate import certificate_page, dcc_text
 from ..pages.printing import print_to_pdf
-from ..pages.unit import UnitResults, unit_in
+from ..pages.unit import UnitResults
 from ..results.budget import Budget
 from ..results.manifest import Manifest
 from .axes import axes_in
+from .release import accepted, unit_of
 
 __all__ = ["Certified", "LaboratoryFacts", "certificate", "facts_of"]
 
@@ -77,6 +78,9 @@ class LaboratoryFacts(BaseModel):
     accreditation: Line | None = None
 
 
+_NEVER_REWRITTEN = ("model.json", "training.json", "limits.json")  # by any command but build
+
+
 @dataclass(frozen=True, slots=True)
 class Certified:
     """What was written: the files, and whether a PDF could be made."""
@@ -105,7 +109,13 @@ def facts_of(meta: Mapping[str, Any], path: Path | None, number: str | None) -> 
 
 
 def certificate(
-    folder: Path, out: Path, *, facts: Path | None = None, number: str | None = None, draft: bool = False
+    folder: Path,
+    out: Path,
+    *,
+    facts: Path | None = None,
+    number: str | None = None,
+    draft: bool = False,
+    accept_fail: str | None = None,
 ) -> Certified:
     """Writes `certificate.html`, `dcc.xml` and, where Chromium is there, `certificate.pdf` into `out`.
 
@@ -114,12 +124,14 @@ def certificate(
         facts: A facts file of the laboratory.
         number: Number of the certificate.
         draft: Take what is missing as not stated: the page is marked as a draft, and there is no DCC.
+        accept_fail: Why a unit gets one whose verdict is FAIL; both say it.
 
     Raises:
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
-            built, or `out` cannot be replaced.
+            built, the verdict is FAIL and not accepted, or `out` cannot be replaced.
     """
-    units = [unit_in(folder / axis) for axis in axes_in(folder)] or [unit_in(folder)]
+    units = [unit_of(folder / axis) for axis in axes_in(folder)] or [unit_of(folder)]
+    why = accepted(folder, units, accept_fail)
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     first = units[0]
     stated = facts_of(first.model.meta, facts, number)
@@ -134,10 +146,10 @@ def certificate(
     with result_folder(out, "certificate", inputs=[folder]) as stage:
         stage.of(first.model.serial)
         told = stated.model_copy(update={"issued": stated.issued or date.today().isoformat()})
-        page = certificate_page(units, told, missing)
+        page = certificate_page(units, told, missing, why)
         write_atomically(stage.folder / "certificate.html", page)
         if not missing:
-            write_atomically(stage.folder / "dcc.xml", dcc_text(units, told))
+            write_atomically(stage.folder / "dcc.xml", dcc_text(units, told, why))
         printed = print_to_pdf(stage.folder / "certificate.html", stage.folder / "certificate.pdf")
     names = (
         "certificate.html",
@@ -186,5 +198,5 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
 
 
 def _proven(manifest: Manifest) -> dict[str, str]:
-    kept = (name for name in manifest.files if name == "model.json" or name.startswith("c/"))
+    kept = (name for name in manifest.files if name in _NEVER_REWRITTEN or name.startswith("c/"))
     return {name: manifest.files[name] for name in kept if not name.endswith("main.c")}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import InputError
 from ..model import Model, load_model
-from ..outputs import digest_of
+from ..outputs import check_intact, digest_of
 from ..results.base import read_result
 from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
 from ..results.training import Training
@@ -116,6 +116,7 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
 
 
 def _unit(place: Path) -> _Calibrated:
+    check_intact(place, ("training.json", "model.json"), needed=False)
     training = read_result(place / "training.json", Training)
     model = load_model(place / "model.json")
     return _Calibrated(model, training, means_of(training.means, place / "training.json"))

@@ -96,6 +96,6 @@ def _verdict(room: float, band: float, rule: DecisionRule) -> Verdict:
     return "CONDITIONAL PASS" if rule == "guard_band" else "FAIL"
 
 
-def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict:
-    """The gravest of several verdicts; a pass where there is none."""
-    return max((v for v in verdicts if v), key=_ORDER.index, default="PASS")
+def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict | None:
+    """The gravest of several verdicts; None where there is none: nothing was judged."""
+    return max((v for v in verdicts if v), key=_ORDER.index, default=None)

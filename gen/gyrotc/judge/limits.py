@@ -172,7 +172,7 @@ def held_against(
         axis=model.axis,
         product=limits.product,
         sha256=limits.sha256,
-        met=all(check.met for check in checks),
+        met=bool(checks) and all(check.met for check in checks),
         limits=checks,
         verdict=worst_of(check.verdict for check in checks),
         decision_rule=limits.decision_rule,

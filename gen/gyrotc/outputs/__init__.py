@@ -11,7 +11,7 @@ from .folder import Stage, clean, leftovers, result_folder, write_result
 from .interrupts import Interrupted, deferred, die_of, raise_on_signals
 from .jsontext import canonical_json, digest_of, json_text
 from .lock import Lock
-from .marker import KINDS, MARKER, SCHEMA, Marker, faults, read_marker, sha256
+from .marker import KINDS, MARKER, SCHEMA, Marker, check_intact, faults, read_marker, sha256
 from .opening import check_own, create, open_or_create, write_own
 from .scratch import scratch_folder
 
@@ -24,6 +24,7 @@ __all__ = [
     "Marker",
     "Stage",
     "canonical_json",
+    "check_intact",
     "check_own",
     "check_replaceable",
     "clean",

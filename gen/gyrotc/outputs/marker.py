@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from .. import __version__
@@ -21,8 +21,8 @@ from ..results.marker import Marker
 from .jsontext import json_text
 
 __all__ = [
-    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "faults", "is_inside", "marker_of", "marker_text",
-    "read_marker", "remove_listed", "sha256", "survey", "walk",
+    "KINDS", "MARKER", "NEW", "OWN", "SCHEMA", "Marker", "check_intact", "faults", "is_inside", "marker_of",
+    "marker_text", "read_marker", "remove_listed", "sha256", "survey", "walk",
 ]  # fmt: skip
 
 MARKER = ".gyrotc-result.json"
@@ -48,6 +48,9 @@ NEW = ".gyrotc-new"
 OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
 """Names by which gyrotc keeps its books in a folder: the marker, one being written, what exchanges are tried on."""
 
+_AS_WRITTEN = "a folder as gyrotc wrote it; make it again"
+_FREE = frozenset(("c/main.c", "c/release.json.sig"))  # the user's, and what another tool may have signed
+_ANYBODYS = "model.json"  # has a checksum of its own, and emit works beside one that came from elsewhere
 _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 
@@ -191,6 +194,41 @@ def faults(folder: Path) -> list[str]:
     for part in marker.parts:
         found += [f"{part}/{fault}" for fault in faults(folder / part)]
     return found
+
+
+def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -> None:
+    """Refuses a result of which a file is missing, or is not as gyrotc wrote it.
+
+    Args:
+        names: Paths of files and folders in it; others are not looked at, nor is what a user may make his own.
+        needed: A folder without a marker is refused, too.
+
+    Raises:
+        InputError: One is.
+    """
+    marker = read_marker(folder)
+    if marker is None:
+        if needed:
+            raise InputError(str(folder), f"has no {MARKER}", _AS_WRITTEN)
+        return
+    if marker.unfinished or marker.pending:
+        raise InputError(str(folder), "is not whole: a job was killed in it", "that command again")
+    for name, known in sorted(marker.files.items()):
+        if _among(name, names) and name not in _FREE and not _is(folder / name, {known}):
+            found = "is not as gyrotc wrote it" if os.path.lexists(folder / name) else "is missing"
+            raise InputError(str(folder / name), found, _AS_WRITTEN)
+    for part in marker.parts:
+        inside = [name[len(part) + 1 :] for name in names if name.startswith(f"{part}/")]
+        if inside and not _among(part, names):
+            check_intact(folder / part, inside)
+    for name in names:
+        listed = name in (*marker.files, _ANYBODYS) or any(_among(name, [part]) for part in marker.parts)
+        if not listed and os.path.lexists(folder / name) and not (folder / name).is_dir():
+            raise InputError(str(folder / name), "was not written by gyrotc", _AS_WRITTEN)
+
+
+def _among(name: str, names: Collection[str]) -> bool:
+    return any(name == other or name.startswith(f"{other}/") for other in names)
 
 
 def _is(path: Path, known: set[str]) -> bool:

@@ -89,17 +89,26 @@ def _row(limit: Limit) -> CertifiedRow:
     )
 
 
-def certificate_page(units: Sequence[UnitResults], facts: Any, missing: Sequence[str]) -> str:
-    """The page; `facts` is what the laboratory states, `missing` makes it a draft."""
+def certificate_page(
+    units: Sequence[UnitResults], facts: Any, missing: Sequence[str], accepted: str | None = None
+) -> str:
+    """The page.
+
+    Args:
+        facts: What the laboratory states.
+        missing: What is missing makes it a draft.
+        accepted: Why the unit is released although a verdict is FAIL.
+    """
     template = page_environment().get_template("certificate.html.j2")
-    return template.render(units=units, rows=[rows_of(unit) for unit in units], facts=facts, missing=missing)
+    rows = [rows_of(unit) for unit in units]
+    return template.render(units=units, rows=rows, facts=facts, missing=missing, accepted=accepted)
 
 
-def dcc_text(units: Sequence[UnitResults], facts: Any) -> str:
-    """The XML of a DCC."""
+def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
+    """The XML of a DCC; arguments as of the page."""
     environment = html_environment(line=_line, day=lambda text: text[:10], rounded=rounded)
     text = environment.get_template("dcc.xml.j2").render(
-        units=units, rows=[rows_of(unit) for unit in units], facts=facts
+        units=units, rows=[rows_of(unit) for unit in units], facts=facts, accepted=accepted
     )
     return re.sub(r"\n\s*\n+", "\n", text)
 

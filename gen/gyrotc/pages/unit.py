@@ -12,7 +12,7 @@ from ..results.budget import Budget
 from ..results.changes import Changes
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Evaluation, Pooled
-from ..results.limits import HeldLimits, Limit
+from ..results.limits import HeldLimits, Limit, Verdict
 from ..results.manifest import Manifest
 from ..results.training import Rung, Training
 from ..results.verification import Verification
@@ -78,11 +78,16 @@ class UnitResults:
         self.judged_on = _JUDGED_ON[judged[0]] if judged else "nothing"
 
     @property
-    def verdict(self) -> str:
-        """Of the limits and of what was proven; empty without limits where nothing failed."""
+    def decision(self) -> Verdict | None:
+        """Of the limits and of what was proven; None without limits where nothing failed."""
         if self.failures:
             return "FAIL"
-        return _verdict(self.limits) if self.limits else ""
+        return self.limits.decision if self.limits else None
+
+    @property
+    def verdict(self) -> str:
+        """The same as text; empty where there is none."""
+        return self.decision or ""
 
     @property
     def failures(self) -> list[str]:
@@ -156,7 +161,7 @@ class UnitResults:
         return list(_changes(self.changes)) if self.changes else []
 
 
-def _verdict(one: Limit | HeldLimits) -> str:
+def _verdict(one: Limit) -> str:
     return one.verdict or ("PASS" if one.met else "FAIL")
 
 

@@ -75,7 +75,12 @@ class HeldLimits(Result):
     axis: Axis = Field(description="null where the recordings have one axis")
     product: str = Field(description="name of the product, empty where the limits file gives none")
     sha256: str = Field(description="of the limits file")
-    met: bool = Field(description="whether all are met")
+    met: bool = Field(description="whether all are met; false where the file gives no limits")
     limits: tuple[Limit, ...] = Field(description="every limit of the file")
-    verdict: Verdict | None = Field(default=None, description="the worst of all limits")
+    verdict: Verdict | None = Field(default=None, description="the worst of all limits; null: there are none")
     decision_rule: DecisionRule | None = Field(default=None, description="of the limits file")
+
+    @property
+    def decision(self) -> Verdict | None:
+        """The verdict; None where there is nothing that it could be of. Files of an early gyrotc do not state it."""
+        return (self.verdict or ("PASS" if self.met else "FAIL")) if self.limits else None

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .base import Axis, Count, Part, Result
+from .limits import Verdict
 
 __all__ = [
     "CallCost", "EmittedWith", "FunctionCost", "JointVerification", "LogPart", "MapError", "ReadLog", "ReplayedRows",
@@ -114,6 +115,15 @@ class SignatureCheck(Part):
     status: PassOrFail = Field(description="whether the record of the files was signed with this key")
     key: str = Field(description="SHA-256 of the public key")
     reason: str | None = Field(description="why it is not good; null where it is")
+    verdict: Verdict | None = Field(
+        default=None, description="that was signed; null without limits, and where the signature is not good"
+    )
+    accepted_fail: str | None = Field(
+        default=None, description="why it was released although the verdict is FAIL, as it was signed"
+    )
+    valid_until: str | None = Field(
+        default=None, description="first day on which an axis ends, as it was signed"
+    )
 
 
 class MapError(Part):

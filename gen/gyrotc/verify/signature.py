@@ -1,7 +1,8 @@
-"""Signatures of an emission: Ed25519 over the bytes of `c/emission.json` (docs/signing.md).
+"""Signatures of a release: Ed25519 over the bytes of `c/release.json` (docs/signing.md).
 
-The record names the model and the hash of every file, and `verify` proves that it and they are what gyrotc makes; the
-signature says who released them. Raw 64 bytes, as `openssl pkeyutl -sign -rawin` writes them.
+It names verdict, limits, uncertainty and dates, and the hashes of what they rest on and of the record of the emission;
+`verify` proves that the emitted files are what gyrotc makes; the signature says who released them. Raw 64 bytes, as
+`openssl pkeyutl -sign -rawin` writes them.
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..emit.record import RECORD, SIGNATURE
+from ..emit.record import RECORD, RELEASE, SIGNATURE
 from ..errors import InputError
-from ..outputs import write_atomically
+from ..inputs import parse_json
+from ..outputs import sha256, write_atomically
+from ..results.base import checked_result
+from ..results.release import RELEASED, Release
 from ..results.verification import SignatureCheck
 
 if TYPE_CHECKING:
@@ -22,39 +26,63 @@ if TYPE_CHECKING:
 __all__ = ["check_signature", "load_private_key", "load_public_key", "sign_record"]
 
 _LARGEST_KEY = 2**16  # bytes of a PEM file
+_LARGEST_RELEASE = 2**22  # bytes: a thousand limits are a tenth of it
 _LENGTH = 64  # bytes of a signature
 
 
 def sign_record(c_folder: Path, key: Ed25519PrivateKey) -> Path:
-    """Writes `c/emission.json.sig`; returns its path.
+    """Writes `c/release.json.sig`; returns its path.
 
     Raises:
-        InputError: There is no record.
+        InputError: There is no release.
     """
     path = c_folder / SIGNATURE
-    write_atomically(path, key.sign(_bytes(c_folder / RECORD, 2**20, "a folder that emit wrote")))
+    write_atomically(path, key.sign(_bytes(c_folder / RELEASE, _LARGEST_RELEASE, "a release")))
     return path
 
 
 def check_signature(c_folder: Path, key: Ed25519PublicKey) -> SignatureCheck:
-    """Whether the record's signature is of this key."""
+    """Whether the release's signature is of this key, and all that it names is as it was released."""
     from cryptography.exceptions import InvalidSignature
 
-    reason = None
+    reason, release = None, None
     try:
-        record = _bytes(c_folder / RECORD, 2**20, "")
-        signature = _bytes(c_folder / SIGNATURE, _LENGTH, "")
-        key.verify(signature, record)
+        data = _bytes(c_folder / RELEASE, _LARGEST_RELEASE, "what gyrotc sign wrote")
+        key.verify(_bytes(c_folder / SIGNATURE, _LENGTH, ""), data)
+        release = checked_result(parse_json(data, str(c_folder / RELEASE), "a release"), Release, RELEASE)
+        reason = _departure(c_folder, release)
     except InputError as error:
         reason = str(error)
     except InvalidSignature:
-        reason = "not a signature of this record by this key"
+        reason = "not a signature of this release by this key"
+    signed = release if release is not None and reason is None else None
+    days = [unit.valid_until for unit in signed.units if unit.valid_until] if signed else []
     return SignatureCheck(
         file=SIGNATURE,
         status="fail" if reason else "pass",
         key=hashlib.sha256(key.public_bytes_raw()).hexdigest(),
         reason=reason,
+        verdict=signed.verdict if signed else None,
+        accepted_fail=signed.accepted_fail if signed else None,
+        valid_until=min(days, default=None),
     )
+
+
+def _departure(c_folder: Path, release: Release) -> str | None:
+    """The first file that is not as it was released, and why; None if all are."""
+    folder = c_folder.parent
+    axes = [f"{unit.axis}/" if release.axis != unit.axis else "" for unit in release.units]
+    known = {f"{axis}{name}": None for axis in axes for name in RELEASED} | release.files
+    for name, digest in ({"c/" + RECORD: release.emission} | known).items():
+        path = folder / name
+        if not path.is_file():
+            if digest is not None:
+                return f"{name} is missing"
+        elif digest is None:
+            return f"{name} was not there when it was signed"
+        elif sha256(path) != digest:
+            return f"{name} is not what was signed"
+    return None
 
 
 def load_public_key(path: Path) -> Ed25519PublicKey:

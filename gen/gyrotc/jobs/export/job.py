@@ -10,7 +10,7 @@ from typing import Literal, cast, get_args
 from ...emit.record import RECORD, read_options
 from ...errors import InputError
 from ...model import Model, load_model
-from ...outputs import check_replaceable, json_text, write_atomically
+from ...outputs import check_intact, check_replaceable, json_text, write_atomically
 from ...quantise.cubic import Autopilot, best_cubic
 from ..axes import axes_in
 from .asap2 import a2l_text
@@ -53,6 +53,8 @@ def export(folder: Path, format: Format, out: Path, options: Exporting = Exporti
     """
     check_replaceable(out)
     parts = [folder / name for name in axes_in(folder)] or [folder]
+    for part in parts:
+        check_intact(part, ("model.json", "c"), needed=False)
     models = [load_model(part / "model.json") for part in parts]
     if format == "fmu":
         data, told = fmu(folder, models)

@@ -17,16 +17,16 @@ from ... import __version__
 from ...errors import GyrotcError, InputError
 from ...model import Model, load_model
 from ...outputs import check_own, open_or_create, sha256, write_atomically
-from ...results.base import read_optional
-from ...results.budget import Budget
 from ...results.catalogue import CatalogueAnswer, Catalogued, CataloguedFile
 from ...results.fleet import FleetEntry
+from ..release import unit_of
 from .entry import ENTRY
 
 __all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter"]
 
 CATALOGUE = "catalogue"
-_FILE = "catalogue.sqlite"
+_FILE, _PAYLOADS = "catalogue.sqlite", "payloads"
+_EXPECTED = "a catalogue as gyrotc fleet wrote it"
 _APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
 _MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
 _BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
@@ -149,8 +149,12 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
         folder / ENTRY
     ).is_file():  # a name with bytes that are no character: it is told, but lies elsewhere
         return 0
-    model = load_model(folder / "model.json")
-    budget = read_optional(folder / "budget.json", Budget)
+    unit = unit_of(folder)
+    model, budget = unit.model, unit.budget
+    if (unit.decision, model.hash) != (entry.verdict, entry.model_hash):
+        raise InputError(
+            str(folder / ENTRY), "is not what the other results give", "a result as fleet wrote it"
+        )
     image, text = (_kept(out, path) for path in (_image(folder, model), folder / "model.json"))
     row = base.execute(
         "INSERT INTO calibration (serial, axis, valid_from, valid_until, tag, status, verdict, model_hash,"
@@ -174,10 +178,10 @@ def _image(folder: Path, model: Model) -> Path:
 def _kept(out: Path, source: Path) -> str:
     """Puts a file among the payloads under its hash, read-only, unless it is there; returns the hash."""
     known = sha256(source)
-    place = out / CATALOGUE / "payloads" / known[:2] / known
+    place = out / CATALOGUE / _PAYLOADS / known[:2] / known
     if place.exists() or place.is_symlink():
         if not place.is_file() or sha256(place) != known:
-            raise InputError(str(place), "is not what its name says", "a catalogue as gyrotc fleet wrote it")
+            raise InputError(str(place), "is not what its name says", _EXPECTED)
     else:
         place.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(place, source.read_bytes())
@@ -204,6 +208,8 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
             base.row_factory = sqlite3.Row
             rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
             found = tuple(_told(base, row) for row in rows)
+            for one in found if serial else ():
+                _check_payloads(path.parent / _PAYLOADS, one)
             total = base.execute("SELECT coalesce(max(id), 0) FROM calibration").fetchone()[0]
     except sqlite3.DatabaseError as error:
         raise InputError(
@@ -213,6 +219,21 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
         gyrotc_version=__version__, serial=serial, axis=None, day=day if serial else None, calibrations=total,
         found=found,
     )  # fmt: skip
+
+
+def _check_payloads(place: Path, one: Catalogued) -> None:
+    """What a gyro may carry is there, and is what its row says.
+
+    Raises:
+        InputError: It is not.
+    """
+    image, text = (place / known[:2] / known for known in (one.image_sha256, one.model_sha256))
+    for path in (image, text):
+        if not path.is_file() or sha256(path) != path.name:
+            raise InputError(str(path), "is missing or not what its name says", _EXPECTED)
+    model = load_model(text)
+    if (model.serial, model.axis, model.hash) != (one.serial, one.axis, one.model_hash):
+        raise InputError(str(text), f"is not the model that the catalogue names for {one.serial}", _EXPECTED)
 
 
 def _told(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:

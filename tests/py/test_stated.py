@@ -1,0 +1,314 @@
+"""What a command states of a result is what was found: a file or a figure that was changed is refused, not told."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import random
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gyrotc import cli
+from gyrotc.dataset import load
+from gyrotc.errors import GyrotcError, InputError
+from gyrotc.jobs.build import build_into
+from gyrotc.jobs.certificate import certificate
+from gyrotc.jobs.export import export
+from gyrotc.jobs.lot import _unit
+from gyrotc.jobs.release import release_of, unit_of
+from gyrotc.judge.limits import load_limits
+from gyrotc.outputs import MARKER, result_folder
+from gyrotc.pages import printing
+from gyrotc.results.release import RELEASED
+from gyrotc.train.fitting import FitOptions
+from recordings import columns, toml, write_csv
+
+SEED = 20
+FAILS = """schema = 1
+product = "NAV"
+[at_most]
+rms_dph = 30.0
+centers = 40
+[at_least]
+improvement = 1e6
+[covers]
+temperature_c = [21.0, 40.0]
+[needs]
+arithmetics = ["f32", "q31"]
+no_findings = ["run_outlier", "counter_wrapped"]
+[interval]
+days = 365
+drift_dph_per_year = 1e-4
+[[instrument]]
+name = "Pt100 SN 71"
+certificate = "K-4711"
+quantity = "temperature"
+expanded_uncertainty = 0.04
+"""
+PASSES = FAILS.replace("improvement = 1e6", "covered = 0.0")
+
+
+def _built(folder: Path, limits: str) -> Path:
+    data, out = folder / "RLG-1", folder / "out"
+    write_csv(data / "run-01.csv", columns(720, seed=1))
+    head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"\n[meta]\ncalibrated_on = "2026-03-07"'
+    (data / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
+    (folder / "limits.toml").write_text(limits)
+    with result_folder(out, "build") as stage:
+        stage.of("RLG-1")
+        known = load_limits(folder / "limits.toml")
+        build_into(stage.folder, load(data), FitOptions(), limits=known, compiled=False)
+    return out
+
+
+@pytest.fixture(scope="module")
+def passing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _built(tmp_path_factory.mktemp("passing"), PASSES)
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _built(tmp_path_factory.mktemp("failing"), FAILS)
+
+
+@pytest.fixture(scope="module")
+def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    private = tmp_path_factory.mktemp("keys") / "lab.pem"
+    subprocess.run(["openssl", "genpkey", "-algorithm", "ed25519", "-out", private], check=True)
+    public = private.with_suffix(".pub")
+    subprocess.run(["openssl", "pkey", "-in", private, "-pubout", "-out", public], check=True)
+    return private
+
+
+@pytest.fixture(autouse=True)
+def paper(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(printing, "_BROWSERS", ())
+
+
+def _status(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr("sys.argv", ["gyrotc", *map(str, arguments)])
+    return cli._status()
+
+
+def _edit(path: Path, change: dict[str, Any]) -> None:
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+
+
+def _hash_again(folder: Path, *names: str) -> None:
+    """What somebody does who knows of the marker and the manifest."""
+    for book in (MARKER, "manifest.json"):
+        content = json.loads((folder / book).read_text())
+        for name in names:
+            if name in content["files"]:
+                content["files"][name] = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        (folder / book).write_text(json.dumps(content))
+    content = json.loads((folder / MARKER).read_text())
+    content["files"]["manifest.json"] = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
+    (folder / MARKER).write_text(json.dumps(content))
+
+
+def _passed(folder: Path) -> None:
+    """A FAIL made into a PASS by hand, with a small uncertainty."""
+    held = json.loads((folder / "limits.json").read_text())
+    for limit in held["limits"]:
+        limit |= {"met": True, "verdict": "PASS"}
+    (folder / "limits.json").write_text(json.dumps(held | {"met": True, "verdict": "PASS"}))
+    _edit(folder / "budget.json", {"expanded_dph": 1e-6, "combined_dph": 5e-7})
+
+
+@pytest.mark.parametrize("hashes", ["as they were", "made again"])
+def test_a_fail_that_was_edited_into_a_pass_is_refused(
+    failing: Path, tmp_path: Path, key: Path, hashes: str,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Before: a certificate that said PASS and U = 1e-6, on the page, in the PDF and in the DCC."""
+    folder = shutil.copytree(failing, tmp_path / "out")
+    _passed(folder)
+    if hashes == "made again":
+        _hash_again(folder, "limits.json", "budget.json")
+    for command in (
+        ("certificate", folder, "--draft", "--out", tmp_path / "C"),
+        ("sign", folder, "--key", key),
+    ):
+        assert _status(monkeypatch, *command) == 2
+        told = capsys.readouterr().err
+        assert len(told.splitlines()) == 1 and ("limits.json" in told or "budget.json" in told), told
+    assert not (tmp_path / "C").exists() and not (folder / "c" / "release.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "field"),
+    [
+        ("expanded_dph", 1e-6),
+        ("coverage_factor", 1.0),
+        ("valid_until", "2099-01-01"),
+        ("interval_days", 9999.0),
+    ],
+)
+def test_a_budget_is_computed_again(passing: Path, tmp_path: Path, name: str, field: object) -> None:
+    folder = shutil.copytree(passing, tmp_path / "out")
+    unit_of(folder)
+    _edit(folder / "budget.json", {name: field})
+    _hash_again(folder, "budget.json")
+    with pytest.raises(InputError, match=r"budget\.json"):
+        unit_of(folder)
+
+
+def test_a_fail_needs_a_reason_which_is_signed_and_printed(
+    failing: Path, tmp_path: Path, key: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Before: `sign` signed a result that said FAIL, and no verdict was among what it signed."""
+    folder, reason = shutil.copytree(failing, tmp_path / "out"), "bench unit, not for flight"
+    assert _status(monkeypatch, "sign", folder, "--key", key) == 2
+    told = capsys.readouterr().err
+    assert "its verdict is FAIL (" in told and "--accept-fail REASON" in told and len(told.splitlines()) == 1
+    with pytest.raises(InputError, match="its verdict is FAIL"):
+        certificate(folder, tmp_path / "C", draft=True)
+    with pytest.raises(InputError, match="a reason"):
+        release_of(folder, " \n")
+    assert _status(monkeypatch, "sign", folder, "--key", key, "--accept-fail", reason) == 0
+    release = json.loads((folder / "c" / "release.json").read_text())
+    assert (release["verdict"], release["accepted_fail"]) == ("FAIL", reason)
+    [unit] = release["units"]
+    assert unit["valid_until"] == "2027-03-07" and unit["calibrated_on"] == "2026-03-07"
+    assert unit["expanded_dph"] == json.loads((folder / "budget.json").read_text())["expanded_dph"]
+    assert len(unit["limits"]) == 8
+    certificate(folder, tmp_path / "C", draft=True, accept_fail=reason)
+    page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
+    assert f"Released although the verdict is FAIL:</b> {reason}" in page
+    public = key.with_suffix(".pub")
+    capsys.readouterr()
+    assert _status(monkeypatch, "verify", folder, "--target", "host-gcc-O2", "--signature", public) == 0
+    assert f"released: FAIL, accepted: {reason}; valid until 2027-03-07" in capsys.readouterr().out
+
+
+def test_a_reason_without_a_fail_is_refused(passing: Path) -> None:
+    with pytest.raises(InputError, match="the verdict is not FAIL"):
+        release_of(passing, "why not")
+
+
+@pytest.mark.parametrize("text", ["schema = 1", 'schema = 1\nproduct = "NAV"\n[interval]\ndays = 365'])
+def test_no_limits_are_no_pass(
+    tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before: a limits file of `schema = 1` alone gave "limits: PASS"."""
+    from gyrotc.commands.results import limit_lines
+
+    folder = _built(tmp_path, text)
+    held = json.loads((folder / "limits.json").read_text())
+    assert (held["met"], held["verdict"], held["limits"]) == (False, None, [])
+    unit = unit_of(folder)
+    assert unit.verdict == "" and unit.limits is not None
+    assert [line for line in limit_lines(unit.limits) if "PASS" in line] == []
+    certificate(folder, tmp_path / "C", draft=True)
+    page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
+    assert "No limits were given" in page and "PASS" not in page
+    assert _status(monkeypatch, "report", folder) == 0
+    assert "<strong>No verdict</strong>" in (folder / "report.html").read_text("utf-8")
+    [(_, release)] = release_of(folder)
+    assert release.verdict is None
+    (tmp_path / "fleet.toml").write_text('schema = 1\ndatasets = ["RLG-1"]\nlimits = "limits.toml"\n')
+    assert _status(monkeypatch, "fleet", tmp_path / "fleet.toml", "--out", tmp_path / "F", "--jobs", "1") == 0
+    [entry] = json.loads((tmp_path / "F" / "fleet.json").read_text())["serials"]
+    assert entry["verdict"] is None and entry["limits_held"] is None
+    capsys.readouterr()
+    assert _status(monkeypatch, "catalogue", tmp_path / "F", "RLG-1", "--on", "2026-04-01") == 0
+    assert "PASS" not in capsys.readouterr().out
+
+
+def _leaves(content: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    if isinstance(content, dict | list) and content:
+        for name, part in content.items() if isinstance(content, dict) else enumerate(content):
+            yield from _leaves(part, (*path, name))
+    else:
+        yield path
+
+
+def _mutated(content: Any, path: tuple[str | int, ...]) -> Any:
+    content = copy.deepcopy(content)
+    place = content
+    for name in path[:-1]:
+        place = place[name]
+    value = place[path[-1]]
+    if isinstance(value, bool):
+        changed: Any = not value
+    elif isinstance(value, int | float):
+        changed = value + 1 if isinstance(value, int) else value * 1.01 + 1e-6
+    else:
+        changed = f"{value}x" if isinstance(value, str) else 1
+    place[path[-1]] = changed
+    return content
+
+
+def test_every_leaf_and_payload_is_guarded(passing: Path, tmp_path: Path, key: Path) -> None:
+    """Certificate, signing, export, lot and the signature's own check refuse whatever was changed of what they state."""
+    from gyrotc.verify.signature import check_signature, load_private_key, load_public_key, sign_record
+
+    print(f"seed {SEED}")
+    rng = random.Random(SEED)
+    folder = shutil.copytree(passing, tmp_path / "out")
+    [(_, release)] = release_of(folder)
+    (folder / "c" / "release.json").write_text(json.dumps(release.content()))
+    sign_record(folder / "c", load_private_key(key, lambda: ""))
+    public = load_public_key(key.with_suffix(".pub"))
+    assert check_signature(folder / "c", public).status == "pass"
+    tried = 0
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name = path.relative_to(folder).as_posix()
+        if name in (MARKER, "c/main.c", "c/release.json.sig", "entry.json"):
+            continue
+        before = path.read_bytes()
+        if path.suffix == ".json":
+            content = json.loads(before)
+            leaves = list(_leaves(content))
+            texts = [
+                json.dumps(_mutated(content, leaf)).encode()
+                for leaf in rng.sample(leaves, min(12, len(leaves)))
+            ]
+        else:
+            at = rng.randrange(len(before))
+            texts = [before[:at] + bytes([before[at] ^ 1]) + before[at + 1 :], before + b"\n", b""]
+        for text in texts:
+            path.write_bytes(text)
+            _refused(folder, tmp_path, name, public, check_signature)
+            tried += 1
+        path.unlink()
+        _refused(folder, tmp_path, name, public, check_signature)
+        path.write_bytes(before)
+    assert tried > 80
+    unit_of(folder)
+    assert check_signature(folder / "c", public).status == "pass"
+
+
+def _refused(folder: Path, tmp_path: Path, name: str, public: Any, check_signature: Any) -> None:
+    if name != "c/release.json":
+        for command in (
+            lambda: certificate(folder, tmp_path / "C", draft=True),
+            lambda: release_of(folder),
+        ):
+            with pytest.raises(GyrotcError, match=name.rpartition("/")[2].replace(".", r"\.")):
+                command()
+        assert not (tmp_path / "C").exists()
+    if name == "model.json" or (name.startswith("c/") and name != "c/release.json"):
+        with pytest.raises(GyrotcError):
+            export(folder, "csv", tmp_path / "map.csv")
+    if name in ("model.json", "training.json"):
+        with pytest.raises(GyrotcError):
+            _unit(folder)
+    if name in (*RELEASED, "c/emission.json", "c/release.json"):
+        assert check_signature(folder / "c", public).status == "fail", name
+
+
+def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None:
+    folder = shutil.copytree(passing, tmp_path / "out")
+    (folder / "notes.json").write_text("{}")
+    unit_of(folder)
+    (folder / "changes.json").write_text("{}")
+    with pytest.raises(InputError, match=r"changes\.json: was not written by gyrotc"):
+        unit_of(folder)
