@@ -20,9 +20,10 @@ from typing import Any
 import pytest
 from gyrotc.errors import InputError
 from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
+from gyrotc.jobs.fleet import unit as units
 from gyrotc.jobs.fleet.fingerprint import inputs_of, program_of
 from gyrotc.jobs.fleet.manifest import SUMMARY
-from gyrotc.jobs.fleet.unit import Task, do_unit, done_before
+from gyrotc.jobs.fleet.unit import Task, do_unit
 from gyrotc.judge.limits import load_limits
 from gyrotc.outputs import MARKER, Lock, faults
 from gyrotc.results.fleet import FleetEntry
@@ -41,12 +42,17 @@ def gyro(folder: Path, serial: str, *, seed: int = 1) -> None:
     (folder / "dataset.toml").write_text(toml('file = "run-01.csv"', head=HEAD.format(serial)))
 
 
+def done_before(task: Task) -> FleetEntry | None:
+    """As a fleet asks it: by what the recordings hold now."""
+    return units.done_before(task.keyed())
+
+
 @pytest.fixture
 def task(tmp_path: Path) -> Task:
     """One gyro, not done yet."""
     gyro(tmp_path / "data" / "RLG-1", "RLG-1")
     fleet = Fleet((Unit(tmp_path / "data" / "RLG-1", None),), FitOptions(), ("f32",), None)
-    return Task(fleet.units[0], fleet, tmp_path / "out" / "RLG-1", False, program_of())
+    return Task(fleet.units[0], "RLG-1", fleet, tmp_path / "out" / "RLG-1", False, program_of())
 
 
 def test_done_is_done_until_a_byte_of_a_recording_changes(task: Task) -> None:

@@ -247,7 +247,7 @@ def _mutated(content: Any, path: tuple[str | int, ...]) -> Any:
 
 
 def test_every_leaf_and_payload_is_guarded(passing: Path, tmp_path: Path, key: Path) -> None:
-    """Certificate, signing, export, lot and the signature's own check refuse whatever was changed of what they state."""
+    """Certificate, signing, export, lot and the signature's own check refuse whatever of it was changed."""
     from gyrotc.verify.signature import check_signature, load_private_key, load_public_key, sign_record
 
     print(f"seed {SEED}")

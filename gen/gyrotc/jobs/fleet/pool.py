@@ -14,6 +14,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...results.fleet import FleetEntry
+from .entry import ENTRY
 from .unit import Task, do_unit, failed
 
 __all__ = ["on_dask", "on_processes"]
@@ -117,4 +118,13 @@ def on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetE
         numbers = {future.key: number for number, future in enumerate(futures)}
         for future in completed(futures):
             number = numbers[future.key]
-            yield number, _entry_of(tasks[number], future)
+            yield number, _there(tasks[number], _entry_of(tasks[number], future))
+
+
+def _there(task: Task, entry: FleetEntry) -> FleetEntry:
+    """The entry if its result is in the fleet's folder here: a worker may have another folder under that path."""
+    if entry.status == "done":
+        os.listdir(task.out.parent)  # noqa: PTH208 a network file system looks anew
+        if not (task.out / ENTRY).is_file():
+            return failed(task, f"{task.out}: its worker has written it into another folder of that name")
+    return entry

@@ -14,7 +14,7 @@ from ...results.fleet import FleetEntry
 from .aside import clean_units
 from .catalogue import enter
 from .fingerprint import program_of
-from .manifest import SUMMARY, Fleet
+from .manifest import SUMMARY, Fleet, printable
 from .page import write_summary
 from .pool import on_dask, on_processes
 from .unit import Task, done_before
@@ -75,7 +75,17 @@ def checked_place(fleet: Fleet, out: Path) -> Path:
 def tasks_of(fleet: Fleet, out: Path, full: bool) -> list[Task]:
     """A task for each unit; none of them carries the others to another process."""
     program, common = program_of(), replace(fleet, units=())
-    return [Task(unit, common, out / unit.folder, full, program) for unit in fleet.units]
+    return [
+        Task(
+            replace(unit, dataset=unit.dataset.absolute()),
+            printable(str(unit.dataset)),
+            common,
+            out / unit.folder,
+            full,
+            program,
+        )
+        for unit in fleet.units
+    ]
 
 
 def _run(
@@ -90,11 +100,12 @@ def _run(
     return summed(out, worked(tasks, entries, jobs, scheduler, say))
 
 
-def done_already(tasks: Sequence[Task], say: Told) -> dict[int, FleetEntry]:
-    """Entries of earlier calls that still hold, by the number of their task."""
+def done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
+    """Entries of earlier calls that still hold, by the number of their task. Every task gets its key."""
     entries = {}
     for number, task in enumerate(tasks):
-        if known := done_before(task):
+        tasks[number] = task.keyed()
+        if known := done_before(tasks[number]):
             entries[number] = known.as_kept()
             say(entries[number])
     return entries

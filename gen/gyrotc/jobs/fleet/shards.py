@@ -89,7 +89,7 @@ def run_share(
             _without_summary(place)  # what it says of them ends now
         found = worked(tasks, entries, jobs, scheduler, say)
         failed = (
-            e.model_copy(update={"key": t.key()})
+            e.model_copy(update={"key": t.key or None})
             for e, t in zip(found, tasks, strict=True)
             if e.status != "done"
         )
@@ -152,7 +152,7 @@ def gather(
 
 def _still(entry: FleetEntry | None, task: Task) -> FleetEntry | None:
     """The entry of a share, if it is of the same inputs."""
-    return entry if entry is not None and entry.key == task.key() else None
+    return entry if entry is not None and entry.key == task.key else None
 
 
 def _kept(out: Path) -> Iterator[FleetEntry]:

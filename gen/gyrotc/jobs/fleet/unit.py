@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import socket
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from ...dataset import Dataset, load
-from ...errors import CheckFailed, GyrotcError, InputError
+from ...errors import GyrotcError, InputError
 from ...judge.conformity import coverage_factor
 from ...metrics import Averages
 from ...model import Model
@@ -26,16 +30,37 @@ __all__ = ["Task", "do_unit", "done_before", "failed"]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A unit with all that its job needs; goes to another process as it is."""
+    """A unit with all that its job needs; goes to another process, maybe on another machine, as it is.
+
+    Attributes:
+        unit: Its recordings by an absolute path: a worker may run in another folder.
+        shown: The path as the user has typed it.
+        fleet: The options; without the other units.
+        out: Where the result goes, absolute.
+        full: As of `run_fleet`.
+        program: Hash of the program that asks for it.
+        key: Hash of what it is to be made of, as the one who asks has found it; empty: that could not be read.
+    """
 
     unit: Unit
+    shown: str
     fleet: Fleet
     out: Path
     full: bool
-    program: str  # hash of the program that asks for it
+    program: str
+    key: str = ""
 
-    def key(self) -> str:
-        """Changes with the contents of the recordings, the options, the limits and the program."""
+    def keyed(self) -> Task:
+        """The same with its key."""
+        try:
+            return replace(self, key=self.found())
+        except OSError:
+            return self
+
+    def found(self) -> str:
+        """The key as it is here and now: it changes with the contents of the recordings, the options, the limits and
+        the program.
+        """
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
         lot = self.fleet.options.lot
         plain = asdict(replace(self.fleet.options, lot=None, prior=None)) | (
@@ -46,15 +71,15 @@ class Task:
 
 
 def done_before(task: Task) -> FleetEntry | None:
-    """The entry of an earlier call that still holds; None if the job must be done.
+    """The entry of an earlier call that still holds; None if the job must be done, or the task has no key.
 
     It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
     """
     try:
-        entry = None if task.unit.refused else kept_entry(task.out, task.key())
+        entry = kept_entry(task.out, task.key) if task.key and not task.unit.refused else None
     except OSError:
         return None
-    now = {"name": task.unit.name, "dataset": _shown(task), "axis": task.unit.axis}
+    now = {"name": task.unit.name, "dataset": task.shown, "axis": task.unit.axis}
     return entry and entry.model_copy(update=now)
 
 
@@ -64,7 +89,8 @@ def do_unit(task: Task) -> FleetEntry:
         if task.unit.refused:
             raise InputError(task.unit.name, task.unit.refused)
         if task.program != program_of():
-            raise CheckFailed("the gyrotc of this worker is not the one that asks")
+            found = f"is not the one that asks (program {program_of()[:16]}, not {task.program[:16]})"
+            raise InputError(f"the gyrotc of worker {_worker()}", found, "the same gyrotc everywhere")
         return _built(task)
     except GyrotcError as error:
         return failed(task, str(error))
@@ -72,6 +98,15 @@ def do_unit(task: Task) -> FleetEntry:
         return failed(task, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:  # a fault of the program itself must not stop the other serials either
         return failed(task, f"{type(error).__name__}: {error}")
+
+
+def _worker() -> str:
+    """Name of this process: as Dask calls it where it is a worker."""
+    distributed = sys.modules.get("distributed")
+    if distributed is not None:
+        with suppress(ValueError):  # no worker, though Dask is there
+            return str(distributed.get_worker().name)
+    return f"{socket.gethostname()}, process {os.getpid()}"
 
 
 def failed(task: Task, reason: str) -> FleetEntry:
@@ -82,20 +117,21 @@ def failed(task: Task, reason: str) -> FleetEntry:
         stays = ""
     return FleetEntry(
         name=task.unit.name,
-        dataset=_shown(task),
+        dataset=task.shown,
         axis=task.unit.axis,
         status="failed",
         reason=printable(reason) + stays,
     )
 
 
-def _shown(task: Task) -> str:
-    return printable(str(task.unit.dataset))
-
-
 def _built(task: Task) -> FleetEntry:
     """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
-    key = task.key()
+    key = task.found()
+    if task.key not in ("", key):
+        found = f"is {key[:16]} on worker {_worker()}, and {task.key[:16]} where the fleet was started"
+        raise InputError(
+            f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere"
+        )
     dataset = load(task.unit.dataset, axis=task.unit.axis)
     aside = set_aside(task.out)
     runs: list[tuple[str, Averages]] = []
@@ -111,7 +147,7 @@ def _built(task: Task) -> FleetEntry:
             compiled=task.full,
             watch=lambda run, averages: runs.append((run.file, averages)),
         )
-        if task.key() != key:
+        if task.found() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
         entry = _entry_of(task, key, dataset, built, runs)
         write_entry(stage.folder, entry)
@@ -127,7 +163,7 @@ def _entry_of(  # long: a field a line
     held = built.limits
     entry = FleetEntry(
         name=task.unit.name,
-        dataset=_shown(task),
+        dataset=task.shown,
         axis=task.unit.axis,
         status="failed" if built.failures else "done",
         serial=dataset.serial,
