@@ -98,6 +98,7 @@ def test_a_table_with_uncertainties_is_the_model(uncertain: Path) -> None:
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("word", [0, 45, 80, 81, 89, 90])
+@pytest.mark.slow
 def test_seeded_fault_in_the_uncertainty_is_seen(
     word: int, numeric: str, tmp_path: Path, few_vectors: None
 ) -> None:
@@ -284,6 +285,7 @@ def test_seeded_fault_of_quantisation_is_seen(
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("name", EXTENDED_FAULTS)
+@pytest.mark.slow
 def test_seeded_fault_in_terms_or_bank_is_seen(
     name: str, numeric: str, tmp_path: Path, few_vectors: None
 ) -> None:

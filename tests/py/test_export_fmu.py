@@ -18,11 +18,12 @@ import pytest
 from conftest import ROOT, Command
 from emitted import emitted
 from gyrotc.emit import example_period_us
-from gyrotc.errors import CheckFailed
+from gyrotc.errors import CheckFailed, InputError
 from gyrotc.frontend import samples_per_block
 from gyrotc.jobs.axes import joint_texts
 from gyrotc.jobs.export import export
 from gyrotc.model import Model, load_model
+from gyrotc.outputs import MARKER
 from gyrotc.quantise import quantise
 from gyrotc.quantise.terms import channel_names
 from gyrotc.reference import Replay, replay
@@ -261,6 +262,9 @@ def test_the_same_result_gives_the_same_bytes_and_a_changed_one_none(plain: Path
     shutil.copytree(plain, tmp_path / "r")
     with next((tmp_path / "r" / "c").glob("gtc_*.c")).open("a") as stream:
         stream.write("/* changed */\n")
+    with pytest.raises(InputError, match="is not as gyrotc wrote it"):
+        export(tmp_path / "r", "fmu", tmp_path / "other.fmu")
+    (tmp_path / "r" / MARKER).unlink()
     with pytest.raises(CheckFailed, match="not exported"):
         export(tmp_path / "r", "fmu", tmp_path / "other.fmu")
     assert not (tmp_path / "other.fmu").exists()

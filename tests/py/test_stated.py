@@ -312,3 +312,23 @@ def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None
     (folder / "changes.json").write_text("{}")
     with pytest.raises(InputError, match=r"changes\.json: was not written by gyrotc"):
         unit_of(folder)
+
+
+def test_verifying_a_signature_refuses_what_the_marker_does_not_know(
+    passing: Path,
+    tmp_path: Path,
+    key: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder, public = shutil.copytree(passing, tmp_path / "out"), key.with_suffix(".pub")
+    assert _status(monkeypatch, "sign", folder, "--key", key) == 0
+    _passed(folder)
+    capsys.readouterr()
+    assert _status(monkeypatch, "verify", folder, "--signature", public) == 2
+    told = capsys.readouterr().err
+    assert "budget.json: is not as gyrotc wrote it" in told and len(told.splitlines()) == 1
+    for name in (MARKER, "verify.json"):  # as an archive may come: the signature alone says it
+        (folder / name).unlink()
+    assert _status(monkeypatch, "verify", folder, "--target", "host-gcc-O2", "--signature", public) == 1
+    assert "limits.json is not what was signed" in capsys.readouterr().out

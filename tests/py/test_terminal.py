@@ -177,6 +177,7 @@ def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
         assert (done.returncode, "of a library" in done.stderr) == (0, shown)
 
 
+@pytest.mark.slow
 def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
     wide = []
     for words in ([], *([name] for name in ("build", "export", "fleet", "diagnose", "import"))):

@@ -9,7 +9,7 @@ import typer
 
 from .. import __version__
 from ..errors import CheckFailed, InputError
-from ..outputs import check_intact, json_text, result_folder, write_atomically
+from ..outputs import json_text, result_folder, write_atomically
 from .base import (
     ERR,
     AgeingOption,
@@ -185,7 +185,6 @@ def verify(  # long: the parts of a command in the order in which they are print
     from ..dataset import load
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
-    from ..results.release import STATED
     from ..results.verification import JointVerification, Verification
     from ..verify import verify as run
 
@@ -196,8 +195,6 @@ def verify(  # long: the parts of a command in the order in which they are print
     results = {}
     with progress(VERIFY) as say:
         for part in [folder / axis for axis in axes] or [folder]:
-            if signature is not None:
-                check_intact(part, STATED, needed=False)
             axis = load_model(part / "model.json").axis
             recordings = load(dataset, axis=axis, trust_units=trust_units) if dataset else None
             with result_folder(part, "verify", entries=("verify.json",)) as stage:

@@ -21,7 +21,9 @@ from ..emit import emit_texts, expected_answers
 from ..emit.vectors import Vectors, make_vectors
 from ..errors import InputError
 from ..model import Model, load_model
+from ..outputs import check_intact
 from ..results.base import read_optional
+from ..results.release import STATED
 from ..results.verification import (
     EmittedWith,
     MapError,
@@ -83,6 +85,8 @@ def verify(  # long: the order of the checks, then one line for each field of th
     say = progress or (lambda _: None)
     _check_edited(edited)
     key = load_public_key(signature) if signature is not None else None
+    if key is not None:
+        check_intact(folder, STATED, needed=False)
     model = load_model(folder / "model.json")
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
     say("comparing files")
