@@ -146,6 +146,10 @@ lot: setup
 uncertainty: setup
 	@$(PYTHON) -m bench.budget docs
 
+## every result of the generator as in tests/oracle/reference.json? minutes (GYROTC_REAL_DATA names measured recordings)
+oracle: setup
+	@$(PYTHON) -m tests.oracle --real "$$SET_REAL"
+
 ## what channels gain on simulated gyros, beside other methods (in build/bench, minutes a gyro): docs/results-channels.md
 signals:
 	@tools/setup.sh test
@@ -217,4 +221,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants blind blind-other odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo formats test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other odd cycles packages dist release lock offline site clean
