@@ -66,7 +66,8 @@ class Reference:
             if path not in known or path not in values:
                 yield f"{path}: only in {'the reference' if path in known else 'this run'}"
             elif known[path] != (now := _hash(values[path])):
-                yield f"{path}: {known[path]} -> {now}, {_shown(values[path])}"
+                value = json.dumps(values[path], ensure_ascii=False)
+                yield f"{path}: {known[path]} -> {now}" + f", {value}" * (len(value) <= _LONGEST)
 
     def enter(self, name: str, outcomes: Mapping[str, Mapping[str, Any]]) -> None:
         """Replaces a set."""

@@ -15,7 +15,7 @@ DROPPED = {
     "gyrotc_version": "changes with each release, not with a result",
     "versions": "of Python, of libraries and of compilers on this machine",
     "program": "a hash of gyrotc's source files, which every refactoring changes",
-    "fingerprint": "holds the same hash",
+    "key": "of a unit of a fleet: a hash of all that its result depends on, gyrotc's source files among it",
     "seconds": "how long training took here",
     "compiler": "name and version of the compiler on this machine",
     "rom_bytes": "decided by the compiler",
@@ -34,10 +34,19 @@ UNREAD = {
     ".png": "likewise",
     ".sqlite": "the order of rows and pages is SQLite's; `gyrotc catalogue` says what is in it",
 }
-#: Parts of a page that are left out, with the reason.
+#: What replaces parts of pages and certificates, with the reason.
 OF_PAGES = (
     (re.compile(r"<svg.*?</svg>", re.DOTALL), "<svg/>"),  # drawn by matplotlib
     (re.compile(r"data:image/[^\"')]*"), "data:image"),  # likewise
+    (
+        re.compile(r'(<td class="pass">pass</td>).*'),
+        r"\1",
+    ),  # version of the compiler, code and stack that it made
+    (re.compile(r"(<td>made with</td>).*"), r"\1"),  # versions of Python and of libraries
+    (
+        re.compile(r'(program</th><td class="mono">|program SHA-256 )\w+'),
+        r"\1",
+    ),  # changes with every refactoring
 )
 
 
@@ -59,7 +68,7 @@ def content_of(path: Path) -> Any:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         return f"{len(data)} bytes {digest_of(data)}"
-    if path.suffix == ".html":
+    if path.suffix in (".html", ".xml"):
         for pattern, replacement in OF_PAGES:
             text = pattern.sub(replacement, text)
     return text.split("\n")

@@ -114,7 +114,7 @@ def _paper(s: Steps) -> None:
     s.run("diagnose", "data", "--out", "diagnosis")
     s.run("plan", "paper", "--out", "plan", "--add-thermometer", "--separate", "hysteresis,turn_on_offset")
     s.run("plan", "paper", "--require", "hysteresis=5e-5", "--json", "plan.json", name="plan to a limit")
-    s.run("compare", "data", "--out", "comparison")
+    s.run("compare", "data", "--out", "comparison", "--quiet")  # it prints how long training took
     s.run(
         "emit",
         "result/model.json",
