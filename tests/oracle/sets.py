@@ -380,6 +380,20 @@ def _events(s: Steps) -> None:
     )
 
 
+def _graded(s: Steps) -> None:
+    """Outliers of 3 to 12 times the noise of a row, so that no limit between can move without a changed result."""
+
+    def make(folder: Path) -> None:
+        for k in range(3):
+            run = _long(k + 1)
+            run["rate_dph"][5::29] += 2.2e-3 * np.linspace(3.0, 12.0, run["rate_dph"][5::29].size)
+            write_csv(folder / "data" / f"{k}.csv", run)
+
+    s.write(make)
+    s.run("check", "data", "--json", "check.json")
+    s.run("fit", "data", "--out", "result")
+
+
 def _axes(s: Steps) -> None:
     """Three axes in one file, two of them exchanged in one run."""
 
@@ -483,6 +497,7 @@ SETS: dict[str, RecordingSet] = {
     "pulses": RecordingSet(_pulses),
     "mpu6050-isothermal": _measured("mpu6050-isothermal", "z", "fit", "diagnose"),
     "pan-lsm6dsm-cold": _measured("pan-lsm6dsm-cold", "x", "fit", "diagnose"),
+    "graded": RecordingSet(_graded),
     "imported": RecordingSet(_imported),
     "accepted": RecordingSet(_accepted),
     "refused": RecordingSet(_refused),
