@@ -99,6 +99,7 @@ def _environment(scratch: Path) -> dict[str, str]:
     return fixed | {
         "PATH": str(scratch / "bin"),
         "XDG_CACHE_HOME": str(scratch / "cache"),  # what was kept of earlier diagnoses would hide a change
+        "XDG_STATE_HOME": str(scratch / "state"),  # reports of internal faults
         "COLUMNS": "200",
         "NO_COLOR": "1",
         "PYTHONWARNINGS": "ignore",
