@@ -17,6 +17,7 @@ DROPPED = {
     "program": "a hash of gyrotc's source files, which every refactoring changes",
     "key": "of a unit of a fleet: a hash of all that its result depends on, gyrotc's source files among it",
     "seconds": "how long training took here",
+    "train_s": "likewise",
     "compiler": "name and version of the compiler on this machine",
     "rom_bytes": "decided by the compiler",
     "ram_bytes": "decided by the compiler",
