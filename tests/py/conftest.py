@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest import mock
 
 import pytest
 
@@ -47,7 +48,12 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
 
     words, out, err = [str(a) for a in args], io.StringIO(), io.StringIO()
     before = Path.cwd()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(),
+        mock.patch.dict(os.environ),  # --max is set for the rest of a process
+    ):
         warnings.simplefilter(
             "ignore"
         )  # as the program does; those of our own code fail the tests of that code
