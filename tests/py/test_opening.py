@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from gyrotc import cli
+from conftest import ROOT, run_gyrotc
 from gyrotc.errors import InputError
 from gyrotc.outputs import Lock, write_atomically
 from recordings import columns, toml, write_csv
 
-PACKAGE = Path(cli.__file__).parent
+PACKAGE = ROOT / "gen" / "gyrotc"
 YEARS = b"years of work\n"
 MADE = ".gyrotc-part-"  # in names of folders that a job has just made: nobody can know them before
 
@@ -57,12 +57,10 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def status(*arguments: str) -> int:
-    """Exit status of a command in this process."""
-    before, sys.argv = sys.argv, ["gyrotc", *arguments]
-    try:
-        return cli._status()
-    finally:
-        sys.argv = before
+    """Exit status of a command, with its errors printed."""
+    done = run_gyrotc(*arguments)
+    print(done.stderr, end="", file=sys.stderr)
+    return done.returncode
 
 
 COMMANDS = {

@@ -8,12 +8,13 @@ import json
 import random
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from gyrotc import cli
+from conftest import run_gyrotc
 from gyrotc.dataset import load
 from gyrotc.errors import GyrotcError, InputError
 from gyrotc.jobs.build import build_into
@@ -90,9 +91,12 @@ def paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(printing, "_BROWSERS", ())
 
 
-def _status(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    monkeypatch.setattr("sys.argv", ["gyrotc", *map(str, arguments)])
-    return cli._status()
+def _status(*arguments: str | Path) -> int:
+    """Exit status of a command, with what it prints."""
+    done = run_gyrotc(*arguments)
+    print(done.stdout, end="")
+    print(done.stderr, end="", file=sys.stderr)
+    return done.returncode
 
 
 def _edit(path: Path, change: dict[str, Any]) -> None:
@@ -135,7 +139,7 @@ def test_a_fail_that_was_edited_into_a_pass_is_refused(
         ("certificate", folder, "--draft", "--out", tmp_path / "C"),
         ("sign", folder, "--key", key),
     ):
-        assert _status(monkeypatch, *command) == 2
+        assert _status(*command) == 2
         told = capsys.readouterr().err
         assert len(told.splitlines()) == 1 and ("limits.json" in told or "budget.json" in told), told
     assert not (tmp_path / "C").exists() and not (folder / "c" / "release.json").exists()
@@ -165,14 +169,14 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
 ) -> None:  # fmt: skip
     """Before: `sign` signed a result that said FAIL, and no verdict was among what it signed."""
     folder, reason = shutil.copytree(failing, tmp_path / "out"), "bench unit, not for flight"
-    assert _status(monkeypatch, "sign", folder, "--key", key) == 2
+    assert _status("sign", folder, "--key", key) == 2
     told = capsys.readouterr().err
     assert "its verdict is FAIL (" in told and "--accept-fail REASON" in told and len(told.splitlines()) == 1
     with pytest.raises(InputError, match="its verdict is FAIL"):
         certificate(folder, tmp_path / "C", draft=True)
     with pytest.raises(InputError, match="a reason"):
         release_of(folder, " \n")
-    assert _status(monkeypatch, "sign", folder, "--key", key, "--accept-fail", reason) == 0
+    assert _status("sign", folder, "--key", key, "--accept-fail", reason) == 0
     release = json.loads((folder / "c" / "release.json").read_text())
     assert (release["verdict"], release["accepted_fail"]) == ("FAIL", reason)
     [unit] = release["units"]
@@ -184,7 +188,7 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
     assert f"Released although the verdict is FAIL:</b> {reason}" in page
     public = key.with_suffix(".pub")
     capsys.readouterr()
-    assert _status(monkeypatch, "verify", folder, "--target", "host-gcc-O2", "--signature", public) == 0
+    assert _status("verify", folder, "--target", "host-gcc-O2", "--signature", public) == 0
     assert f"released: FAIL, accepted: {reason}; valid until 2027-03-07" in capsys.readouterr().out
 
 
@@ -209,16 +213,16 @@ def test_no_limits_are_no_pass(
     certificate(folder, tmp_path / "C", draft=True)
     page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
     assert "No limits were given" in page and "PASS" not in page
-    assert _status(monkeypatch, "report", folder) == 0
+    assert _status("report", folder) == 0
     assert "<strong>No verdict</strong>" in (folder / "report.html").read_text("utf-8")
     [(_, release)] = release_of(folder)
     assert release.verdict is None
     (tmp_path / "fleet.toml").write_text('schema = 1\ndatasets = ["RLG-1"]\nlimits = "limits.toml"\n')
-    assert _status(monkeypatch, "fleet", tmp_path / "fleet.toml", "--out", tmp_path / "F", "--jobs", "1") == 0
+    assert _status("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "F", "--jobs", "1") == 0
     [entry] = json.loads((tmp_path / "F" / "fleet.json").read_text())["serials"]
     assert entry["verdict"] is None and entry["limits_held"] is None
     capsys.readouterr()
-    assert _status(monkeypatch, "catalogue", tmp_path / "F", "RLG-1", "--on", "2026-04-01") == 0
+    assert _status("catalogue", tmp_path / "F", "RLG-1", "--on", "2026-04-01") == 0
     assert "PASS" not in capsys.readouterr().out
 
 
@@ -322,13 +326,13 @@ def test_verifying_a_signature_refuses_what_the_marker_does_not_know(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     folder, public = shutil.copytree(passing, tmp_path / "out"), key.with_suffix(".pub")
-    assert _status(monkeypatch, "sign", folder, "--key", key) == 0
+    assert _status("sign", folder, "--key", key) == 0
     _passed(folder)
     capsys.readouterr()
-    assert _status(monkeypatch, "verify", folder, "--signature", public) == 2
+    assert _status("verify", folder, "--signature", public) == 2
     told = capsys.readouterr().err
     assert "budget.json: is not as gyrotc wrote it" in told and len(told.splitlines()) == 1
     for name in (MARKER, "verify.json"):  # as an archive may come: the signature alone says it
         (folder / name).unlink()
-    assert _status(monkeypatch, "verify", folder, "--target", "host-gcc-O2", "--signature", public) == 1
+    assert _status("verify", folder, "--target", "host-gcc-O2", "--signature", public) == 1
     assert "limits.json is not what was signed" in capsys.readouterr().out

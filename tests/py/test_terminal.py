@@ -169,7 +169,9 @@ def test_ctrl_c_before_anything_is_begun_is_silent() -> None:
 
 
 def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
-    code = "import warnings, gyrotc.cli as c; c._status = lambda: (warnings.warn('of a library'), 0)[1]; c.main()"
+    code = (
+        "import warnings, gyrotc.cli as c; c.run = lambda _: (warnings.warn('of a library'), 0)[1]; c.main()"
+    )
     plain = os.environ | {"PYTHONWARNINGS": ""}
     for options, shown in (((), False), (("-W", "default"), True)):
         command = [sys.executable, *options, "-c", code]

@@ -22,6 +22,7 @@ from ..results.training import Training
 from ..results.verification import Verification, VerifiedTarget
 from .budget import budget_of
 from .limits import Limits, held_against
+from .stated import AGEING
 
 __all__ = ["check_budget", "check_figures", "check_limits"]
 
@@ -124,7 +125,7 @@ def check_budget(
     if training is None:
         raise InputError(where, "stands without training.json", _EXPECTED)
     drift = next(
-        (one for one in budget.contributions if one.id == "ageing" and one.distribution == "rectangular"),
+        (one for one in budget.contributions if one.id == AGEING and one.distribution == "rectangular"),
         None,
     )
     stated = {"drift_dph_per_year": drift.standard_uncertainty * math.sqrt(3.0)} if drift else {}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from datetime import date
 from itertools import pairwise
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from ..results.verification import Verification
 from .limits import Limits
 
 __all__ = [
-    "DAYS_A_YEAR", "Known", "ageing", "arithmetic", "combined", "part", "reference", "thermometer", "yearly_drifts",
+    "AGEING", "DAYS_A_YEAR", "Known", "ageing", "arithmetic", "combined", "part", "reference", "thermometer",
+    "yearly_drifts",
 ]  # fmt: skip
 
 _STEP = 0.01  # of the range of temperatures, for the map's gradient
 DAYS_A_YEAR = 365.25  # the Julian year
+AGEING: Final = "ageing"  # the contribution of that name
 Known = tuple[float, float | None]
 """A contribution, deg/h, and its degrees of freedom (None: many)."""
 
@@ -145,7 +147,7 @@ def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str
     years = interval.days / DAYS_A_YEAR
     if interval.drift_dph_per_year is not None:
         return part(
-            "ageing",
+            AGEING,
             f"drift of the bias to the end of {interval.days:g} days",
             interval.drift_dph_per_year / math.sqrt(3.0),
             "largest drift of the type, as the limits file states it",
@@ -157,7 +159,7 @@ def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str
     if not drifts:
         return "ageing: neither a drift of the type nor an earlier calibration with its date is known"
     return part(
-        "ageing",
+        AGEING,
         f"drift of the bias to the end of {interval.days:g} days",
         math.sqrt(math.fsum(d**2 for d in drifts) / len(drifts)),
         f"{len(drifts) + 1} calibrations",
