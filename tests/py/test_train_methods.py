@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gyrotc.model import Model
-from gyrotc.train import SIZE_RULES, fit, predict
+from gyrotc.train import SIZE_RULES, TrainingData, fit, predict
+from numpy.typing import NDArray
 from training_data import NOISE_DPH, rms, samples, true_bias
 
 
@@ -68,20 +71,74 @@ def test_candidates_are_what_the_method_says() -> None:
     assert len(np.unique(np.round(r, 6))) <= 13
 
 
-def test_linear_regression_takes_constant_t_and_rate_first() -> None:
-    found = fit(samples(4), method="mlr")
+def with_bias(seed: int, bias_dph: NDArray[np.float64]) -> TrainingData:
+    return replace(samples(seed), bias_dph=bias_dph)
+
+
+@pytest.mark.parametrize(
+    ("of_t", "of_r", "kept"),
+    [
+        (0.0, 0.0, [[0, 0]]),
+        (5e-4, 0.0, [[0, 0], [1, 0]]),
+        (0.0, 5e-4, [[0, 0], [0, 1]]),
+        (5e-4, 5e-4, [[0, 0], [1, 0], [0, 1]]),
+    ],
+)
+def test_linear_regression_drops_what_does_nothing(of_t: float, of_r: float, kept: list[list[int]]) -> None:
+    """Of ten draws of the noise at most one keeps a variable without effect, all keep one with an effect."""
+    found = []
+    for seed in range(10):
+        data = samples(seed)
+        noise = data.bias_dph - true_bias(data.temperature_c, data.slope_c_per_min)
+        t, r = (data.temperature_c - 10.0) / 50.0, data.slope_c_per_min / 4.0
+        fitted = fit(with_bias(seed, 7e-3 + of_t * t + of_r * r + noise), method="mlr")
+        found.append(fitted.curves["powers"])
+        assert np.all(np.diff(fitted.curves["bic"]) < 0.0)
+        assert fitted.n_centers == 0
+        assert fitted.table_bytes == 24
+        for used, weight in zip(([1, 0], [0, 1]), fitted.networks[0]["linear"], strict=True):
+            assert (weight != 0.0) == (used in fitted.curves["powers"])
+    assert found.count(kept) >= 9, found
+
+
+def test_linear_regression_minimises_bic_over_its_subsets() -> None:
+    """Against least squares of every subset in plain numpy, on means over 100 s."""
+    for seed in range(5):
+        data = samples(seed)
+        fitted = fit(data, method="mlr")
+        n = len(data) // 10
+        t, r, y = (
+            x.reshape(n, 10).mean(axis=1) for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph)
+        )
+        bic = []
+        for columns in ([], [t], [r], [t, r]):
+            x = np.column_stack([np.ones(n), *columns])
+            rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+            bic.append(n * np.log(rest @ rest / n) + x.shape[1] * np.log(n))
+        assert fitted.curves["bic"][-1] == pytest.approx(min(bic), rel=1e-9)
+
+
+def test_products_of_powers_join_a_plane_while_bic_falls() -> None:
+    found = fit(samples(4), method="poly_slope")
     assert found.curves["powers"][:3] == [[0, 0], [1, 0], [0, 1]]
+    assert len(found.curves["powers"]) > 3
     assert np.all(np.diff(found.curves["bic"]) < 0.0)
     assert found.n_centers == 0
+
+
+def test_a_product_of_powers_is_found_exactly() -> None:
+    data = samples(5)
+    t, r = (data.temperature_c - 10.0) / 50.0, data.slope_c_per_min / 4.0
+    truth = 1e-3 + 2e-3 * t * r - 1e-3 * r**3
+    found = fit(with_bias(5, truth), method="poly_slope")
+    assert rms(predict(found, data.temperature_c, data.slope_c_per_min) - truth) < 1e-6
 
 
 def test_a_polynomial_is_found_exactly() -> None:
     data = samples(5)
     z = (data.temperature_c - 10.0) / 50.0
     truth = 1e-3 + 2e-3 * z - 1e-3 * z**3
-    found = fit(
-        type(data)(**{**{k: getattr(data, k) for k in data.__slots__}, "bias_dph": truth}), method="poly"
-    )
+    found = fit(with_bias(5, truth), method="poly")
     value = predict(found, data.temperature_c, data.slope_c_per_min)
     assert rms(value - truth) < 1e-6
 

@@ -64,7 +64,7 @@ def quantise_all(
         InputError: An unknown arithmetic, or a method that has no table.
         CheckFailed: An arithmetic asked for by name is refused, or none remains.
     """
-    if model.method in ("mlr", "poly"):
+    if model.method in ("poly", "poly_slope"):
         raise InputError(
             "model.json, field method", f"{model.method!r} is for comparison only", "a network (mrbf, ...)"
         )

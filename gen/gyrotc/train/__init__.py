@@ -12,12 +12,12 @@ from ..metrics import LEAST_SPAN_C
 from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
-from .linear import fit_mlr, fit_poly
+from .linear import fit_mlr, fit_poly, fit_poly_slope
 from .lot.earlier import EarlierPrior, fit_with_earlier
 from .lot.prior import LotPrior
 from .lot.use import Given, fit_with_lot
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .ols import SIZE_RULES, fit_ols
+from .ols import RIDGE, SIZE_RULES, fit_ols
 from .process import TrainingFailed
 from .residual_noise import floor_dph
 from .result import Fit, Outcome, network, predict
@@ -38,16 +38,18 @@ __all__ = [
     "coverage",
     "fit",
     "predict",
+    "trained",
     "uncertainty",
 ]
 
-METHODS = ("mlr", "poly", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
-NETWORK_METHODS = (*SIMPLE, "mrbf_t", *METHODS[2:])
+METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
+NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
 """Those whose map is networks alone, so that a table can hold it."""
 AUTO = "auto"
 """The ladder: the simplest correction that does on unseen history what the best one does."""
 _MAX_CENTERS = 512  # what a table holds: docs/FORMAT.md, "Legal ranges"
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
+_POLYNOMIALS = {"mlr": fit_mlr, "poly": fit_poly, "poly_slope": fit_poly_slope}
 _GUARDED = ("mrbf", "mrbf_t")
 
 
@@ -111,7 +113,9 @@ def fit(
         method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
         findings += found.findings
     else:
-        outcome = _trainer(method, seed, centers, rho, size_rule, average_s)(samples, scaling)
+        outcome = trained(
+            method, samples, scaling, seed=seed, centers=centers, rho=rho, size_rule=size_rule, average_s=average_s
+        )  # fmt: skip
         against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
         if against:
             findings.append(_beyond(method, against))
@@ -155,19 +159,34 @@ def _check(method: str, centers: int | None, rho: float | None, average_s: float
         raise InputError("average_s", repr(average_s), "a number of seconds above 0")
 
 
-def _trainer(
-    method: str, seed: int, centers: int | None, rho: float | None, size_rule: str | None, average_s: float
-) -> Callable[[TrainingData, Scaling], Outcome]:
-    if method == "mlr":
-        return lambda data, scaling: fit_mlr(data, scaling, average_s)
-    if method == "poly":
-        return lambda data, scaling: fit_poly(data, scaling, average_s)
+def trained(
+    method: str,
+    data: TrainingData,
+    scaling: Scaling,
+    *,
+    seed: int = 0,
+    centers: int | None = None,
+    rho: float | None = None,
+    size_rule: str | None = None,
+    average_s: float = 100.0,
+    ridge: float = RIDGE,
+) -> Outcome:
+    """What one method makes of cleaned samples, whatever they tell about temperature; arguments as those of `fit`.
+
+    Args:
+        ridge: For the methods by orthogonal least squares, as `fit_ols` takes it.
+
+    Raises:
+        InputError: A size rule that does not exist.
+        TrainingFailed: The equations cannot be solved.
+    """
+    if method in _POLYNOMIALS:
+        return _POLYNOMIALS[method](data, scaling, average_s)
     if method in SIMPLE:
-        return lambda data, scaling: fit_simple(method, data, scaling, average_s)
+        return fit_simple(method, data, scaling, average_s)
     if method in _MAPS:
-        run = _MAPS[method]
-        return lambda data, scaling: run(data, scaling, seed=seed, centers=centers, average_s=average_s)
-    return lambda data, scaling: fit_ols(
+        return _MAPS[method](data, scaling, seed=seed, centers=centers, average_s=average_s)
+    return fit_ols(
         method,
         data,
         scaling,
@@ -176,6 +195,7 @@ def _trainer(
         rho=rho,
         size_rule=size_rule,
         average_s=average_s,
+        ridge=ridge,
     )
 
 

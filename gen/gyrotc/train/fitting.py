@@ -25,6 +25,7 @@ from ..results.lot import Lot
 from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
 from . import (
     AUTO,
+    METHODS,
     NETWORK_METHODS,
     SIMPLE,
     Fit,
@@ -166,8 +167,9 @@ def fit_dataset(
         InputError: No training run, too few usable samples, or a method whose map is no network.
     """
     if options.method not in (AUTO, *NETWORK_METHODS):
+        others = ", ".join(method for method in METHODS if method not in NETWORK_METHODS)
         expected = (
-            f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows mlr and poly beside them)"
+            f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows {others} beside them)"
         )
         raise InputError("--method", repr(options.method), expected)
     if options.lot is not None and options.lot.axis != dataset.axis:

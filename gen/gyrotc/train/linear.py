@@ -1,4 +1,4 @@
-"""Methods for comparison: multiple linear regression and polynomials in T."""
+"""Multiple linear regression of the paper, and polynomials for comparison."""
 
 from __future__ import annotations
 
@@ -10,33 +10,53 @@ from numpy.typing import NDArray
 from .data import Scaling, TrainingData, average
 from .result import Outcome, network
 
-__all__ = ["fit_mlr", "fit_poly"]
+__all__ = ["fit_mlr", "fit_poly", "fit_poly_slope"]
 
 Floats = NDArray[np.float64]
 Powers = tuple[int, int]
 
-_BASE: tuple[Powers, ...] = ((0, 0), (1, 0), (0, 1))  # powers of T and of dT/dt: a plane
+_PLANE: tuple[Powers, ...] = ((0, 0), (1, 0), (0, 1))  # powers of T and of dT/dt
 # Powers up to the third order together
 _FURTHER: tuple[Powers, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 _HIGHEST_ORDER = 5  # polynomials of higher order swing between the data and beyond
 
 
 def fit_mlr(data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
-    """Constant, T and dT/dt, as in Ding et al. 2014, and further products of powers as long as BIC falls."""
+    """Stepwise regression of Ding et al. 2014, section 4.2: constant, T and dT/dt, less what BIC eliminates.
+
+    The variable without which the criterion is least is dropped as long as the criterion falls. The paper names no
+    further candidates; the constant stays, because dropping it would depend on where the scale of T begins.
+    """
     began = time.process_time()
     means = average(data, average_s)
-    chosen = list(_BASE)
+    chosen = list(_PLANE)
     best, weights = _bic(means, scaling, chosen)
     curve = [best]
-    while True:
-        trials = [(*_bic(means, scaling, [*chosen, p]), p) for p in _FURTHER if p not in chosen]
-        if not trials:
+    while len(chosen) > 1:
+        trials = [(*_bic(means, scaling, [q for q in chosen if q != p]), p) for p in chosen[1:]]
+        bic, fewer, dropped = min(trials, key=lambda trial: trial[0])
+        if bic >= best:
             break
-        bic, more, powers = min(trials, key=lambda trial: trial[0])
+        best, weights = bic, fewer
+        chosen.remove(dropped)
+        curve.append(best)
+    return _outcome(chosen, weights, curve, time.process_time() - began)
+
+
+def fit_poly_slope(data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
+    """Polynomial in T and dT/dt: a plane, and further products of powers up to the third order while BIC falls."""
+    began = time.process_time()
+    means = average(data, average_s)
+    chosen = list(_PLANE)
+    best, weights = _bic(means, scaling, chosen)
+    curve = [best]
+    while len(chosen) < len(_PLANE) + len(_FURTHER):
+        trials = [(*_bic(means, scaling, [*chosen, p]), p) for p in _FURTHER if p not in chosen]
+        bic, more, added = min(trials, key=lambda trial: trial[0])
         if bic >= best:
             break
         best, weights = bic, more
-        chosen.append(powers)
+        chosen.append(added)
         curve.append(best)
     return _outcome(chosen, weights, curve, time.process_time() - began)
 

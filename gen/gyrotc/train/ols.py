@@ -24,7 +24,7 @@ from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
 from .result import Outcome, network
 
-__all__ = ["SIZE_RULES", "fit_ols"]
+__all__ = ["RIDGE", "SIZE_RULES", "fit_ols"]
 
 Floats = NDArray[np.float64]
 Dictionary = Callable[[float], _core.EqualGaussians]
@@ -37,7 +37,7 @@ _MAX_CENTERS = 30  # bounds the time of a fit
 _FOLDS = 5  # the usual five
 _BLOCKS = 20  # of time, four to a fold, so that each fold has all temperatures
 _GUARD_S = 300.0  # three times the averaging: what is left out has no neighbour in training
-_RIDGE = 1e-8  # times all weight: slight, for candidates that nearly coincide (docs/training.md, section 2)
+RIDGE = 1e-8  # times all weight: slight, for candidates that nearly coincide (docs/training.md, section 2)
 _TOLERANCE = 1e-3  # a smaller model whose criterion is worse by this share is preferred
 _EXCESS = 1.02  # of the noise floor: what the default ρ asks for
 
@@ -82,6 +82,7 @@ def fit_ols(
     rho: float | None,
     size_rule: str | None,
     average_s: float,
+    ridge: float = RIDGE,
 ) -> Outcome:
     """Trains `rbf_random`, `mrbf_paper` or `rbf_ols`.
 
@@ -94,6 +95,7 @@ def fit_ols(
         rho: Threshold of eq. (16); None: where the residual reaches the noise that the samples show.
         size_rule: One of `SIZE_RULES`; None: the method's own, or `rho` where `rho` is given.
         average_s: Length of the means, s (the paper's filter: 100 s).
+        ridge: On the weights of the Gaussians, times all weight of the samples; 0: plain least squares.
     """
     began = time.process_time()
     means = average(data, average_s)
@@ -115,7 +117,7 @@ def fit_ols(
     )
     choices = [_choice(problem, dictionary, width) for width in WIDTHS]
     best = min(choices, key=lambda c: c.score)
-    return _outcome(problem, best, choices, scaling, time.process_time() - began)
+    return _outcome(problem, best, choices, scaling, ridge, time.process_time() - began)
 
 
 def _limit(method: str) -> int:
@@ -238,12 +240,17 @@ def _folds(means: TrainingData, rule: str) -> Sequence[tuple[NDArray[np.bool_], 
 
 
 def _outcome(
-    problem: _Problem, best: _Choice, choices: Sequence[_Choice], scaling: Scaling, seconds: float
+    problem: _Problem,
+    best: _Choice,
+    choices: Sequence[_Choice],
+    scaling: Scaling,
+    ridge: float,
+    seconds: float,
 ) -> Outcome:
     places = best.dictionary.centers[np.array(best.path.chosen[1 : best.columns], dtype=np.int64) - 1]
     gaussians = np.concatenate([places, np.full((len(places), 2), best.width)], axis=1)
     total = float(problem.means.weight.sum())
-    weights = _core.least_squares(problem.samples(), gaussians, _RIDGE * total)
+    weights = _core.least_squares(problem.samples(), gaussians, ridge * total)
     order = np.lexsort((places[:, 1], places[:, 0]))
     physical = places * [scaling.half_range_c, scaling.half_range_c_per_min] + [scaling.center_c, 0.0]
     curves = {
