@@ -82,6 +82,7 @@ check:
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
 	@cd gen && ../.venv/bin/mypy gyrotc
 	@$(PYTHON) tools/promises
+	@$(PYTHON) -m gyrotc.paper docs --check
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:

@@ -42,6 +42,13 @@ VariableProjection projection(VectorXd t, VectorXd r, VectorXd weight, VectorXd 
 
 NB_MODULE(_core, m) {
     m.doc() = "C++ core of gyrotc: Kohonen network, evidence model, variable projection.";
+#if defined(__clang__)
+    m.attr("compiler") = __VERSION__;
+#elif defined(__GNUC__)
+    m.attr("compiler") = "GCC " __VERSION__;
+#else
+    m.attr("compiler") = "another";
+#endif
 
     nb::class_<KohonenMap>(m, "KohonenMap")
         .def_ro("nodes", &KohonenMap::nodes)

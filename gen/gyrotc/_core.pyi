@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 
+compiler: str
+"""What the core was compiled with, with its version."""
+
 class KohonenMap:
     nodes: _Floats
     occupancy: _Floats

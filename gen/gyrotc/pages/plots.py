@@ -52,11 +52,13 @@ STYLE: Any = {
 }
 
 
-def svg(figure: Figure) -> Markup:
-    """The figure as an SVG element without prologue, date or fixed size."""
+def svg(figure: Figure, identifier: str | None = None) -> Markup:
+    """The figure as an SVG element without prologue, date or fixed size; `identifier` goes into its metadata."""
     with mpl.rc_context(STYLE):
         stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(
+            stream, format="svg", metadata={"Date": None, "Creator": None, "Identifier": identifier}
+        )
     text = stream.getvalue()
     text = re.sub(
         r"<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL

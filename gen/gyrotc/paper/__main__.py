@@ -1,58 +1,88 @@
-"""`python -m gyrotc.paper docs`: every table and figure of docs/paper.md made again, and the run in simulation.md."""
+"""Every table and figure of docs/paper.md made again, or checked.
+
+python -m gyrotc.paper docs            docs/results/paper.json, the page, its figures, the run in simulation.md
+python -m gyrotc.paper docs --check    the same measured again and compared with what is there; changes nothing
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
+import re
 import sys
-import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..outputs import write_atomically
 from ..simulate import read
-from ..simulate.campaign import Noise, campaign, with_noise
-from .experiment import Experiment, experiment
-from .figures import draw, draw_run
-from .page import filled, gyros_table, scatter_table, table_1, times_table
+from ..simulate.campaign import campaign, with_noise
+from .figures import FIGURES, checksum, draw, draw_run
+from .page import filled, parts
+from .record import SEEDS, departures, measured
 
-_GYROS = range(1, 11)
 _RUN = "5 C/min"
 
 
-def _experiments(noise: Noise) -> list[Experiment]:
-    with tempfile.TemporaryDirectory() as folder:
-        return [experiment(seed, noise, Path(folder) / "data") for seed in _GYROS]
+def record_of(docs: Path) -> dict[str, Any]:
+    """docs/results/paper.json."""
+    found: dict[str, Any] = json.loads((docs / "results" / "paper.json").read_text("utf-8"))
+    return found
 
 
-def _measured(bench: Path) -> list[dict[str, Any]]:
-    """Running times of whole methods that `make bench` has left; none where it was never run."""
-    if not bench.exists():
-        return []
-    tables = json.loads(bench.read_text("utf-8"))["speed"]["learning"]
-    return next(table["rows"] for table in tables if table["scenario"] == "paper")
+def page_of(docs: Path, record: Mapping[str, Any]) -> str:
+    """docs/paper.md with its tables made from the record."""
+    bench = docs / "results" / "bench.json"  # of `make bench`
+    tables = json.loads(bench.read_text("utf-8"))["speed"]["learning"] if bench.exists() else []
+    rows: list[dict[str, Any]] = next((table["rows"] for table in tables if table["scenario"] == "paper"), [])
+    return filled((docs / "paper.md").read_text("utf-8"), parts(record, rows))
 
 
-def _write_paper(page: Path) -> None:
-    paper, ordinary = _experiments("paper"), _experiments("class")
-    parts = {
-        "table-1": table_1(paper[0], published=True),
-        "table-1-class": table_1(ordinary[0], published=False),
-        "gyros": gyros_table({"paper": paper, "class": ordinary}),
-        "scatter": scatter_table(paper[0]),
-        "times": times_table(_measured(page.parent / "results" / "bench.json")),
-    }
-    write_atomically(page, filled(page.read_text("utf-8"), parts))
-    draw(paper[0], page.with_suffix(""))
+def stale(docs: Path) -> Iterator[str]:
+    """What of the page and its figures is not made from the record beside them."""
+    record = record_of(docs)
+    there, made = (docs / "paper.md").read_text("utf-8"), page_of(docs, record)
+    for old, new in zip(there.splitlines(), made.splitlines(), strict=False):
+        if old != new:
+            yield f"{docs / 'paper.md'}: {old!r}; the record gives {new!r}"
+    if there.count("\n") != made.count("\n"):
+        yield f"{docs / 'paper.md'}: {there.count(chr(10))} lines; the record gives {made.count(chr(10))}"
+    for number in FIGURES:
+        path = docs / "paper" / f"figure-{number:02d}.svg"
+        if not path.exists() or checksum(record["series"]) not in path.read_text("utf-8"):
+            yield f"{path}: does not show the series of the record"
 
 
-def main(docs: Path) -> None:
-    """Writes tables into `docs/paper.md`, figures into `docs/paper/`, one run into `docs/simulation/`."""
-    _write_paper(docs / "paper.md")
+def write(docs: Path) -> None:
+    """Writes record, tables, `docs/paper/`, and one run into `docs/simulation/`."""
+    record = measured()
+    text = json.dumps(record, indent=1)
+    text = re.sub(
+        r"\[[^\[\]{}]*\]", lambda found: re.sub(r"\s+", " ", found[0]), text
+    )  # a series is one line
+    write_atomically(docs / "results" / "paper.json", text + "\n")
+    write_atomically(docs / "paper.md", page_of(docs, record))
+    draw(record["series"], docs / "paper")
     plan = with_noise(read("paper-5C-min")[1], "paper")
-    run = next(iter(campaign(plan, _GYROS[0])))
-    draw_run(run, f"Chamber at {_RUN}", docs / "simulation" / "run.svg")
+    draw_run(next(iter(campaign(plan, SEEDS[0]))), f"Chamber at {_RUN}", docs / "simulation" / "run.svg")
     print(f"{docs / 'paper.md'} and the figures beside it")
 
 
+def main() -> int:
+    """0: done, or all is as recorded; 1: something is not."""
+    parser = argparse.ArgumentParser(prog="gyrotc.paper", description=__doc__.splitlines()[0])
+    parser.add_argument("docs", type=Path)
+    parser.add_argument("--check", action="store_true", help="measure again and compare; write nothing")
+    arguments = parser.parse_args()
+    if not arguments.check:
+        write(arguments.docs)
+        return 0
+    wrong = [*stale(arguments.docs), *departures(record_of(arguments.docs), measured())]
+    for line in wrong:
+        print(line, file=sys.stderr)
+    print(f"docs/paper.md: {len(wrong)} departures" if wrong else "docs/paper.md: as measured now")
+    return 1 if wrong else 0
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    sys.exit(main())

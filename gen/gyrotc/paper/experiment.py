@@ -5,33 +5,46 @@ Beside it gyrotc's own way: one model over all environments.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dataset import load
+from ..metrics import average, statistics
 from ..pages.published import ENVIRONMENTS, NEURONS
 from ..simulate import simulate
 from ..simulate.campaign import Noise
 from ..simulate.truth import simulated_floor
-from ..train import Fit, TrainingData, fit, predict
+from ..train import Fit, TrainingData, fit, predict, trained
 from ..train.data import joined, scaling_of
 from ..train.fitting import front_end, samples_of
-from ..train.ols import fit_ols
-from ..train.result import Outcome, network
 
-__all__ = ["AVERAGE_S", "METHODS", "Cell", "Experiment", "PaperGroup", "experiment"]
+__all__ = [
+    "AVERAGE_S",
+    "LITERAL_RHO",
+    "METHODS",
+    "Cell",
+    "Experiment",
+    "PaperGroup",
+    "experiment",
+    "groups_of",
+]
 
 Array = NDArray[np.float64]
 
 AVERAGE_S = 100.0  # the paper's means
+LITERAL_RHO = 3.0e-4  # the paper's "sum of errors", taken as 1 - sum of the error reductions: eq. (16)
 METHODS = {
     "constant": "a constant",
     "mlr": "MLR",
     "rbf_random": "RBFNN, random centers",
+    "rbf_random_plain": "RBFNN, random centers, no ridge",
     "mrbf_paper": "modified RBFNN",
+    "mrbf_paper_literal": "modified RBFNN, ρ = 3.0e-4",
     "mrbf": "gyrotc, one model",
 }
 _BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
@@ -39,11 +52,16 @@ _BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
 
 @dataclass(frozen=True, slots=True)
 class PaperGroup:
-    """One environment: blocks of set 1 and of set 2."""
+    """One environment: blocks of set 1 and of set 2.
+
+    Attributes:
+        exam_begins_s: Where the means of set 2 begin, s: with the run, although its first block has no input yet.
+    """
 
     environment: str
     train: TrainingData
     exam: TrainingData
+    exam_begins_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,54 +69,80 @@ class Cell:
     """What one method makes of one environment: exam means over 100 s, deg/h, and how many centers it took.
 
     Attributes:
-        before, predicted: Measured bias and the model's, shape (n,).
+        before, after: Measured and compensated bias, shape (n,).
         centers: How many the model has that was used here.
+        moved: `after` with the temperature of set 2 moved onto that of set 1, by the difference of their medians.
     """
 
     before: Array
-    predicted: Array
+    after: Array
     centers: int
+    moved: Array
 
     @property
-    def after(self) -> Array:
-        """Compensated bias, deg/h."""
-        return self.before - self.predicted
+    def predicted(self) -> Array:
+        """The model's bias, deg/h."""
+        return self.before - self.after
 
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """All cells by method and environment, and the noise that was really added to the exam runs."""
+    """All cells by method and environment, and the noise that was really added to the exam runs, deg/h."""
 
-    cells: dict[str, dict[str, Cell]]
+    cells: Mapping[str, Mapping[str, Cell]]
     floor_dph: float
 
-    def exam_ratio(self, method: str) -> float:
-        """Pooled RMS after compensation ÷ the noise floor."""
-        after = np.concatenate([cell.after for cell in self.cells[method].values()])
-        return float(np.sqrt(np.mean(after**2)) / self.floor_dph)
+    def figures(self) -> dict[str, Any]:
+        """What docs/results/paper.json has of it: mean, σ and RMS before and after, in deg/h, and centers."""
+        before = {name: _figures(cell.before) for name, cell in self.cells["constant"].items()}
+        after = {
+            method: {
+                name: {
+                    **_figures(cell.after),
+                    "centers": cell.centers,
+                    "moved_rms_dph": _figures(cell.moved)["rms_dph"],
+                }
+                for name, cell in cells.items()
+            }
+            for method, cells in self.cells.items()
+        }
+        return {"floor_dph": self.floor_dph, "before": before, "after": after}
+
+
+def _figures(values: Array) -> dict[str, Any]:
+    found = statistics(values)
+    return {name: found[name] for name in ("mean_dph", "std_dph", "rms_dph")}
 
 
 def experiment(seed: int, noise: Noise, folder: Path) -> Experiment:
     """Simulates the paper's two sets for one gyro into `folder`, trains and judges every method."""
     simulate("paper", seed=seed, out=folder, noise=noise)
-    groups, floor = _groups(folder)
-    cells: dict[str, dict[str, Cell]] = {}
-    for method in ("constant", "mlr", "rbf_random", "mrbf_paper"):
-        cells[method] = {group.environment: _cell(group, _trained(method, group, seed)) for group in groups}
+    groups, floor = groups_of(folder)
     whole = joined([group.train for group in groups])
-    trained = fit(whole, method="mrbf", average_s=AVERAGE_S)
-    cells["mrbf"] = {group.environment: _cell(group, trained) for group in groups}
+    ours = fit(whole, method="mrbf", average_s=AVERAGE_S)
+    cells = {
+        method: {
+            group.environment: _cell(group, ours if method == "mrbf" else _trained(method, group, seed))
+            for group in groups
+        }
+        for method in METHODS
+    }
     return Experiment(cells, floor)
 
 
-def _groups(folder: Path) -> tuple[list[PaperGroup], float]:
+def groups_of(folder: Path) -> tuple[list[PaperGroup], float]:
+    """The environments of a simulated data set in the order of Table 1, and the noise of its exam runs, deg/h."""
     dataset = load(folder)
     front = front_end(dataset.runs, _BLOCK_S)
-    blocks = {
-        (run.environment, run.role): samples_of(front.blocks(run), front.block_s, number)
-        for number, run in enumerate(dataset.runs)
-    }
-    groups = [PaperGroup(name, blocks[name, "train"], blocks[name, "exam"]) for name in ENVIRONMENTS]
+    blocks, begins = {}, {}
+    for number, run in enumerate(dataset.runs):
+        found = front.blocks(run)
+        blocks[run.environment, run.role] = samples_of(found, front.block_s, number)
+        begins[run.environment, run.role] = found.begins_s or 0.0
+    groups = [
+        PaperGroup(name, blocks[name, "train"], blocks[name, "exam"], begins[name, "exam"])
+        for name in ENVIRONMENTS
+    ]
     floor = simulated_floor(folder, [run.file for run in dataset.runs if run.role == "exam"], AVERAGE_S)
     assert floor is not None  # this data set was simulated
     return groups, floor
@@ -108,44 +152,36 @@ def _trained(method: str, group: PaperGroup, seed: int) -> Fit:
     """One model on one environment as the paper does, whatever the temperature tells there."""
     data = group.train
     scaling = scaling_of(data)
-    if method in ("constant", "mlr"):
-        outcome = _least_squares(data, variables=2 if method == "mlr" else 0)
-    else:
-        outcome = fit_ols(
-            method,
-            data,
-            scaling,
-            seed=seed,
-            centers=NEURONS[group.environment] if method == "rbf_random" else None,
-            rho=None,
-            size_rule=None,
-            average_s=AVERAGE_S,
-        )
-    return Fit(method, outcome, scaling, [], 0.0, AVERAGE_S, float(data.bias_dph.mean()))
+    options: dict[str, Any] = {}
+    if method.startswith("rbf_random"):
+        options["centers"] = NEURONS[group.environment]
+    if method == "rbf_random_plain":
+        options["ridge"] = 0.0
+    if method == "mrbf_paper_literal":
+        options["rho"] = LITERAL_RHO
+    name = method.removesuffix("_plain").removesuffix("_literal")
+    outcome = trained(name, data, scaling, seed=seed, average_s=AVERAGE_S, **options)
+    return Fit(name, outcome, scaling, [], 0.0, AVERAGE_S, float(data.bias_dph.mean()))
 
 
-def _least_squares(data: TrainingData, variables: int) -> Outcome:
-    """Constant and, with two variables, T and dT/dt: what the paper's criterion left of its MLR."""
-    inputs = scaling_of(data).normalise(data.temperature_c, data.slope_c_per_min)
-    columns = np.column_stack((np.ones(len(data.bias_dph)), *inputs[:variables]))
-    weights = np.zeros(3)
-    weights[: variables + 1] = np.linalg.lstsq(columns, data.bias_dph, rcond=None)[0]
-    return Outcome(networks=(network(weights[0], (weights[1], weights[2])),), curves={})
+def _cell(group: PaperGroup, fitted: Fit) -> Cell:
+    exam = group.exam
+    offset_c = float(np.median(exam.temperature_c) - np.median(group.train.temperature_c))
+    before, after = _means(group, predict(fitted, exam.temperature_c, exam.slope_c_per_min))
+    _, moved = _means(group, predict(fitted, exam.temperature_c - offset_c, exam.slope_c_per_min))
+    return Cell(before, after, fitted.n_centers, moved)
 
 
-def _cell(group: PaperGroup, trained: Fit) -> Cell:
-    return Cell(
-        before=_means(group.exam, group.exam.bias_dph),
-        predicted=_means(group.exam, _predicted(trained, group.exam)),
-        centers=sum(len(part["centers"]) for part in trained.networks),
+def _means(group: PaperGroup, predicted: Array) -> tuple[Array, Array]:
+    """Measured and compensated bias of set 2 as means over 100 s."""
+    exam = group.exam
+    means = average(
+        exam.time_s,
+        exam.temperature_c,
+        exam.bias_dph,
+        exam.bias_dph - predicted,
+        scored=np.ones(len(exam), dtype=bool),
+        average_s=AVERAGE_S,
+        from_s=group.exam_begins_s,
     )
-
-
-def _predicted(trained: Fit, data: TrainingData) -> Array:
-    return np.asarray(predict(trained, data.temperature_c, data.slope_c_per_min))
-
-
-def _means(data: TrainingData, values: Array) -> Array:
-    """Means over 100 s of blocks that follow one another without gaps."""
-    count = round(AVERAGE_S / float(data.duration_s[0]))
-    return np.asarray(values[: len(values) - len(values) % count].reshape(-1, count).mean(axis=1))
+    return means.before_dph, means.after_dph

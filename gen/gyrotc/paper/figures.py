@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,38 +12,43 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ..outputs import write_atomically
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
 from ..pages.published import ENVIRONMENTS
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
-from .experiment import AVERAGE_S, Cell, Experiment
+from .experiment import AVERAGE_S
 
-__all__ = ["FIGURES", "draw", "draw_run"]
+__all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run"]
 
 _ZOOM = slice(50, 101)
 _CONSTANT, _VARIABLE = ENVIRONMENTS[:3], ENVIRONMENTS[3:]
 
-_Panel = Callable[[Axes, Cell, slice], None]
+Series = Mapping[str, Mapping[str, Sequence[float]]]
+"""Means over 100 s in deg/h by environment: `measured`, and what the model of each method says."""
+_Shown = tuple[NDArray[np.float64], NDArray[np.float64]]  # measured and modelled bias of an environment
+_Panel = Callable[[Axes, _Shown, slice], None]
 
 
-def _measured(ax: Axes, cell: Cell, part: slice) -> None:
-    ax.plot(_samples(cell, part), 1e3 * cell.before[part], color=BEFORE, linewidth=0.7, label="zero bias")
+def _measured(ax: Axes, shown: _Shown, part: slice) -> None:
+    ax.plot(_samples(shown, part), 1e3 * shown[0][part], color=BEFORE, linewidth=0.7, label="zero bias")
 
 
-def _identified(ax: Axes, cell: Cell, part: slice) -> None:
-    _measured(ax, cell, part)
-    ax.plot(_samples(cell, part), 1e3 * cell.predicted[part], color=AFTER, linewidth=1.2, label="model")
+def _identified(ax: Axes, shown: _Shown, part: slice) -> None:
+    _measured(ax, shown, part)
+    ax.plot(_samples(shown, part), 1e3 * shown[1][part], color=AFTER, linewidth=1.2, label="model")
 
 
-def _compensated(ax: Axes, cell: Cell, part: slice) -> None:
+def _compensated(ax: Axes, shown: _Shown, part: slice) -> None:
     ax.axhline(0.0, color="#222222", linewidth=0.6)
-    ax.plot(_samples(cell, part), 1e3 * cell.after[part], color=AFTER, linewidth=0.7, label="compensated")
+    after = 1e3 * (shown[0] - shown[1])[part]
+    ax.plot(_samples(shown, part), after, color=AFTER, linewidth=0.7, label="compensated")
 
 
-def _samples(cell: Cell, part: slice) -> Any:
-    return np.arange(len(cell.before))[part]
+def _samples(shown: _Shown, part: slice) -> Any:
+    return np.arange(len(shown[0]))[part]
 
 
 FIGURES: dict[int, tuple[str, str, _Panel, bool]] = {
@@ -56,20 +63,31 @@ FIGURES: dict[int, tuple[str, str, _Panel, bool]] = {
 """Number in the paper: method, title, what a panel shows, whether samples 50 to 100 are enlarged."""
 
 
-def draw(result: Experiment, folder: Path, numbers: Iterable[int] = tuple(FIGURES)) -> list[Path]:
-    """Writes `figure-05.svg` to `figure-11.svg`, or those of `numbers`, into `folder`."""
+def draw(series: Series, folder: Path, numbers: Iterable[int] = tuple(FIGURES)) -> list[Path]:
+    """Writes `figure-05.svg` to `figure-11.svg`, or those of `numbers`, into `folder`.
+
+    Each has the checksum of the series as its identifier.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for number in numbers:
         path = folder / f"figure-{number:02d}.svg"
-        write_atomically(path, _figure(result, number))
+        write_atomically(path, _figure(series, number))
         written.append(path)
     return written
 
 
-def _figure(result: Experiment, number: int) -> str:
+def checksum(series: Series) -> str:
+    """Which series a figure shows."""
+    return "sha256:" + hashlib.sha256(json.dumps(series, sort_keys=True).encode()).hexdigest()
+
+
+def _figure(series: Series, number: int) -> str:
     method, title, panel, enlarged = FIGURES[number]
-    cells = result.cells[method]
+    cells = {
+        name: (np.array(measured), np.array(series[method][name]))
+        for name, measured in series["measured"].items()
+    }
     whole = slice(None)
     rows = [(_CONSTANT, whole), (_VARIABLE, whole)]
     if enlarged:
@@ -84,14 +102,14 @@ def _figure(result: Experiment, number: int) -> str:
         handles, labels = axes[0][0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=2)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        return svg(figure)
+        return svg(figure, identifier=checksum(series))
 
 
 def _line(
-    axes: Sequence[Axes], letter: str, cells: Sequence[tuple[str, Cell]], panel: _Panel, part: slice
+    axes: Sequence[Axes], letter: str, cells: Sequence[tuple[str, _Shown]], panel: _Panel, part: slice
 ) -> None:
-    for ax, (name, cell) in zip(axes, cells, strict=True):
-        panel(ax, cell, part)
+    for ax, (name, shown) in zip(axes, cells, strict=True):
+        panel(ax, shown, part)
         ax.set_title(f"({letter}) {name}", fontsize=8.5, loc="left")
     axes[0].set_ylabel("1e-3 deg/h")
 

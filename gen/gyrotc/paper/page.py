@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
-from .experiment import METHODS, Cell, Experiment
+from .experiment import METHODS
 
-__all__ = ["filled", "gyros_table", "scatter_table", "table_1", "times_table"]
+__all__ = ["filled", "parts"]
+
+Figures = Mapping[str, Any]
+"""Those of one gyro, as `Experiment.figures` gives them."""
+Gyros = Mapping[str, Mapping[str, Figures]]
+"""By level of noise and seed."""
 
 _Row = Sequence[str]
-_MEASURED = {
-    "mlr": "paper: mlr, with BIC",
-    "rbf_random": "paper: rbf_random",
-    "mrbf_paper": "paper: mrbf_paper",
-    "mrbf": "gyrotc mrbf (default)",
-}
-"""Names in docs/results/bench.json."""
+_MAIN = ("constant", "mlr", "rbf_random", "mrbf_paper", "mrbf")  # the others vary one of them
+_HOLDS = ENVIRONMENTS[:3]
+_CLAIMS = (
+    ("mrbf_paper", "rbf_random"),
+    ("mrbf_paper", "mlr"),
+    ("mrbf_paper", "constant"),
+    ("mlr", "constant"),
+    ("mrbf", "mrbf_paper"),
+    ("mrbf", "mlr"),
+)
+_NOISES = {"paper": "the paper's noise", "class": "an ordinary unit's"}
 
 
 def filled(text: str, parts: Mapping[str, str]) -> str:
@@ -39,79 +48,119 @@ def filled(text: str, parts: Mapping[str, str]) -> str:
     return text
 
 
+def parts(record: Mapping[str, Any], bench: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """All parts of the page.
+
+    Args:
+        record: What docs/results/paper.json holds.
+        bench: Whole methods on one gyro of scenario `paper`, as in docs/results/bench.json; empty: not measured.
+    """
+    gyros: Gyros = record["gyros"]
+    first = {noise: next(iter(of.values())) for noise, of in gyros.items()}
+    samples = len(record["series"]["measured"][ENVIRONMENTS[0]])
+    return {
+        "made": _made(record["made_with"]),
+        "table-1": _table_1(first["paper"], published=True),
+        "table-1-class": _table_1(first["class"], published=False),
+        "gyros": _gyros_table(gyros),
+        "scatter": _scatter_table(first["paper"], samples),
+        "holds": _holds_table(gyros),
+        "claims": _claims_table(gyros),
+        "times": _times(bench),
+    }
+
+
 def _markdown(head: _Row, rows: Sequence[_Row]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+def _made(made: Mapping[str, str]) -> str:
+    return (
+        f"Made with numpy {made['numpy']} and scipy {made['scipy']}, the core compiled by {made['compiler']}, "
+        f"on {made['machine']}."
+    )
 
 
-def table_1(result: Experiment, *, published: bool) -> str:
+def _table_1(figures: Figures, *, published: bool) -> str:
     """Table 1: before, after and improvement in each environment; with the paper's own figures or without."""
+    before, after = figures["before"], figures["after"]
+
+    def row(label: str, value: Callable[[str], str]) -> _Row:
+        return [label, *(value(name) for name in ENVIRONMENTS)]
+
+    def paper(
+        method: str, value: Callable[[str], float], digits: int, label: str = "*paper*"
+    ) -> Iterator[_Row]:
+        if published and (method == "before" or method in AFTER_DPH):
+            yield row(label, lambda name: f"*{value(name):.{digits}f}*")
+
     rows = [
-        _row(result, "before: mean", lambda cell: float(cell.before.mean()), 1e3),
-        _row(result, "before: RMS about zero", lambda cell: _rms(cell.before), 1e3),
+        row("before: mean", lambda name: f"{1e3 * before[name]['mean_dph']:.3f}"),
+        row("before: RMS about zero", lambda name: f"{1e3 * before[name]['rms_dph']:.3f}"),
+        *paper("before", lambda name: 1e3 * BEFORE_DPH[name], 3, '*paper\'s "σ" before*'),
+        row("before: σ about the mean", lambda name: f"{1e3 * before[name]['std_dph']:.3f}"),
     ]
-    if published:
-        rows.append(['*paper\'s "σ" before*', *(f"*{1e3 * BEFORE_DPH[name]:.3f}*" for name in ENVIRONMENTS)])
-    rows.append(_row(result, "before: σ about the mean", lambda cell: float(cell.before.std()), 1e3))
     for method, label in METHODS.items():
-        cells = result.cells[method]
-        rows.append([f"after, {label}", *(f"{1e3 * _rms(cells[name].after):.3f}" for name in ENVIRONMENTS)])
-        if published and method in AFTER_DPH:
-            rows.append(["*paper*", *(f"*{1e3 * AFTER_DPH[method][name]:.3f}*" for name in ENVIRONMENTS)])
-    for method, label in METHODS.items():
-        rows.append([f"improvement, {label}", *(_improvement(result.cells[method][n]) for n in ENVIRONMENTS)])
-        if published and method in AFTER_DPH:
-            ratios = (BEFORE_DPH[name] / AFTER_DPH[method][name] for name in ENVIRONMENTS)
-            rows.append(["*paper*", *(f"*{ratio:.1f}*" for ratio in ratios)])
-    for method, label in METHODS.items():
+        of = after[method]
+        rows.append(row(f"after, {label}", lambda name, of=of: f"{1e3 * of[name]['rms_dph']:.3f}"))  # type: ignore[misc]
+        rows += paper(method, lambda name, m=method: 1e3 * AFTER_DPH[m][name], 3)  # type: ignore[misc]
+    for method in _MAIN:
+        of = after[method]
         rows.append(
-            [f"improvement of σ, {label}", *(_of_sigma(result.cells[method][n]) for n in ENVIRONMENTS)]
+            row(
+                f"improvement, {METHODS[method]}",
+                lambda name, of=of: f"{before[name]['rms_dph'] / of[name]['rms_dph']:.1f}",  # type: ignore[misc]
+            )
         )
-    for method in ("rbf_random", "mrbf_paper", "mrbf"):
-        counts = (str(result.cells[method][name].centers) for name in ENVIRONMENTS)
-        rows.append([f"centers, {METHODS[method]}", *counts])
+        rows += paper(method, lambda name, m=method: BEFORE_DPH[name] / AFTER_DPH[m][name], 1)  # type: ignore[misc]
+    for method in _MAIN:
+        of = after[method]
+        rows.append(
+            row(
+                f"improvement of σ, {METHODS[method]}",
+                lambda name, of=of: f"{before[name]['std_dph'] / of[name]['std_dph']:.2f}",  # type: ignore[misc]
+            )
+        )
+    for method, label in METHODS.items():
+        of = after[method]
+        if any(cell["centers"] for cell in of.values()):
+            rows.append(row(f"centers, {label}", lambda name, of=of: str(of[name]["centers"])))  # type: ignore[misc]
     return _markdown(["1e-3 deg/h", *ENVIRONMENTS], rows)
 
 
-def _row(result: Experiment, label: str, value: Callable[[Cell], float], factor: float) -> _Row:
-    return [label, *(f"{factor * value(result.cells['mlr'][name]):.3f}" for name in ENVIRONMENTS)]
+def _ratio(figures: Figures, method: str) -> float:
+    """RMS after compensation over all environments, which have as many means each, ÷ the noise floor."""
+    squares = [figures["after"][method][name]["rms_dph"] ** 2 for name in ENVIRONMENTS]
+    return math.sqrt(sum(squares) / len(squares)) / float(figures["floor_dph"])
 
 
-def _improvement(cell: Cell) -> str:
-    return f"{_rms(cell.before) / _rms(cell.after):.1f}"
+def _median_worst(values: Sequence[float]) -> str:
+    return f"{np.median(values):.3f}, {max(values):.3f}"
 
 
-def _of_sigma(cell: Cell) -> str:
-    return f"{float(cell.before.std() / cell.after.std()):.2f}"
-
-
-def gyros_table(results: Mapping[str, Sequence[Experiment]]) -> str:
+def _gyros_table(gyros: Gyros) -> str:
     """Exam RMS ÷ noise floor over several gyros, median and worst, for each level of noise."""
-    head = ["RMS after ÷ noise floor", *(f"{noise} noise: median, worst" for noise in results)]
-    rows = []
-    for method, label in METHODS.items():
-        row = [label]
-        for gyros in results.values():
-            ratios = [gyro.exam_ratio(method) for gyro in gyros]
-            row.append(f"{np.median(ratios):.3f}, {max(ratios):.3f}")
-        rows.append(row)
-    floors = [f"{1e3 * float(np.median([g.floor_dph for g in gyros])):.3f}" for gyros in results.values()]
+    rows = [
+        [label, *(_median_worst([_ratio(one, method) for one in of.values()]) for of in gyros.values())]
+        for method, label in METHODS.items()
+    ]
+    floors = [
+        f"{1e3 * float(np.median([one['floor_dph'] for one in of.values()])):.3f}" for of in gyros.values()
+    ]
     rows.append(["noise floor, 1e-3 deg/h", *floors])
-    return _markdown(head, rows)
+    return _markdown(
+        ["RMS after ÷ noise floor", *(f"{_NOISES[noise]}: median, worst" for noise in gyros)], rows
+    )
 
 
-def scatter_table(result: Experiment) -> str:
+def _scatter_table(figures: Figures, samples: int) -> str:
     """How much σ after compensation differs between the environments: ours, the paper's, and by chance."""
-    samples = len(next(iter(result.cells["mlr"].values())).before)
     chance = f"{100.0 / np.sqrt(2.0 * samples):.1f} %"
     rows = []
-    for method in AFTER_DPH:
-        ours = [float(result.cells[method][name].after.std()) for name in ENVIRONMENTS]
-        rows.append([METHODS[method], _scatter(list(AFTER_DPH[method].values())), _scatter(ours), chance])
+    for method, published in AFTER_DPH.items():
+        ours = [figures["after"][method][name]["std_dph"] for name in ENVIRONMENTS]
+        rows.append([METHODS[method], _scatter(list(published.values())), _scatter(ours), chance])
     return _markdown(
         ["spread of σ over the environments", "paper", "here", f"chance, {samples} samples"], rows
     )
@@ -121,16 +170,56 @@ def _scatter(values: Sequence[float]) -> str:
     return f"{100.0 * float(np.std(values, ddof=1) / np.mean(values)):.1f} %"
 
 
-def times_table(measured: Sequence[Mapping[str, Any]]) -> str:
-    """Running times of the training: the paper's, and what `make bench` measured for all six environments.
-
-    Args:
-        measured: Whole methods on one gyro of scenario `paper`, as in docs/results/bench.json.
-    """
-    seconds = {row["name"]: f"{row['seconds']:.3f}" for row in measured if "seconds" in row}
+def _holds_table(gyros: Gyros) -> str:
+    """RMS at constant temperature over what a constant leaves: as recorded, and with set 2 at set 1's temperature."""
     rows = []
-    for method, name in _MEASURED.items():
-        each = RUNNING_S.get(method)
-        paper = f"{min(each.values()):.1f} ... {max(each.values()):.1f} for one environment" if each else "-"
-        rows.append([METHODS[method], paper, seconds.get(name, "-")])
-    return _markdown(["running time, s", "paper", "here, one model over all six"], rows)
+    for method, label in METHODS.items():
+        row = [label]
+        for key in ("rms_dph", "moved_rms_dph"):
+            ratios = [
+                one["after"][method][name][key] / one["after"]["constant"][name]["rms_dph"]
+                for one in gyros["paper"].values()
+                for name in _HOLDS
+            ]
+            row.append(_median_worst(ratios))
+        rows.append(row)
+    return _markdown(
+        [
+            "RMS ÷ that of a constant",
+            "as recorded: median, worst",
+            "at the temperature of set 1: median, worst",
+        ],
+        rows,
+    )
+
+
+def _claims_table(gyros: Gyros) -> str:
+    """Of how many gyros one method leaves less than another, with medians of RMS ÷ noise floor."""
+    rows = []
+    for better, worse in _CLAIMS:
+        row = [f"{METHODS[better]} < {METHODS[worse]}"]
+        for of in gyros.values():
+            pairs = [(_ratio(one, better), _ratio(one, worse)) for one in of.values()]
+            wins = sum(a < b for a, b in pairs)
+            row.append(f"{wins} of {len(pairs)}")
+        rows.append(row)
+    return _markdown(["which leaves less, of all gyros", *(_NOISES[noise] for noise in gyros)], rows)
+
+
+def _times(bench: Sequence[Mapping[str, Any]]) -> str:
+    """Running times in words: the paper's for one environment, `make bench`'s for all six together."""
+    ours = {row["name"]: row.get("seconds") for row in bench}
+    random, modified = ours.get("paper: rbf_random"), ours.get("paper: mrbf_paper")
+    theirs = [sorted(RUNNING_S[method].values()) for method in ("rbf_random", "mrbf_paper")]
+    paper = (
+        f"The paper trains its random network in {theirs[0][0]:.0f} to {theirs[0][-1]:.0f} s for one environment, the "
+        f"modified one in {theirs[1][0]:.0f} to {theirs[1][-1]:.0f} s."
+    )
+    if random is None or modified is None:
+        return f"{paper} `make bench` has not measured ours."
+    verdict = "confirmed" if modified < 0.9 * random else "not confirmed"
+    return (
+        f"{paper} Here one model over all six takes {random:.3f} s and {modified:.3f} s of processor time ([results.md]"
+        f"(results.md)): that the modified network trains faster is {verdict}. Both factorise normal equations, "
+        "whose cost grows with the number of candidates, which is the same; the Kohonen network comes on top."
+    )
