@@ -83,6 +83,7 @@ check:
 	@cd gen && ../.venv/bin/mypy gyrotc
 	@$(PYTHON) tools/promises
 	@$(PYTHON) -m gyrotc.paper docs --check
+	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/test_paper_reference.py
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:

@@ -156,7 +156,7 @@ NB_MODULE(_core, m) {
         "select_columns",
         [](const NormalEquations &dictionary, Eigen::Index max_columns, double rho, double guard, Eigen::Index given,
            bool in_order) { return select_columns(dictionary, {max_columns, rho, guard, given, in_order}); },
-        "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-10, "given"_a = 1,
+        "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-7, "given"_a = 1,
         "in_order"_a = false);
     m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
     m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);

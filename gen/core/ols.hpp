@@ -39,7 +39,8 @@ struct OlsPath {
 struct SelectionRule {
     Eigen::Index max_columns = 31;
     double rho = 0.0;      // ends when 1 - sum of reductions < rho, eq. (16)
-    double guard = 1e-10;  // passes over a candidate whose squared norm orthogonal to the chosen is below this share
+    double guard = 1e-7;   // passes over a candidate whose squared norm orthogonal to the chosen is below this share:
+                           // a million times what interpolated products err by, so that rounding decides nothing
     Eigen::Index given = 1;  // so many leading columns (the constant, w0) are taken first
     bool in_order = false;   // takes the others as they come, too, instead of by largest reduction
 };

@@ -119,7 +119,7 @@ def select_columns(
     max_columns: int,
     *,
     rho: float = 0.0,
-    guard: float = 1e-10,
+    guard: float = 1e-7,
     given: int = 1,
     in_order: bool = False,
 ) -> OlsPath: ...

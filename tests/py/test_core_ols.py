@@ -29,7 +29,7 @@ def design(t: Floats, r: Floats, centers: Floats, width_t: float, width_r: float
     return np.concatenate([np.ones((len(t), 1)), g], axis=1)
 
 
-def textbook_ols(p: Floats, y: Floats, steps: int, guard: float = 1e-10) -> tuple[list[int], list[float]]:
+def textbook_ols(p: Floats, y: Floats, steps: int, guard: float = 1e-7) -> tuple[list[int], list[float]]:
     """Eq. (7) to (15): at each step every candidate is orthogonalised, the largest error reduction is taken."""
     chosen, reductions, basis = [0], [float((p[:, 0] @ y) ** 2 / (p[:, 0] @ p[:, 0]) / (y @ y))], [p[:, 0]]
     while len(chosen) < steps:
