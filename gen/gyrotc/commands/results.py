@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -205,7 +206,10 @@ def _difference_text(file: VerifiedFile) -> str:
 
 
 def summary(result: Evaluation) -> str:
-    """One line that says what was gained; the paper's own figure beside it for the paper's scenario."""
+    """One line that says what was gained: about zero, what of it a constant alone gives, and about the mean.
+
+    The paper's own figure stands beside it for the paper's scenario.
+    """
     found = result.judged()
     if found is None or not found[1].improvement:
         return "no sample to judge by"
@@ -213,13 +217,28 @@ def summary(result: Evaluation) -> str:
     if result.exam:
         simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
         published = simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
-        text = f"improvement {part.improvement:.2f}" + (" (paper: 9.8-10.4)" if published else "")
+        text = f"improvement about zero {part.improvement:.2f}"
+        beside = ["paper: 9.8-10.4"] if published else []
     else:
-        text = f"improvement on spans left out {part.improvement:.2f}"
+        text, beside = f"improvement about zero on spans left out {part.improvement:.2f}", []
+    alone = _of_a_constant(result, part)
+    beside += [f"a constant alone: {alone:.2f}"] if alone else []
+    text += f" ({'; '.join(beside)})" if beside else ""
+    if part.before.std_dph is not None and part.after.std_dph:
+        text += f", about the mean {part.before.std_dph / part.after.std_dph:.2f}"
     floor, rms = result.noise_floor_dph, part.after.rms_dph
     if floor and rms is not None:
         text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
+
+
+def _of_a_constant(result: Evaluation, judged: Pooled) -> float | None:
+    """Improvement about zero that the mean of the training runs alone gives; None without such runs."""
+    b, constant = judged.before, result.train.before.mean_dph if result.train else None
+    if constant is None or b.mean_dph is None or b.std_dph is None or b.rms_dph is None:
+        return None
+    left = math.hypot(b.std_dph, b.mean_dph - constant)
+    return b.rms_dph / left if left > 0.0 else None
 
 
 _RULES = {
