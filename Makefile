@@ -173,7 +173,7 @@ fleet: setup
 kills: setup
 	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
-## faults planted in the generator, and which check sees each: docs/results.md
+## faults planted in gyrotc, and which check or test sees each: docs/results.md
 mutants: setup
 	@$(PYTHON) -m tests.mutants.run --docs docs
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,30 +14,48 @@ from results import table, write
 
 __all__ = ["section", "write_page"]
 
-_HEAD = """## Faults planted in the generator (`make mutants`)
+_HEAD = """## Faults planted in gyrotc (`make mutants`)
 
-Each is a line of `gen/gyrotc/` that reads otherwise (`tests/mutants/faults.toml`). The changed generator emits a model;
-who objects first? The generator itself (a rule of its own on what it makes), `tools/check_table.py` (standard library,
-nothing of gyrotc), or `gyrotc verify` of the changed generator (compiled code against its reference, one target).
-{n} faults: {generator} by the generator, {check_table} by `check_table`, {verify} by `verify`, {nobody} by nobody.
+Each is a line of `gen/gyrotc/` that reads otherwise (`tests/mutants/faults.toml`). In what emits, the changed generator
+emits a model; who objects first? The generator itself (a rule of its own on what it makes), `tools/check_table.py`
+(standard library, nothing of gyrotc), or `gyrotc verify` of the changed generator (compiled code against its reference,
+one target). Elsewhere tests of `tests/py` run on the changed package; which one fails first?
 """
+_WHO = ("generator", "check_table", "verify", "test")
 
 
 def section(result: dict[str, Any]) -> str:
     """The section as text."""
     mutants = result["mutants"]
-    seen = [m["seen_by"] for m in mutants]
-    counts = {who: seen.count(who) for who in ("generator", "check_table", "verify")}
+    packages: dict[str, list[str | None]] = {}
+    for m in mutants:
+        packages.setdefault(f"`{m['file'].split('/')[0]}`", []).append(m["seen_by"])
+    packages["all"] = [m["seen_by"] for m in mutants]
+    counts = [
+        [name, len(seen), *(seen.count(who) for who in (*_WHO, None)), _rate(seen)]
+        for name, seen in packages.items()
+    ]
     rows = [
-        [m["name"], f"`{m['file']}`", m["model"], m["seen_by"] or "**nobody**", _told(m["told"])]
+        [
+            m["name"],
+            f"`{m['file']}`",
+            m["model"],
+            m["seen_by"] or "**nobody**",
+            _told(m["told"] or m.get("survives", "")),
+        ]
         for m in mutants
     ]
     return "\n".join(
         [
-            _HEAD.format(n=len(mutants), nobody=seen.count(None), **counts),
+            _HEAD,
+            table(["package", "faults ", *(f"{who} " for who in _WHO), "nobody ", "seen "], counts),
             table(["fault", "in", "model", "seen by", "told"], rows),
         ]
     )
+
+
+def _rate(seen: Sequence[str | None]) -> str:
+    return f"{100.0 * sum(who is not None for who in seen) / len(seen):.0f} %"
 
 
 def _told(text: str) -> str:
@@ -44,6 +64,15 @@ def _told(text: str) -> str:
     return short.replace("|", "\\|").replace("<", "&lt;")
 
 
-def write_page(docs: Path, result: dict[str, Any]) -> None:
-    """`docs/results/mutants.json` and the section."""
-    write(docs, "mutants", result, section)
+def write_page(docs: Path, found: Sequence[dict[str, Any]], names: Sequence[str]) -> None:
+    """`docs/results/mutants.json` and the section: what was found now, and of the other faults what was found before.
+
+    Args:
+        docs: Folder of the pages.
+        found: Results of the faults that were tried.
+        names: All faults, in order.
+    """
+    path = docs / "results" / "mutants.json"
+    before = json.loads(path.read_text("utf-8"))["mutants"] if path.exists() else []
+    by_name = {m["name"]: m for m in [*before, *found]}
+    write(docs, "mutants", {"mutants": [by_name[name] for name in names if name in by_name]}, section)

@@ -1,14 +1,17 @@
 """Faults planted in the generator, one at a time, and who sees them: `make mutants`.
 
-Each fault of `faults.toml` is a line of `gen/gyrotc/` that reads otherwise. The changed generator emits a model; the
-independent check (`tools/check_table.py`) looks at the result, then `gyrotc verify` of the changed generator itself.
-A fault that nobody sees is a hole in the proof: exit status 1. Unchanged, nobody may object to any of the models.
+Each fault of `faults.toml` is a line of `gen/gyrotc/` that reads otherwise. With a fault that names a model the changed
+generator emits it; the independent check (`tools/check_table.py`) looks at the result, then `gyrotc verify` of the
+changed generator itself. With a fault that names tests these run on the changed package.
+A fault that nobody sees is a hole in the proof: exit status 1. Unchanged, nobody may object to any of the models, and
+all tests pass.
 """
 
 from __future__ import annotations
 
 import argparse
 import compileall
+import importlib
 import json
 import os
 import py_compile
@@ -50,13 +53,16 @@ class Fault:
     file: str  # below gen/gyrotc
     old: str
     new: str
-    model: str  # key of MODELS
+    model: str = ""  # key of MODELS; or ...
+    tests: tuple[str, ...] = ()  # ... files or tests of tests/py that should see it
+    survives: str = ""  # why nobody can see it
 
 
 def faults() -> list[Fault]:
     """All of faults.toml, in order."""
     with (HERE / "faults.toml").open("rb") as file:
-        return [Fault(**entry) for entry in tomllib.load(file)["fault"]]
+        entries = tomllib.load(file)["fault"]
+    return [Fault(**{**entry, "tests": tuple(entry.get("tests", ()))}) for entry in entries]
 
 
 class House:
@@ -67,13 +73,15 @@ class House:
         for name in ("include", "libc"):
             shutil.copytree(ROOT / name, folder / name)
         shutil.copytree(ROOT / "gen" / "gyrotc", self.package, ignore=shutil.ignore_patterns("__pycache__"))
+        core = Path(importlib.import_module("gyrotc._core").__file__ or "")
+        shutil.copy(core, self.package / core.name)
         # By its content: a file that is changed and put back within a second is read anew.
         compileall.compile_dir(
             self.package, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH
         )
 
-    def objection(self, model: str, fault: Fault | None = None) -> dict[str, Any]:
-        """Who objects to what the generator, with the fault, makes of a model."""
+    def objection(self, model: str, fault: Fault | None = None, tests: Sequence[str] = ()) -> dict[str, Any]:
+        """Who objects to what the generator, with the fault, makes of a model; or which of `tests` fails with it."""
         path = self.package / (fault.file if fault else "__init__.py")
         text = path.read_text("utf-8")
         if fault is not None:
@@ -83,15 +91,20 @@ class House:
                 )
             path.write_text(text.replace(fault.old, fault.new), "utf-8")
         try:
+            if tests:
+                return self._driven(HERE / "drive_tests.py", *tests)
             with tempfile.TemporaryDirectory() as out:
-                return self._driven(ROOT / MODELS[model], Path(out) / "result")
+                result = Path(out) / "result"
+                return self._driven(
+                    HERE / "drive.py", ROOT / MODELS[model], result, ROOT / "tools/check_table.py"
+                )
         finally:
             path.write_text(text, "utf-8")
 
-    def _driven(self, model: Path, out: Path) -> dict[str, Any]:
+    def _driven(self, *command: str | Path) -> dict[str, Any]:
         environment = os.environ | {"PYTHONPATH": str(self.package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
         done = subprocess.run(
-            [sys.executable, HERE / "drive.py", model, out, ROOT / "tools" / "check_table.py"],
+            [sys.executable, *command],
             env=environment,
             capture_output=True,
             text=True,
@@ -114,14 +127,15 @@ def tried(names: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
     chosen = [fault for fault in faults() if not names or fault.name in names]
     with tempfile.TemporaryDirectory() as folder:
         house = House(Path(folder))
-        for model in dict.fromkeys(fault.model for fault in chosen):
-            found = house.objection(model)
+        for model, tests in dict.fromkeys((fault.model, fault.tests) for fault in chosen):
+            found = house.objection(model, tests=tests)
             if found["seen_by"] is not None:
+                what = model or ", ".join(tests)
                 raise ValueError(
-                    f"{found['seen_by']} objects to the sound generator's {model}: {found['told']}"
+                    f"{found['seen_by']} objects to the sound generator's {what}: {found['told']}"
                 )
         for fault in chosen:
-            yield asdict(fault) | house.objection(fault.model, fault)
+            yield asdict(fault) | house.objection(fault.model, fault, fault.tests)
 
 
 def main() -> int:
@@ -134,9 +148,9 @@ def main() -> int:
     for result in tried(arguments.names):
         results.append(result)
         print(f"{result['seen_by'] or 'NOBODY':<12} {result['name']}: {result['told'][:100]}", flush=True)
-    unseen = [result["name"] for result in results if result["seen_by"] is None]
-    if arguments.docs and not arguments.names:
-        write_page(arguments.docs, {"mutants": results})
+    unseen = [result["name"] for result in results if result["seen_by"] is None and not result["survives"]]
+    if arguments.docs:
+        write_page(arguments.docs, results, [fault.name for fault in faults()])
     print(f"{len(results)} faults, {len(unseen)} that nobody sees{': ' if unseen else ''}{', '.join(unseen)}")
     return 1 if unseen else 0
 

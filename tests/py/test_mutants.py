@@ -29,7 +29,8 @@ def test_there_are_enough_and_no_name_twice() -> None:
 
 @pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
 def test_what_it_changes_stands_there_once(fault: Fault) -> None:
-    assert fault.model in MODELS
+    assert (fault.model in MODELS) != bool(fault.tests)
+    assert all((ROOT / "tests" / "py" / test.partition("::")[0]).is_file() for test in fault.tests)
     assert fault.old != fault.new
     assert (ROOT / "gen" / "gyrotc" / fault.file).read_text("utf-8").count(fault.old) == 1
 
@@ -52,4 +53,6 @@ def test_the_page_is_that_of_the_last_campaign() -> None:
     result = json.loads((ROOT / "docs" / "results" / "mutants.json").read_text("utf-8"))
     assert section(result) in (ROOT / "docs" / "results.md").read_text("utf-8")
     assert [m["name"] for m in result["mutants"]] == [fault.name for fault in FAULTS]
-    assert all(m["seen_by"] in ("generator", "check_table", "verify") for m in result["mutants"])
+    assert all(m["seen_by"] or m["survives"] for m in result["mutants"])
+    seen = Counter(m["seen_by"] is not None for m in result["mutants"])
+    assert seen[True] >= 0.95 * seen.total()

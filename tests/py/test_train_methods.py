@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.model import Model
 from gyrotc.train import SIZE_RULES, TrainingData, fit, predict
+from gyrotc.train.data import average
 from numpy.typing import NDArray
 from training_data import NOISE_DPH, rms, samples, true_bias
 
@@ -38,6 +39,24 @@ def test_the_default_beats_what_it_is_compared_with() -> None:
     assert all(best < e for e in errors.values()), (best, errors)
 
 
+def test_press_is_the_error_of_means_left_out_alone() -> None:
+    """Against as many refits as there are means, by plain least squares on the chosen centers."""
+    data = samples(2)
+    found = fit(data, method="mrbf_paper", size_rule="press")
+    means, width = average(data, 100.0), found.curves["width"]
+    x = np.column_stack(found.scaling.normalise(means.temperature_c, means.slope_c_per_min))
+    centers = np.column_stack(found.scaling.normalise(*np.array(found.networks[0]["centers"]).T))
+    u2 = np.sum((x[:, None] - centers[None]) ** 2, axis=2)
+    columns = np.column_stack([np.ones(len(x)), np.exp(-u2 / width**2)])
+    squares = []
+    for k in range(len(x)):
+        rest = np.arange(len(x)) != k
+        weights = np.linalg.lstsq(columns[rest], means.bias_dph[rest], rcond=None)[0]
+        squares.append((means.bias_dph[k] - columns[k] @ weights) ** 2)
+    stated = found.curves["criterion"][f"{width:g}"][found.curves["chosen"]]
+    assert stated == pytest.approx(np.mean(squares), rel=1e-4)
+
+
 def test_rho_counts_down_to_the_threshold() -> None:
     """Eq. (16): the chosen size is the first at which 1 − Σ [err] is below ρ."""
     found = fit(samples(1), method="mrbf_paper", rho=0.0127)
@@ -65,10 +84,10 @@ def test_candidates_are_what_the_method_says() -> None:
     assert all((round(t, 6), round(r, 6)) in points for t, r in random.networks[0]["centers"])
     grid = fit(data, method="rbf_ols", centers=12)
     t, r = np.array(grid.networks[0]["centers"]).T
-    step = np.ptp(data.temperature_c) / 20
-    assert len(np.unique(np.round(t, 6))) <= 21
-    assert np.ptp(t) <= 20.001 * step
-    assert len(np.unique(np.round(r, 6))) <= 13
+    means = average(data, 100.0)
+    for places, inputs, steps in ((t, means.temperature_c, 20), (r, means.slope_c_per_min, 12)):
+        at = (places - inputs.min()) / np.ptp(inputs) * steps
+        assert np.abs(at - np.round(at)).max() < 1e-6
 
 
 def with_bias(seed: int, bias_dph: NDArray[np.float64]) -> TrainingData:
@@ -141,6 +160,15 @@ def test_a_polynomial_is_found_exactly() -> None:
     found = fit(with_bias(5, truth), method="poly")
     value = predict(found, data.temperature_c, data.slope_c_per_min)
     assert rms(value - truth) < 1e-6
+
+
+def test_a_polynomial_has_the_order_that_the_data_show() -> None:
+    data = samples(5, noise_dph=1e-5)
+    noise = data.bias_dph - true_bias(data.temperature_c, data.slope_c_per_min)
+    z = (data.temperature_c - 10.0) / 50.0
+    for order in (1, 2, 3, 5):
+        found = fit(replace(data, bias_dph=7e-3 + 1e-3 * z**order + noise), method="poly")
+        assert found.curves["powers"] == [[k, 0] for k in range(order + 1)]
 
 
 def test_a_bank_has_three_regions_and_blends_as_the_model_does() -> None:

@@ -82,7 +82,7 @@ def _made(made: Mapping[str, str]) -> str:
     )
 
 
-def _table_1(figures: Figures, *, published: bool) -> str:
+def _table_1(figures: Figures, *, published: bool) -> str:  # long: the rows, one kind after the other
     """Table 1: before, after and improvement in each environment; with the paper's own figures or without."""
     before, after = figures["before"], figures["after"]
 
