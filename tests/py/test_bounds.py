@@ -114,6 +114,7 @@ def test_code_without_a_bound_is_refused(rows: tuple[str, ...], why: str) -> Non
         most(*rows)
 
 
+@pytest.mark.slow
 def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None:
     """An increment is divided by libgcc, whose longest way its divisor never takes; how far other bounds are from
     the counts depends on how a release of the compiler arranges branches."""

@@ -131,6 +131,7 @@ def test_build_writes_the_budget_and_the_page_tells_it(built: Path) -> None:
     assert "Not known, and so not in U:" in page
 
 
+@pytest.mark.slow
 def test_the_stated_uncertainty_holds_on_a_slice_of_the_simulated_units() -> None:
     """`make uncertainty` looks at all 200, and keeps what it found; of six units the share scatters by 3 %."""
     every = units_of(UNITS)

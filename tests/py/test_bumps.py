@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from gyrotc.train import TrainingData, fit, predict
 from gyrotc.train.bumps import Bumps, find_bumps
 from gyrotc.train.data import cleaned, scaling_of
@@ -62,6 +63,7 @@ def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
     return found.beside(finer.networks[0], finer.scaling.half_range_c)
 
 
+@pytest.mark.slow
 def test_a_smooth_map_gets_no_bumps() -> None:
     rng = np.random.default_rng(SEED + 1)
     counts = [

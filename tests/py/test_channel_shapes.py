@@ -82,6 +82,7 @@ def model(built: Path) -> Model:
     return load_model(built / "model.json")
 
 
+@pytest.mark.slow
 def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as_such(
     built: Path, model: Model
 ) -> None:

@@ -123,6 +123,7 @@ def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:
     assert (demo / "result" / "report.html").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_ten_gyros_reach_the_floor(tmp_path: Path) -> None:
     """Pooled exam RMS ÷ floor: median ≤ 1.006, worst ≤ 1.015; tables ≤ 144 bytes. One of them through compiled C."""
     ratios = []

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import Command
+from conftest import Command, quick_and_slow
 from gyrotc import cli
 from gyrotc.outputs import MARKER, Lock, faults
 from recordings import columns, toml, write_csv
@@ -176,7 +176,7 @@ def test_a_closed_pipe_is_told_as_shells_expect(made: Path) -> None:
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", quick_and_slow([signal.SIGTERM], [signal.SIGINT, signal.SIGHUP]))
 def test_a_signal_cleans_up_and_ends_as_shells_expect(
     number: signal.Signals, made: Path, tmp_path: Path
 ) -> None:

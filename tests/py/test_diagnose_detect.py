@@ -184,6 +184,7 @@ def test_a_planted_cause_is_found_and_noise_alone_is_not(quiet: Search, planted:
     assert detect(planted.extended(column), "map and beside")[0].p_value > 0.01, "nothing beside it"
 
 
+@pytest.mark.slow
 def test_p_values_of_noise_are_not_too_small_in_many_campaigns(campaign: Campaign) -> None:
     smallest = []
     for seed in range(SEED, SEED + 12):

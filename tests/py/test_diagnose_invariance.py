@@ -125,6 +125,7 @@ def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[st
     )
 
 
+@pytest.mark.slow
 def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) -> None:
     case = made("hysteresis")
     found = answer(changed(case.records, lambda r: replace(r, rate_dph=-r.rate_dph)), case.declared)
@@ -164,6 +165,7 @@ def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
         assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
 
 
+@pytest.mark.slow
 def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Case]) -> None:
     case = made("auxiliary")
 
@@ -174,6 +176,7 @@ def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Ca
     assert "auxiliary" not in answer(changed(case.records, shifted), case.declared).causes
 
 
+@pytest.mark.slow
 def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str], Case]) -> None:
     """Nothing in the recordings can say which of the two acts."""
     case = made("auxiliary")
@@ -204,6 +207,7 @@ def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
     assert result["extended"] is None or result["extended"]["gain"]["rms_removed_dph"]["low"] < 0.0
 
 
+@pytest.mark.slow
 def test_noise_declared_twice_too_high_or_low_is_told(made: Callable[[str], Case]) -> None:
     case = made("")
     for factor in (0.5, 2.0):

@@ -51,6 +51,7 @@ def _typed(*arguments: object) -> tuple[str, set[str]]:
     return done.stdout, set(json.loads(done.stderr.splitlines()[-1]))
 
 
+@pytest.mark.slow
 def test_the_second_call_writes_the_same_and_loads_nothing_that_computes_or_draws(
     data: Path, tmp_path: Path
 ) -> None:

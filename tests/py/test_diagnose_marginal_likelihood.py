@@ -92,6 +92,7 @@ def _told(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, float]]
     return chosen[0].id, probabilities_of(chosen[0].id, likely)
 
 
+@pytest.mark.slow
 def test_gradients_and_lags_that_the_catalogue_does_not_have_are_told_apart(
     quiet: Gains, campaign: Campaign
 ) -> None:

@@ -87,12 +87,14 @@ def test_relays_are_hysteresis(campaign: Campaign, seed: int) -> None:
     assert found.columns.shape[1] > found.wide.columns.shape[1], "the play itself stays in the model"
 
 
+@pytest.mark.slow
 def test_relays_need_no_second_cause(campaign: Campaign) -> None:
     """A lag and a finer map beside a play came as near to these, and stood with it as three causes."""
     found = attribute(measured(campaign, relays(campaign.records, 0), 25.0, 0))
     assert named(found) == ["hysteresis"]
 
 
+@pytest.mark.slow
 def test_a_wave_beside_a_play_stays_a_cause_of_its_own(campaign: Campaign) -> None:
     wave = columns_of(campaign.records, "path_length_periodicity", {"period_c": 9.0})[:, 0]
     effect = campaign.records.columns(loop)[:, 0] / 6.0 + wave

@@ -129,6 +129,7 @@ def test_limits_of_time_and_size_hold_in_as_many_cases_as_they_say() -> None:
         (1809580124, 42, "map_too_coarse"),
     ],
 )
+@pytest.mark.slow
 def test_what_a_unit_always_does_is_no_event(tmp_path: Path, seed: int, number: int, name: str) -> None:
     """Relays of which a branch looked like a gain that changed, in a run and of a run; a kink passed in a minute."""
     write(draw_recording(seed, number, "one", name), tmp_path, "A")

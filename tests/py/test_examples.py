@@ -53,6 +53,7 @@ def test_every_example_is_on_the_page() -> None:
     )
 
 
+@pytest.mark.slow
 def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
     folder = tmp_path / "examples" / "triad"
     shutil.copytree(EXAMPLES / "triad", folder)
@@ -134,6 +135,7 @@ def test_interrupt_and_task_with_freertos(tmp_path: Path) -> None:
     assert "320 increments, 5 readings" in told
 
 
+@pytest.mark.slow
 def test_two_slots_as_its_page_says(tmp_path: Path) -> None:
     folder = EXAMPLES / "two_slots"
     sources = [folder / "main.c", folder / "slots.c", EXAMPLES / "minimal" / "gtc_rlg_0042.c", *RUNTIME]
@@ -180,6 +182,7 @@ def test_a_block_of_simulink_refuses_a_period_that_makes_no_block(tmp_path: Path
     assert "between a microsecond and 4294 s" in _run(block, "0", status=1)
 
 
+@pytest.mark.slow
 def test_the_notebook_draws_a_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its cells in order, as Jupyter runs them; at most ten statements of the API."""
     mpl.use("Agg")

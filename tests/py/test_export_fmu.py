@@ -212,6 +212,7 @@ def test_what_no_unit_can_do_is_said(plain: Path, tmp_path: Path) -> None:
     gyro.library.fmi3FreeInstance(unit)
 
 
+@pytest.mark.slow
 def test_three_axes_are_one_unit_and_each_is_its_own_table(tmp_path: Path, gyrotc: Command) -> None:
     models, sources = {}, {}
     for axis in "xyz":

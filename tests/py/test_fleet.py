@@ -262,6 +262,7 @@ def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) ->
         pytest.skip("Dask is installed")
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:
     """Before: such a fleet passed without a word."""
     for k in (1, 2):

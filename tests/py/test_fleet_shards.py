@@ -57,6 +57,7 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     fleet, out = load_manifest(lot / "d"), lot / "shares"
     told = gyrotc("fleet", lot / "d", "--out", out, "--shard", f"1/{N}")

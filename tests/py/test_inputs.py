@@ -241,6 +241,7 @@ def test_results_of_other_types_are_refused_by_field() -> None:
     assert "is not a JSON object" in refused(lambda: checked_result([], Verification, "v.json"))
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
     program = (
         "import sys, gyrotc.dataset.load as m, gyrotc.judge.check, gyrotc.cli\n"
@@ -279,6 +280,7 @@ class _Runs:
         return os.system, ("touch /tmp/gyrotc-was-here",)
 
 
+@pytest.mark.slow
 def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pickle
 

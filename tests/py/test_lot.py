@@ -205,6 +205,7 @@ def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     assert use is not None and use.cluster == found.state.cluster[int(np.argmax(side == 1))]
 
 
+@pytest.mark.slow
 def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     rng = np.random.default_rng(41)
     units = [calibrated(rng, unit_map(rng, 1e-4)) for _ in range(15)]
@@ -220,6 +221,7 @@ def test_a_lot_of_few_units_knows_its_mean_badly() -> None:
     assert few.alone().rms_sigma_dph() > many.alone().rms_sigma_dph()
 
 
+@pytest.mark.slow
 def test_the_same_units_give_the_same_file() -> None:
     rng = np.random.default_rng(61)
     units = [calibrated(rng, unit_map(rng, 2e-4)) for _ in range(6)]

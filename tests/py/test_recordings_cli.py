@@ -68,6 +68,7 @@ def test_build_refuses_every_case_before_it_writes(case: str, tmp_path: Path) ->
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_a_refused_build_leaves_an_older_result_alone(tmp_path: Path, gyrotc: Command) -> None:
     described(tmp_path / "RLG-1")
     small = columns() | {"rate_dph": columns()["rate_dph"] - 20.0}

@@ -37,6 +37,7 @@ def right(sources: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Verd
 
 
 @pytest.mark.parametrize("build", WRONG)
+@pytest.mark.slow
 def test_every_build_whose_results_differ_is_refused(
     build: str, sources: list[Path], right: Verdict, tmp_path: Path
 ) -> None:

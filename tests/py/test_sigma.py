@@ -64,6 +64,7 @@ def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> 
     assert set(status[:, 1]) == {E_LAYOUT}
 
 
+@pytest.mark.slow
 def test_errors_of_a_few_gyros_are_as_large_as_sigma_says() -> None:
     """A slice of `python -m bench docs --only sigma`: four gyros, whole runs and outages."""
     parts = [departures(gyro("paper", seed), seed) for seed in range(900_001, 900_005)]

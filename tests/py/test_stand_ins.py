@@ -192,6 +192,7 @@ def gyro(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return World(plain, model, [run.rows() for run in dataset.runs if run.role == "exam"])
 
 
+@pytest.mark.slow
 def test_a_channel_lost_in_the_exam_costs_no_more_than_2_percent_over_one_thermometer(
     gyro: World, tmp_path: Path
 ) -> None:

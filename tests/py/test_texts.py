@@ -665,6 +665,7 @@ def _read_or_refused(read: Callable[[], object]) -> None:
         assert "\x1b" not in terminal_text(str(error))
 
 
+@pytest.mark.slow
 def test_manifests_limits_and_scenarios_are_read_or_refused_in_words(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
     for text in HOSTILE:

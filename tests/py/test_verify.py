@@ -77,6 +77,7 @@ def test_a_flipped_bit_of_a_weight_fails(copy: Path) -> None:
     assert entry["status"] == "fail" and entry["mismatches"] >= 1
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
     flip(copy / "c" / "vectors_rlg_0042.h", r"VECTORS_SEED 0x([0-9a-f]{8})UL", bit=7)
     for entry in entries(copy, FAST).values():
@@ -90,6 +91,7 @@ def test_a_flipped_bit_of_the_emitted_answers_fails(copy: Path) -> None:
     assert [e["mismatches"] for e in result["emitted"] if e["status"] == "fail"] == [1]
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     path = copy / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())
@@ -100,6 +102,7 @@ def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     assert {e["file"]: e["mismatches"] for e in result["emitted"]}[path.name] == 1
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_of_the_reference_fails(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*arguments: Any) -> dict[str, np.ndarray]:
         words = {numeric: rows.copy() for numeric, rows in expected_answers(*arguments).items()}
@@ -244,6 +247,7 @@ def test_log_that_is_damaged_cut_off_or_foreign_is_refused(copy: Path) -> None:
         verify(copy, log=copy / "absent.log")
 
 
+@pytest.mark.slow
 def test_groups_of_a_crc_log_are_compared_each(whole: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(whole, tmp_path / "copy"))
     everything = {p.numeric: p for p in read_output(_board_output(folder))}

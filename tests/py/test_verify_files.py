@@ -158,6 +158,7 @@ def test_main_may_be_edited_when_it_is_said_and_nothing_else(copy: Path, gyrotc:
         verify(copy, compiled=False, edited=["gtc.c"])
 
 
+@pytest.mark.slow
 def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path, gyrotc: Command) -> None:
     unit, model = tmp_path / "unit", load_model(GOLDEN)
     models = {axis: model.model_copy(update={"axis": axis}) for axis in "xy"}
