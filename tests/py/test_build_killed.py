@@ -12,7 +12,10 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from recordings import columns, described, write_csv
+
+pytestmark = pytest.mark.slow
 
 KILLS = 6
 

@@ -103,6 +103,7 @@ def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as
     assert "taken: a bent line, two Gaussians beside a straight one" in page
 
 
+@pytest.mark.slow
 def test_the_code_gives_what_was_trained_bit_for_bit(built: Path) -> None:
     verified = json.loads((built / "verify.json").read_text("utf-8"))
     assert {(t["numeric"], t["status"], t["mismatches"]) for t in verified["targets"]} == {

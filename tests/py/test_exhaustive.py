@@ -24,6 +24,7 @@ def _visit(folder: Path, every: int = SAMPLE) -> Visited:
     return visit_all(job.c_folder, job.model, job.tables["q31"], every=every, trusted=True)
 
 
+@pytest.mark.slow
 def test_sample_of_all_inputs_agrees_and_keeps_the_bound(tmp_path: Path) -> None:
     folder = emitted(tmp_path)
     table = job_of(folder).tables["q31"]

@@ -133,6 +133,7 @@ def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         gyro(tmp_path / "d" / name, "RLG-1")

@@ -71,6 +71,7 @@ def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     assert contents(out) == contents(lot / "whole")
 
 
+@pytest.mark.slow
 def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:

@@ -206,6 +206,7 @@ def test_a_channel_lost_in_the_exam_costs_no_more_than_2_percent_over_one_thermo
     assert rms_of(gyro.model, rows, tmp_path) <= most
 
 
+@pytest.mark.slow
 def test_the_correction_jumps_within_its_sigma_where_channels_are_lost(gyro: World) -> None:
     """All channels stay away for 40 minutes in every two hours of the exam, and come back."""
     table = quantise(gyro.model, "f32")

@@ -130,6 +130,7 @@ def test_code_that_does_not_compile_is_no_pass(copy: Path) -> None:
         assert entry["status"] == "fail" and "nonsense" in entry["error"]
 
 
+@pytest.mark.slow
 def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
     whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -115,9 +115,7 @@ def verify_table(result: Verification) -> RichTable:
         table.add_column(name, no_wrap=True)
     for name in ("vectors", "rows", "differ", "map call", "code", "stack"):
         table.add_column(name, justify="right", no_wrap=True)
-    for entry in result.targets:
-        if entry.status == "missing":
-            continue  # `not_installed_lines` names it
+    for entry in (e for e in result.targets if e.status != "missing"):  # `not_installed_lines` names those
         replayed, counted = entry.replayed, entry.map_cost
         differ = (
             None if entry.mismatches is None else entry.mismatches + (replayed.mismatches if replayed else 0)
