@@ -138,11 +138,14 @@ def _unit(s: Steps) -> None:
     s.run("simulate", "few.toml", "--seed", 4, "--out", "data")
     s.run("build", "data", "--out", "result", "--limits", "product.toml", "--json", "build.json")
     s.run("verify", "result", "--target", "host-gcc-O2", "--json", "verify.json")
-    s.run("certificate", "result", "--facts", "facts.toml", "--number", "2026-0042", "--out", "certificate")
-    s.run("certificate", "result", "--number", "2", "--out", "refused", name="certificate without facts")
-    s.run(
-        "certificate", "result", "--number", "2", "--out", "draft", "--draft", name="certificate as a draft"
-    )
+    accepted, facts = ("--accept-fail", "the only unit at hand"), ("--facts", "facts.toml")
+    for name, options in {
+        "certificate": (*facts, *accepted, "--out", "certificate"),
+        "certificate of a FAIL": (*facts, "--out", "refused"),
+        "certificate without facts": (*accepted, "--out", "refused"),
+        "certificate as a draft": (*accepted, "--draft", "--out", "draft"),
+    }.items():
+        s.run("certificate", "result", "--number", "2026-0042", *options, name=name)
     s.run("simulate", "paper-20C", "--seed", 4, "--out", "check-run", name="simulate a check run")
     s.run(
         "fit",
