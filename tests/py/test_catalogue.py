@@ -38,6 +38,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_the_last_calibration_governs_and_one_that_failed_lets_none_fly(fleet: Path) -> None:
     assert catalogued(fleet, "RLG-1", "2026-02-28").found == ()
     [one] = catalogued(fleet, "RLG-1", "2026-08-31").found

@@ -119,6 +119,7 @@ def test_seeded_fault_in_the_uncertainty_is_seen(
     "macro",
     ["Q31_BIAS_FRAC_BITS", "BLOCK_US", "ID", "PERIOD_MAX_US", "T_MIN_C", "AUTHORITY_MIN_DPH", "N_CHANNELS"],
 )
+@pytest.mark.slow
 def test_a_wrong_macro_of_the_header_is_seen(macro: str, uncertain: Path, tmp_path: Path) -> None:
     shutil.copytree(uncertain, tmp_path / "spoilt")
     header = tmp_path / "spoilt" / "c" / "gtc_sim_0003.h"
@@ -270,6 +271,7 @@ def model() -> Model:
     return load_model(GOLDEN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("name", FAULTS)
 def test_seeded_fault_of_quantisation_is_seen(

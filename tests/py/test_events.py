@@ -104,6 +104,7 @@ def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None
         assert all(step.run == 1 and step.time_s[1] <= at <= step.time_s[2] for step in found)
 
 
+@pytest.mark.slow
 def test_limits_of_time_and_size_hold_in_as_many_cases_as_they_say() -> None:
     """Sixty steps of 9 to 20 noise floors, on ramps and holds. A step within a cell had been told too small."""
     rng = np.random.default_rng(SEED + 4)

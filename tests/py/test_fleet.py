@@ -83,6 +83,7 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
         ).read_bytes()
 
 
+@pytest.mark.slow
 def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     gyro(tmp_path / "a" / "RLG-1", "RLG-1")
     rows = columns(360)

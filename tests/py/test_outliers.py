@@ -118,6 +118,7 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
     assert len(run_of.rows()) == ROWS - 4
 
 
+@pytest.mark.slow
 def test_the_report_lists_what_was_left_out_with_the_line_to_paste(
     tmp_path: Path,
 ) -> None:
