@@ -99,9 +99,14 @@ def _effect(shape: str, u: Array, t: Array) -> Array:
     return np.asarray(1e-3 * (slope * u + (0.4 * u**2 if shape == "curve" else 0.0)))
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("shape", ["line", "curve", "product"])
-def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, rng: np.random.Generator) -> None:
-    """And nine tenths of what it adds are removed in a run that the choice has not seen."""
+def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, seed: int) -> None:
+    """And nine tenths of what it adds are removed in a run that the choice has not seen.
+
+    The seeds are fixed: in about one draw of eighty the folds do not show the curve by more than a standard error.
+    """
+    rng = np.random.default_rng(seed)
     samples, u = history(rng), wander(rng, 30.0)
     effect = _effect(shape, u, samples.temperature_c)
     made = replace(samples, bias_dph=samples.bias_dph + effect)
