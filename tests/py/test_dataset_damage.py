@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -77,3 +78,19 @@ def test_damaged_files_are_read_or_refused(case: str, name: str, tmp_path: Path)
         else:
             assert not check(folder).problems
     assert refused > TRIALS // 10
+
+
+def test_a_damaged_description_of_parquet_never_ends_the_process(tmp_path: Path) -> None:
+    """Descriptions of columns that contradict each other made pyarrow abort when it was asked for one of them."""
+    folder, draw = tmp_path / "RLG-1", random.Random(1)
+    ACCEPTED["Parquet"](folder)
+    path = folder / "a.parquet"
+    whole = path.read_bytes()
+    footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
+    for _ in range(200):
+        data = bytearray(whole)
+        for _ in range(draw.randint(1, 3)):
+            data[draw.randrange(footer, len(data) - 8)] = draw.randrange(256)
+        path.write_bytes(data)
+        with contextlib.suppress(InputError):
+            load(folder)
