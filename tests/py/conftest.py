@@ -7,7 +7,6 @@ import fcntl
 import io
 import os
 import subprocess
-import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,14 +31,6 @@ EXAMPLE = ROOT / "examples" / "minimal"
 HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
-
-
-def run_process(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """The installed command in a process of its own: about a second of start-up, for what only a process shows."""
-    program = Path(sys.executable).with_name("gyrotc")
-    return subprocess.run(
-        [str(program), *map(str, args)], capture_output=True, text=True, check=False, cwd=cwd
-    )
 
 
 def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -91,11 +82,6 @@ def quick_and_slow(quick: Sequence[Any], slow: Sequence[Any]) -> list[Any]:
 @pytest.fixture(scope="session")
 def gyrotc() -> Command:
     return run_gyrotc
-
-
-@pytest.fixture(scope="session")
-def gyrotc_process() -> Command:
-    return run_process
 
 
 @pytest.fixture
