@@ -12,8 +12,8 @@ from gyrotc.train.lot import LotPrior, UnitMeans
 from gyrotc.train.lot.earlier import posterior_of_means, stated_sigma_dph, widened
 from gyrotc.train.lot.held import held
 from gyrotc.train.lot.learn import sums_of
-from gyrotc.train.lot.means import unit_means
 from gyrotc.train.lot.surprise import FALSE_ALARM
+from gyrotc.train.means import unit_means
 from gyrotc.train.process import fit_process
 from numpy.typing import NDArray
 from scipy.stats import norm

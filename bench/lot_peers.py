@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gyrotc.train.lot import UnitMeans
+from gyrotc.train.means import UnitMeans
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:

@@ -30,8 +30,8 @@ from gyrotc.simulate.scenario import read
 from gyrotc.train import Fit, TrainingData, fit, predict, uncertainty
 from gyrotc.train.data import cleaned, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.lot import LotPrior, UnitMeans, learn
-from gyrotc.train.lot.means import unit_means
+from gyrotc.train.lot import LotPrior, learn
+from gyrotc.train.means import UnitMeans, unit_means
 from numpy.typing import NDArray
 
 from .lot_checks import best_power, recalibrated, seen
@@ -115,7 +115,7 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     for data, _ in recorded(strange, exam=False):
         powers.append(best_power(prior, seen(programmes(data)[0][1]), seen(data)))
         for name, part in programmes(data):
-            use = fit(part, method="auto", lot=prior).lot if name != "six runs" else None
+            use = fit(part, method="auto", prior=prior).lot if name != "six runs" else None
             p = (
                 use.p_value
                 if use
@@ -200,7 +200,7 @@ def _unit(
     """Figures of one unseen unit: ratio and error of every way, coverage of sigma, p-value."""
     row: dict[str, Any] = {}
     for name, part in programmes(data)[: 3 if longer else 1]:
-        with_lot = fit(part, method="auto", lot=prior)
+        with_lot = fit(part, method="auto", prior=prior)
         ways: dict[str, Callable[[], Floats]] = {
             "lot": lambda f=with_lot: predict(f, exam.temperature_c, exam.slope_c_per_min),
             "mrbf": lambda p=part: predict(fit(p, method="mrbf"), exam.temperature_c, exam.slope_c_per_min),

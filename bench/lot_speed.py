@@ -18,8 +18,7 @@ from gyrotc.simulate.campaign import with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import cleaned, scaling_of
-from gyrotc.train.lot import UnitMeans
-from gyrotc.train.lot.means import unit_means
+from gyrotc.train.means import UnitMeans, unit_means
 
 from .lot_prior import learnt, recorded
 

@@ -25,9 +25,9 @@ from gyrotc.simulate.scenario import read
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.lot import LotPrior, UnitMeans
 from gyrotc.train.lot.learn import sums_of
-from gyrotc.train.lot.means import unit_means
 from gyrotc.train.lot.model import UnitSums
 from gyrotc.train.lot.surprise import FALSE_ALARM
+from gyrotc.train.means import unit_means
 from numpy.typing import NDArray
 
 from .lot_checks import best_power, seen

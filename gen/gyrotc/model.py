@@ -347,6 +347,12 @@ class Model(_Frozen):
         return tuple(t.stand_in for t in self.terms if t.stand_in is not None)
 
     @property
+    def between_dph(self) -> float:
+        """Standard deviation of the constant from power-on to power-on, deg/h; 0 where it is not known."""
+        known = self.uncertainty_dph
+        return float(known.rules.between_dph) if known is not None and known.rules is not None else 0.0
+
+    @property
     def n_centers(self) -> int:
         """Of the map."""
         return sum(len(n.centers) for n in self.networks)

@@ -154,14 +154,14 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
     dataset, lot = load(tmp_path / "units" / "LOT-0005-006"), load_lot(world / "lot.json")
     records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
     left = []
-    for options in (FitOptions(lot=lot), FitOptions()):
+    for options in (FitOptions(prior=prior_of(lot)), FitOptions()):
         refitting = Refitting(dataset, records, options, single_cycle=False)
         first = [np.full(len(m), k == 0) for k, m in enumerate(refitting.everything())]
         fitted = refitting.fit([], first)
         others = joined([played.data for played in refitting.train[1:]])
         away = others.bias_dph - predict(fitted, others.temperature_c, others.slope_c_per_min)
         left.append(float(np.mean(away**2)))
-        assert (fitted.lot is not None and fitted.lot.accepted) == (options.lot is not None)
+        assert (fitted.lot is not None and fitted.lot.accepted) == (options.prior is not None)
     assert left[0] < left[1]
     told = run_here(
         *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),

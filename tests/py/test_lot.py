@@ -14,12 +14,13 @@ from gyrotc.errors import InputError
 from gyrotc.jobs.lot import checksum_of, lot_from
 from gyrotc.results.lot import Lot, LotCluster
 from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty
-from gyrotc.train.lot import LotPrior, UnitMeans, learn, prior_of
+from gyrotc.train.lot import LotPrior, learn, prior_of
 from gyrotc.train.lot import basis as lot_basis
 from gyrotc.train.lot.basis import PRIOR_LOG, LotBasis
 from gyrotc.train.lot.learn import Learned, sums_of
 from gyrotc.train.lot.model import evidence, fitted
 from gyrotc.train.lot.surprise import p_value, scores
+from gyrotc.train.means import UnitMeans
 from numpy.typing import NDArray
 from scipy.stats import kstest, multivariate_normal
 
@@ -129,7 +130,7 @@ def test_a_unit_with_one_run_gains_what_its_lot_knows() -> None:
     for _ in range(8):
         own = unit_map(rng, 2e-4)
         data = short_run(rng, own)
-        with_lot, alone = fit(data, method="auto", lot=prior), fit(data, method="mrbf")
+        with_lot, alone = fit(data, method="auto", prior=prior), fit(data, method="mrbf")
         assert with_lot.lot is not None
         if not with_lot.lot.accepted:
             continue
@@ -168,7 +169,7 @@ def test_a_stranger_is_told_and_calibrated_without_the_lot() -> None:
     _, prior, _ = family(21)
     rng = np.random.default_rng(22)
     data = short_run(rng, [2e-3, -2e-3, 1e-3, 0.0, 1e-3])
-    with_lot, alone = fit(data, method="auto", lot=prior), fit(data, method="auto")
+    with_lot, alone = fit(data, method="auto", prior=prior), fit(data, method="auto")
     assert with_lot.lot is not None and not with_lot.lot.accepted and with_lot.lot.p_value < 0.01
     assert "not_of_its_lot" in [f["id"] for f in with_lot.findings]
     assert with_lot.networks == alone.networks and with_lot.method == alone.method
@@ -201,7 +202,7 @@ def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     prior = prior_of(lot)
     own = unit_map(rng, 1e-4, 1.5e-3)
     data = short_run(rng, own)
-    use = fit(data, method="auto", lot=prior).lot
+    use = fit(data, method="auto", prior=prior).lot
     assert use is not None and use.cluster == found.state.cluster[int(np.argmax(side == 1))]
 
 

@@ -11,10 +11,10 @@ from gyrotc.plan.next_run import Price, next_run
 from gyrotc.plan.with_lot import HOLDS, RATES, hours_of, inputs_of, programme_text
 from gyrotc.results.lot_plan import ChamberStep
 from gyrotc.simulate.scenario import read
-from gyrotc.train.lot import UnitMeans
 from gyrotc.train.lot.basis import PRIOR_LOG, LotBasis
 from gyrotc.train.lot.earlier import widened
 from gyrotc.train.lot.prior import MapPosterior, MapPrior
+from gyrotc.train.means import UnitMeans
 from gyrotc.train.process import Asked
 from models import random_model
 from numpy.typing import NDArray

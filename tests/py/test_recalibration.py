@@ -22,7 +22,6 @@ from gyrotc.results.training import Training
 from gyrotc.results.verification import Verification
 from gyrotc.train import TrainingData, fit, predict
 from gyrotc.train.data import cleaned, scaling_of
-from gyrotc.train.lot import UnitMeans
 from gyrotc.train.lot.earlier import (
     EarlierPrior,
     known_map,
@@ -31,7 +30,7 @@ from gyrotc.train.lot.earlier import (
     widened,
 )
 from gyrotc.train.lot.held import Held, held
-from gyrotc.train.lot.means import unit_means
+from gyrotc.train.means import UnitMeans, unit_means
 from numpy.typing import NDArray
 from recordings import write_csv
 from scipy.stats import kstest
@@ -160,7 +159,7 @@ def test_a_confirmed_model_and_its_check_run_are_one_table() -> None:
     left = [np.sqrt(np.mean((predict(f, t, r) - bias(t, r)) ** 2)) for f in (both, alone)]
     assert left[0] < left[1]
     changed = fit(recorded(rng, CHECK, CHANGES["local"]), method="auto", prior=prior)
-    assert changed.prior is not None and not changed.prior.accepted and changed.posterior is None
+    assert changed.prior is not None and not changed.prior.accepted and changed.known is None
     assert "prior_does_not_hold" in [f["id"] for f in changed.findings]
 
 

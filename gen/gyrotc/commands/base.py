@@ -23,7 +23,7 @@ from .stages import StageLine, Stages
 
 if TYPE_CHECKING:
     from ..dataset import Applied
-    from ..results.lot import Lot
+    from ..train.lot import LotPrior
 
 app = typer.Typer(
     name="gyrotc",
@@ -257,13 +257,14 @@ def _main(
     _Loudness.quiet, _Loudness.verbose = quiet, verbose
 
 
-def lot_in(path: Path | None) -> Lot | None:
-    """The lot of `--lot`. Raises as `load_lot`."""
+def lot_in(path: Path | None) -> LotPrior | None:
+    """The lot of `--lot` as what is known of a unit. Raises as `load_lot`."""
     if path is None:
         return None
     from ..jobs.lot import load_lot  # with what learns one: not for who has none
+    from ..train.lot import prior_of
 
-    return load_lot(path)
+    return prior_of(load_lot(path))
 
 
 def applied_in(path: Path | None) -> Applied | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import CheckFailed, InputError
-from .base import JsonOption, LotOption, OutOption, app, progress, tell, write_json
+from .base import JsonOption, LotOption, OutOption, app, lot_in, progress, tell, write_json
 from .stages import time_left
 
 if TYPE_CHECKING:
@@ -52,14 +52,12 @@ def fleet(
     Example: gyrotc fleet recordings --out fleet
     """
     from ..jobs.fleet import gather, load_manifest, run_fleet, run_share, share_of, summary_of
-    from ..jobs.lot import load_lot
 
     share = share_of(shard) if shard else None
     if share and gathered:
         raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
-    if lot is not None:
-        wanted = replace(wanted, options=replace(wanted.options, lot=load_lot(lot)))
+    wanted = replace(wanted, options=replace(wanted.options, prior=lot_in(lot)))
     with progress() as say:
         told = _Told(len(wanted.units), say)
         if share:

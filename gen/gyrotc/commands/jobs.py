@@ -246,7 +246,7 @@ def diagnose(  # long: the parts of a command in the order in which they are pri
     known = load_model(model) if model else None
     shared = lot_in(lot)
     options = (
-        FitOptions(method, seed, centers, rho, block_s, average_s, lot=shared) if known is None else None
+        FitOptions(method, seed, centers, rho, block_s, average_s, prior=shared) if known is None else None
     )
     subtracted = applied_in(applied)
     axes = axes_of(dataset) if axis == "all" else (axis,)

@@ -33,6 +33,7 @@ from .base import (
     TrustOption,
     TrustUnitsOption,
     app,
+    lot_in,
     numerics_of,
     progress,
     show,
@@ -78,12 +79,11 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..dataset import load
-    from ..jobs.lot import load_lot
     from ..jobs.recalibration import with_prior
     from ..quantise.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
-    shared = load_lot(lot) if lot else None
+    shared = lot_in(lot)
     options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:

@@ -129,7 +129,7 @@ def result_of(  # long: one line for each field of the result
 
 def _of_lot(extension: Extension, options: FitOptions, *, single_cycle: bool) -> str | None:
     """What became of the lot, in words."""
-    if options.lot is None:
+    if options.prior is None:
         return None
     if single_cycle or extension.lot is None:
         return "not used: beside an effect the map of a single cycle is one of T alone, which a lot does not know"

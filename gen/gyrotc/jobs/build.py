@@ -120,7 +120,7 @@ def build(
     say("reading")
     chosen_targets(targets)
     known = applied_of(applied) if applied else None
-    if extend and (options.lot is not None or prior is not None):
+    if extend and (options.prior is not None or prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
     refuse_together(options, prior, ageing_dph)
     held = load_limits(limits) if limits else None

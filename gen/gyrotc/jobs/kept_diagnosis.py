@@ -136,7 +136,7 @@ def _name(
 ) -> str:
     """Name of a diagnosis among what is kept: a hash of all that it depends on."""
     description = dataset.folder / FILE
-    lot = options.lot if options is not None else None
+    prior = options.prior if options is not None else None
     depends: dict[str, Any] = {
         "code": _code(),
         "description": hashlib.sha256(description.read_bytes()).hexdigest()
@@ -145,8 +145,8 @@ def _name(
         "recordings": [[run.file, run.sha256, run.role] for run in dataset.runs],
         "told": [dataset.serial, dataset.axis, dataset.applied_table, dataset.trusted, dataset.warnings],
         "model": None if model is None else digest_of(model.to_dict()),
-        "options": None if options is None else asdict(replace(options, lot=None, prior=None)),
-        "lot": None if lot is None else lot.checksum,
+        "options": None if options is None else asdict(replace(options, prior=None)),
+        "prior": None if prior is None else prior.key,
         "accept_events": accept_events,
         "files": files,
     }

@@ -16,12 +16,12 @@ from ..outputs import check_intact, digest_of
 from ..results.base import read_result
 from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
 from ..results.training import Training
-from ..train.lot import LEAST_UNITS, Learned, UnitMeans, learn, prior_of
+from ..train.lot import LEAST_UNITS, Learned, learn, prior_of
 from ..train.lot.learn import Envelope, folds_of
 from ..train.lot.model import LotState
 from ..train.lot.prior import process_told, rounded
+from ..train.means import UnitMeans, means_of
 from ..train.process import MEAN_S
-from .recalibration import between_of, means_of
 
 __all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
 
@@ -86,7 +86,7 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
         envelope,
         axis=units[0].model.axis,
         mean_s=float(np.median([u.training.means.mean_s for u in kept if u.training.means])),
-        between_dph=float(np.sqrt(np.mean([between_of(u.model) ** 2 for u in kept]))),
+        between_dph=float(np.sqrt(np.mean([u.model.between_dph**2 for u in kept]))),
     )
 
 

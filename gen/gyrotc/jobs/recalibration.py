@@ -19,7 +19,7 @@ from ..results.base import read_result
 from ..results.lot import Lot
 from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
-from ..train.lot import UnitMeans, prior_of
+from ..train.lot import prior_of
 from ..train.lot.earlier import (
     EarlierPrior,
     posterior_of_known,
@@ -29,8 +29,9 @@ from ..train.lot.earlier import (
 )
 from ..train.lot.prior import MapPosterior
 from ..train.lot.surprise import FALSE_ALARM
+from ..train.means import means_of
 
-__all__ = ["between_of", "means_of", "posterior_in", "prior_from", "refuse_together", "unit_in", "with_prior"]
+__all__ = ["posterior_in", "prior_from", "refuse_together", "unit_in", "with_prior"]
 
 
 def prior_from(
@@ -64,7 +65,7 @@ def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float |
     Raises:
         InputError: They do.
     """
-    if prior is not None and options.lot is not None:
+    if prior is not None and options.prior is not None:
         found = "with --prior: what the lot knew of the unit is in its earlier model already"
         raise InputError("--lot", found, "one of the two")
     if prior is None and ageing_dph is not None:
@@ -101,7 +102,7 @@ def posterior_in(folder: Path, model: Model) -> MapPosterior:
         return posterior_of_known(training.known, str(where))
     means = means_of(training.means, where)
     envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    between, table = between_of(model), model.uncertainty_dph
+    between, table = model.between_dph, model.uncertainty_dph
     stated = stated_sigma_dph(np.array(table.rows), envelope, between, means) if table else 0.0
     return posterior_of_means(means, envelope, between, stated)
 
@@ -132,33 +133,6 @@ def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, 
             "--lot", f"the unit does not fit it (p = {known.p_value:.2g})", "its own lot, or none"
         )
     return model, known, training.means
-
-
-def means_of(means: MapMeans | None, where: Path) -> UnitMeans:
-    """Means of a unit as arrays.
-
-    Args:
-        where: The `training.json` that they are of.
-
-    Raises:
-        InputError: There are none, or they do not go together.
-    """
-    if means is None:
-        raise InputError(
-            str(where),
-            "has no means (an extended model, or an earlier gyrotc)",
-            "a unit as gyrotc fleet or build makes it: give that command again",
-        )
-    arrays = [np.array(x) for x in (means.temperature_c, means.slope_c_per_min, means.bias_dph, means.count)]
-    if len({len(x) for x in arrays}) != 1 or len(arrays[0]) == 0 or arrays[3].min() <= 0.0:
-        raise InputError(f"{where}, field means", "lists that do not go together", "one of each a mean")
-    return UnitMeans(arrays[0], arrays[1], arrays[2], arrays[3], means.sigma_dph)
-
-
-def between_of(model: Model) -> float:
-    """Standard deviation of a unit's constant from power-on to power-on, deg/h."""
-    known = model.uncertainty_dph
-    return float(known.rules.between_dph) if known is not None and known.rules is not None else 0.0
 
 
 def _ageing(

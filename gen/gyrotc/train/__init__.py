@@ -13,11 +13,9 @@ from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .guard import objection
 from .linear import fit_mlr, fit_poly, fit_poly_slope
-from .lot.earlier import EarlierPrior, fit_with_earlier
-from .lot.prior import LotPrior
-from .lot.use import Given, fit_with_lot
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .ols import RIDGE, SIZE_RULES, fit_ols
+from .prior import Prior
 from .process import TrainingFailed
 from .residual_noise import floor_dph
 from .result import Fit, Outcome, network, predict
@@ -63,9 +61,8 @@ def fit(
     size_rule: str | None = None,
     average_s: float = 100.0,
     power_on: NDArray[np.int64] | None = None,
-    lot: LotPrior | None = None,
+    prior: Prior | None = None,
     serial: str = "",
-    prior: EarlierPrior | None = None,
 ) -> Fit:  # long: the ways to a map, one after the other
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
 
@@ -79,11 +76,9 @@ def fit(
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
         power_on: For the ladder: number of the power-on of each run, by its index; None: each run is one.
-        lot: What units of the type share; for `AUTO` and "mrbf" without a number of centers. A unit that does not fit
-            it is fitted without it, with a finding.
-        serial: The unit's, to tell whether the lot has seen it.
-        prior: The unit's earlier model, in the place of a lot; samples are those of a check run. Where it no longer
-            holds they are fitted without it, with a finding.
+        prior: What units of the type share, or the unit's earlier model; for `AUTO` and "mrbf" without a number of
+            centers. Samples that do not agree with it are fitted without it, with a finding.
+        serial: The unit's, to tell whether a lot has seen it.
 
     Raises:
         InputError: Bad samples or arguments.
@@ -98,12 +93,13 @@ def fit(
     reason = ""
     like_auto = method in (AUTO, "mrbf") and centers is None
     given = (
-        _given(samples, scaling, lot, prior, serial, seed=seed, average_s=average_s) if like_auto else None
+        prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s)
+        if like_auto and prior
+        else None
     )
     findings += given.findings if given else []
     if given is not None and given.map is not None:
-        (outcome, scaling), method = given.map, "mrbf"
-        reason = "the unit fits its lot" if given.lot else "the earlier model still holds"
+        (outcome, scaling), method, reason = given.map, "mrbf", given.reason
     elif np.ptp(samples.temperature_c) < LEAST_SPAN_C:
         outcome = _constant(samples)
         findings.append(_no_information(samples))
@@ -125,26 +121,8 @@ def fit(
     floor = floor_dph(samples, residual, average_s)
     return Fit(
         method, outcome, scaling, findings, floor, average_s, mean, rows, reason,
-        given.lot if given else None, given.prior if given else None, given.posterior if given else None,
+        given.lot if given else None, given.prior if given else None, given.known if given else None,
     )  # fmt: skip
-
-
-def _given(
-    samples: TrainingData,
-    scaling: Scaling,
-    lot: LotPrior | None,
-    prior: EarlierPrior | None,
-    serial: str,
-    *,
-    seed: int,
-    average_s: float,
-) -> Given | None:
-    """What is known beforehand, and the map that it gives with the samples."""
-    if prior is not None:
-        return fit_with_earlier(samples, scaling, prior, seed=seed, average_s=average_s)
-    if lot is not None:
-        return fit_with_lot(samples, scaling, lot, serial, seed=seed, average_s=average_s)
-    return None
 
 
 def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:

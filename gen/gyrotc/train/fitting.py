@@ -18,10 +18,9 @@ from .. import __version__
 from ..dataset import Dataset, Run, earth_rate_warning, joined_runs
 from ..errors import InputError
 from ..frontend import Blocks, run_blocks
-from ..metrics import Averages, pooled
+from ..metrics import Averages
 from ..model import Model
-from ..results.evaluation import FoundIn
-from ..results.lot import Lot
+from ..results.evaluation import FoundIn, Pooled
 from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
 from . import (
     AUTO,
@@ -41,10 +40,9 @@ from .channels import chosen_channels, seen_by_target, with_channels
 from .data import cleaned, joined, scaling_of
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .left_out import outliers_of, stretches_left_out
-from .lot.earlier import EarlierPrior, known_map
-from .lot.means import unit_means
-from .lot.prior import prior_of
+from .means import unit_means
 from .noisefloor import noise_terms, sensitivities, stretches
+from .prior import Prior
 from .result import snapped
 from .rules import rezero_dph
 from .spans import Span, training_spans
@@ -80,7 +78,7 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 class FitOptions:
     """Options of `gyrotc fit`; the method `auto` is the ladder of corrections.
 
-    `channels`: recorded channels become inputs where they earn their place. `prior`: the unit's earlier model.
+    `channels`: recorded channels become inputs where they earn their place. `prior`: what is known of the unit.
     """
 
     method: str = AUTO
@@ -90,8 +88,7 @@ class FitOptions:
     block_s: float = 10.0
     average_s: float = 100.0
     channels: bool = False
-    lot: Lot | None = None
-    prior: EarlierPrior | None = None
+    prior: Prior | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +169,8 @@ def fit_dataset(
             f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows {others} beside them)"
         )
         raise InputError("--method", repr(options.method), expected)
-    if options.lot is not None and options.lot.axis != dataset.axis:
-        raise InputError(
-            "--lot", f"of axis {options.lot.axis}", f"a lot of axis {dataset.axis}, as the recordings"
-        )
+    if options.prior is not None:
+        options.prior.check_axis(dataset.axis)
     runs = [run for run in dataset.runs if run.role == "train"]
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
@@ -208,17 +203,19 @@ def fit_dataset(
     data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
     spans = training_spans(stretches, data)
-    lot = options.lot if fitted.lot and fitted.lot.accepted else None
-    prior = options.prior if fitted.prior and fitted.prior.accepted else None
-    again = replace(options, method=fitted.method, lot=lot, prior=prior)
+    use = fitted.lot or fitted.prior
+    again = replace(options, method=fitted.method, prior=options.prior if use and use.accepted else None)
     left_out = _left_out(data, spans, again, say) if spans else None
     front = replace(front, stuck_s=stuck_after_s(longest_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
-    told: dict[str, Any] = {"outliers": outliers_of(left_out_rows, data), "means": _means(data, fitted)}
+    told: dict[str, Any] = {
+        "outliers": outliers_of(left_out_rows, float(data.weight.sum())),
+        "means": _means(data, fitted),
+    }
     told |= {"lot": fitted.lot} if fitted.lot else {}
     told |= {"prior": fitted.prior} if fitted.prior else {}
-    told |= {"known": known_map(fitted.posterior)} if fitted.posterior else {}
+    told |= {"known": fitted.known} if fitted.known else {}
     if choice:
         told["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
@@ -265,9 +262,8 @@ def _fit(
         rho=options.rho,
         average_s=options.average_s,
         power_on=power_on,
-        lot=prior_of(options.lot) if options.lot else None,
-        serial=serial,
         prior=options.prior,
+        serial=serial,
     )
 
 
@@ -430,8 +426,8 @@ def training_of(
         prediction_withheld=fitted.withheld,
         noise_floor_dph=fitted.noise_floor_dph,
         spans=tuple(span.result() for span in spans),
-        left_out=pooled(left_out) if left_out else None,
-        left_out_spans=tuple(pooled([a]) for a in left_out or []),
+        left_out=Pooled.of(left_out) if left_out else None,
+        left_out_spans=tuple(Pooled.of([a]) for a in left_out or []),
         noise=_noise(data, fitted, front.block_s),
         sensitivity=sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
         ladder=tuple(Rung(**row) for row in fitted.ladder),

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..dataset import Run
 from ..results.training import LeftOutRows, Outliers
-from .data import TrainingData
 
 __all__ = ["exclude_text", "outliers_of", "stretches_left_out"]
 
@@ -38,10 +37,13 @@ def stretches_left_out(run: Run, times_s: NDArray[np.float64]) -> list[LeftOutRo
     ]
 
 
-def outliers_of(stretches: Sequence[LeftOutRows], data: TrainingData) -> Outliers:
-    """`outliers` of `training.json`: number of rows left out, their share, where (the first 200 stretches)."""
+def outliers_of(stretches: Sequence[LeftOutRows], kept: float) -> Outliers:
+    """`outliers` of `training.json`: number of rows left out, their share of all, where (the first 200 stretches).
+
+    Args:
+        kept: Number of rows that training took.
+    """
     rows = sum(stretch.rows for stretch in stretches)
-    kept = float(data.weight.sum())
     return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))
 
 

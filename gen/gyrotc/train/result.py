@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..results.earlier import EarlierUse
-from ..results.lot import LotUse
+from ..results.lot import KnownMap, LotUse
 from .data import Scaling
 from .process import Process
-
-if TYPE_CHECKING:
-    from .lot.prior import MapPosterior
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict", "rescaled", "snapped"]
 
@@ -62,7 +59,7 @@ class Fit:
         reason: Why this one was chosen, in words.
         lot: What a lot did for it, where one was given.
         prior: What an earlier model did for it, where one was given.
-        posterior: What it follows, where a lot or an earlier model was used.
+        known: What it follows, where a lot or an earlier model was used, for `training.json`.
     """
 
     method: str
@@ -76,7 +73,7 @@ class Fit:
     reason: str = ""
     lot: LotUse | None = None
     prior: EarlierUse | None = None
-    posterior: MapPosterior | None = None
+    known: KnownMap | None = None
 
     @property
     def networks(self) -> Sequence[Network]:

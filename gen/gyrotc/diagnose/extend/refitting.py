@@ -13,7 +13,6 @@ from ...metrics import Averages
 from ...train import Fit
 from ...train.data import joined
 from ...train.fitting import FitOptions, front_end, map_method
-from ...train.lot import prior_of
 from ...train.spans import training_spans
 from ..attribute.attribution import choose
 from ..attribute.refine import Refined
@@ -58,7 +57,7 @@ class Refitting:
             "rho": options.rho,
             "average_s": options.average_s,
             # Beside effects the map of a single cycle is one of T alone, which no lot knows.
-            "lot": prior_of(options.lot) if options.lot and not single_cycle else None,
+            "prior": None if single_cycle else options.prior,
         }
 
     def fit(

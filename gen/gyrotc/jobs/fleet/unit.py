@@ -62,10 +62,8 @@ class Task:
         the program.
         """
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
-        lot = self.fleet.options.lot
-        plain = asdict(replace(self.fleet.options, lot=None, prior=None)) | (
-            {"lot": lot.checksum} if lot else {}
-        )
+        prior = self.fleet.options.prior
+        plain = asdict(replace(self.fleet.options, prior=None)) | {"prior": prior.key if prior else None}
         options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 

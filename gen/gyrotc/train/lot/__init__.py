@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .learn import LEAST_UNITS, Learned, UnitMeans, learn
-from .prior import LotPrior, prior_of
+from .learn import LEAST_UNITS, Learned, learn
+from .use import LotPrior, prior_of
 
-__all__ = ["LEAST_UNITS", "Learned", "LotPrior", "UnitMeans", "learn", "prior_of"]
+__all__ = ["LEAST_UNITS", "Learned", "LotPrior", "learn", "prior_of"]

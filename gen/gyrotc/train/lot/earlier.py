@@ -17,18 +17,18 @@ from ...errors import InputError
 from ...results.earlier import EarlierUse
 from ...results.lot import KnownMap
 from ..data import Scaling, TrainingData
+from ..means import UnitMeans
+from ..prior import Given
 from ..process import Asked
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .held import Held, held
-from .learn import Envelope, UnitMeans, sums_of, that_count
-from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
+from .learn import Envelope, sums_of, that_count
+from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
 from .surprise import FALSE_ALARM
-from .use import Given, curve_of, followed, seen_alone
+from .use import curve_of, followed, known_map, seen_alone
 
 __all__ = [
     "EarlierPrior",
-    "fit_with_earlier",
-    "known_map",
     "posterior_of_known",
     "posterior_of_means",
     "stated_sigma_dph",
@@ -57,6 +57,40 @@ class EarlierPrior(MapPrior):
     date: str | None
     ageing_dph: float
     ageing_from: str
+
+    @property
+    def key(self) -> str:
+        return f"{self.model_hash} {self.ageing_dph!r}"
+
+    def check_axis(self, axis: str | None) -> None:
+        """Nothing to refuse: it was read for this axis."""
+
+    def with_samples(
+        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
+    ) -> Given:
+        """Tests the earlier model against a check run, and fits both together if it still holds.
+
+        Args:
+            samples: Cleaned samples of the check run.
+            own: Their scaling.
+            serial: The unit's.
+            seed: Of the Kohonen network.
+            average_s: Averaging of RMS figures, s.
+        """
+        alone, unit = seen_alone(samples, own)
+        checked = held(self.alone(), unit)
+        posterior = self.with_runs(unit)
+        if checked.change is not None:
+            use = _use(self, posterior, checked, None)
+            return Given(None, [_moved(use)], prior=use)
+        found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        if isinstance(found, str):
+            use = _use(self, posterior, checked, None)
+            text = f"The earlier model is not used: a map with it is refused: {found}."
+            finding = {"id": "map_refused", "text": text, "evidence": {"method": "prior"}}
+            return Given(None, [finding], prior=use)
+        use = _use(self, posterior, checked, found[1])
+        return Given(found, [], "the earlier model still holds", prior=use, known=known_map(posterior))
 
 
 def stated_sigma_dph(rows: Floats, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
@@ -140,52 +174,6 @@ def widened(
         date=date,
         ageing_dph=ageing_dph,
         ageing_from=ageing_from,
-    )
-
-
-def fit_with_earlier(
-    samples: TrainingData, own: Scaling, prior: EarlierPrior, *, seed: int, average_s: float
-) -> Given:
-    """Holds the earlier model against a check run, and fits both together if it still holds.
-
-    Args:
-        samples: Cleaned samples of the check run.
-        own: Their scaling.
-        prior: The earlier model after ageing.
-        seed: Of the Kohonen network.
-        average_s: Averaging of RMS figures, s.
-    """
-    alone, unit = seen_alone(samples, own)
-    checked = held(prior.alone(), unit)
-    posterior = prior.with_runs(unit)
-    if checked.change is not None:
-        use = _use(prior, posterior, checked, None)
-        return Given(None, [_moved(use)], prior=use)
-    found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
-    if isinstance(found, str):
-        use = _use(prior, posterior, checked, None)
-        text = f"The earlier model is not used: a map with it is refused: {found}."
-        return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "prior"}}], prior=use)
-    return Given(found, [], prior=_use(prior, posterior, checked, found[1]), posterior=posterior)
-
-
-def known_map(posterior: MapPosterior) -> KnownMap:
-    """A posterior as `training.json` holds it."""
-    prior = posterior.prior
-    basis, asked = prior.basis, prior.asked
-    return KnownMap(
-        temperature_c=prior.temperature_c,
-        slope_c_per_min=prior.slope_c_per_min,
-        center_dph=prior.center_dph,
-        unit_dph=prior.unit_dph,
-        functions=basis.told(),
-        mean=rounded(posterior.mean),
-        covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
-        rest=process_told(prior.rest),
-        asked_temperature_c=rounded(asked.temperature_c),
-        asked_slope_c_per_min=rounded(asked.slope_c_per_min),
-        asked_share=rounded(asked.share),
-        between_dph=asked.between_dph,
     )
 
 

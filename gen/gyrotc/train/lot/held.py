@@ -18,7 +18,7 @@ from scipy.special import erfc, ndtri
 
 from ...errors import InputError
 from ...results.earlier import CheckedCell, MapChange
-from .learn import UnitMeans
+from ..means import UnitMeans
 from .prior import MapPosterior, MapPrior
 from .surprise import FALSE_ALARM
 

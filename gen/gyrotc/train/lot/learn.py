@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..means import UnitMeans
 from .basis import LotBasis
 from .model import LotState, UnitSums, evidence, fitted, predictive
 from .surprise import FALSE_ALARM, inflation, p_value, scores
 
-__all__ = ["LEAST_UNITS", "Envelope", "Learned", "UnitMeans", "folds_of", "learn", "sums_of", "that_count"]
+__all__ = ["LEAST_UNITS", "Envelope", "Learned", "folds_of", "learn", "sums_of", "that_count"]
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -33,23 +34,6 @@ _COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing
 _FOLDS = 5  # each leaves four fifths of the units, enough to stand for the lot
 _STARTS = 8  # of the search for clusters
 _REFINED = 2  # partitions whose units may change clusters: of many units every start gives another one
-
-
-@dataclass(frozen=True, slots=True)
-class UnitMeans:
-    """A fully calibrated unit.
-
-    Attributes:
-        temperature_c, slope_c_per_min, bias_dph: Gathered means, shape (means,).
-        count: Means behind each, the same shape.
-        sigma_dph: Noise of a mean of count 1, deg/h.
-    """
-
-    temperature_c: Floats
-    slope_c_per_min: Floats
-    bias_dph: Floats
-    count: Floats
-    sigma_dph: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A lot as a prior: from `lot.json` to the posterior of a unit, and whether the unit fits its lot."""
+"""What is known of a unit's map before its runs, and with them: normal distributions of its coefficients."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...results.lot import Lot, LotProcess
+from ...results.lot import LotProcess
+from ..means import UnitMeans
 from ..process import Asked
 from .basis import PARAMETERS, LotBasis
-from .learn import UnitMeans, sums_of
+from .learn import sums_of
 from .model import evidence
-from .surprise import freedom_of, of_few, p_value, scores
+from .surprise import of_few, p_value, scores
 
 __all__ = [
-    "LotPrior",
     "MapPosterior",
     "MapPrior",
     "check_positive",
-    "prior_of",
     "process_told",
     "processed",
     "rounded",
@@ -82,17 +81,6 @@ class MapPrior:
 
 
 @dataclass(frozen=True, slots=True)
-class LotPrior(MapPrior):
-    """What a lot says of a unit that was not seen.
-
-    Attributes:
-        lot: The file.
-    """
-
-    lot: Lot
-
-
-@dataclass(frozen=True, slots=True)
 class MapPosterior:
     """A normal distribution of a unit's coefficients.
 
@@ -124,57 +112,6 @@ class MapPosterior:
         asked = self.prior.asked
         variance = self.variance_dph2(asked.temperature_c, asked.slope_c_per_min)
         return float(np.sqrt(np.average(variance, weights=asked.share)))
-
-
-def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
-    """The prior that a file holds.
-
-    Raises:
-        InputError: The file contradicts itself: lengths that differ, a covariance that is none.
-    """
-    basis = LotBasis.read(lot.functions)
-    kept = basis.kept
-    directions = (
-        np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
-    )
-    rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
-    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
-    scale = lot.cross_validation.spread_scale * of_few(freedom)
-    means, covariances = _of_clusters(lot, scale, rest, where)
-    sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
-    if not (sizes > 0.0).all():
-        raise InputError(f"{where}, clusters", "one without units", "units in each")
-    shares = sizes / sizes.sum()
-    return LotPrior(
-        basis=basis,
-        center_dph=lot.center_dph,
-        unit_dph=lot.unit_dph,
-        temperature_c=lot.temperature_c,
-        slope_c_per_min=lot.slope_c_per_min,
-        means=means,
-        covariances=covariances,
-        share=shares,
-        rest=processed(lot.rest),
-        asked=_asked(lot, where),
-        freedom=freedom,
-        lot=lot,
-    )
-
-
-def _of_clusters(lot: Lot, scale: float, rest: Floats, where: str) -> tuple[Floats, Floats]:
-    """Means and covariances of a new unit's coefficients, one for each cluster."""
-    n = len(lot.functions.kept)
-    means, covariances = [], []
-    for number, cluster in enumerate(lot.clusters):
-        at = f"{where}, clusters, {number}"
-        lower = triangle(cluster.covariance, n, at)
-        if len(cluster.mean) != n:
-            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{n}, one a function")
-        covariance = scale * (rest + lower + np.tril(lower, -1).T)
-        check_positive(covariance, at)
-        means.append(np.array(cluster.mean))
-        covariances.append(covariance)
-    return np.array(means), np.array(covariances)
 
 
 def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, Floats]:
@@ -223,19 +160,3 @@ def check_positive(covariance: Floats, where: str) -> None:
         np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError:
         raise InputError(f"{where}, covariance", "is not positive definite", "a covariance") from None
-
-
-def _asked(lot: Lot, where: str) -> Asked:
-    """Centers of the cells in which units were."""
-    rows = {len(row) for row in lot.occupancy}
-    shares = np.array(lot.occupancy, dtype=np.float64) if len(rows) == 1 else np.zeros((0, 0))
-    if shares.size == 0 or shares.min() < 0.0 or not shares.sum() > 0.0:
-        raise InputError(f"{where}, occupancy", "rows that differ in length, or no shares", "shares of time")
-    n_r, n_t = shares.shape
-    t, r = np.meshgrid(_centers(lot.temperature_c, n_t), _centers(lot.slope_c_per_min, n_r))
-    there = shares > 0.0
-    return Asked(t[there], r[there], shares[there] / shares.sum(), lot.between_dph)
-
-
-def _centers(span: tuple[float, float], n: int) -> Floats:
-    return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))

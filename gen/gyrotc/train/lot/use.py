@@ -12,41 +12,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.earlier import EarlierUse
-from ...results.lot import LotUse, UnitCurve
+from ...errors import InputError
+from ...results.lot import KnownMap, Lot, LotUse, UnitCurve
 from ..data import Bins, Scaling, TrainingData, average
 from ..guard import objection
+from ..means import UnitMeans, unit_means
 from ..mrbf import fit_mrbf
-from ..process import MEAN_S, Process, TrainingFailed, fit_process
+from ..prior import Given
+from ..process import MEAN_S, Asked, Process, TrainingFailed, fit_process
 from ..result import Outcome
-from .learn import UnitMeans
-from .means import unit_means
-from .prior import LotPrior, MapPosterior, MapPrior
-from .surprise import FALSE_ALARM
+from .basis import LotBasis
+from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
+from .surprise import FALSE_ALARM, freedom_of, of_few
 
-__all__ = ["Given", "curve_of", "fit_with_lot", "followed", "seen_alone"]
+__all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
 
 Floats = NDArray[np.float64]
 _CURVE = 41  # points of the picture
 _KEPT_DIGITS = 6  # of its numbers
-
-
-@dataclass(frozen=True, slots=True)
-class Given:
-    """What a lot, or an earlier model, made of a unit.
-
-    Attributes:
-        map: Networks and scaling over both envelopes; None: the prior was not used.
-        findings: What a user should know.
-        lot, prior: For `training.json`: what a lot did, or an earlier model.
-        posterior: What the map follows; None: the prior was not used.
-    """
-
-    map: tuple[Outcome, Scaling] | None
-    findings: list[dict[str, Any]]
-    lot: LotUse | None = None
-    prior: EarlierUse | None = None
-    posterior: MapPosterior | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,31 +66,121 @@ class _PosteriorMap:
         return s.center_c + s.half_range_c * np.asarray(t), s.half_range_c_per_min * np.asarray(r)
 
 
-def fit_with_lot(
-    samples: TrainingData, own: Scaling, prior: LotPrior, serial: str, *, seed: int, average_s: float
-) -> Given:
-    """Tests whether a unit fits its lot, and fits it with the lot if it does.
+@dataclass(frozen=True, slots=True)
+class LotPrior(MapPrior):
+    """What a lot says of a unit that was not seen.
 
-    Args:
-        samples: Cleaned samples of the unit.
-        own: Their scaling.
-        prior: The lot.
-        serial: The unit's serial: one of the lot is told.
-        seed: Of the Kohonen network.
-        average_s: Averaging of RMS figures, s.
+    Attributes:
+        lot: The file.
     """
-    alone, unit = seen_alone(samples, own)
-    posterior = prior.with_runs(unit)
-    if posterior.p_value < FALSE_ALARM:
-        use = _use(prior, posterior, serial, accepted=False, scaling=own)
-        return Given(None, [_stranger(use)], lot=use)
-    found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
-    if isinstance(found, str):
-        use = _use(prior, posterior, serial, accepted=False, scaling=own)
-        text = f"The lot is not used: a map with it is refused: {found}."
-        return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}], lot=use)
-    use = _use(prior, posterior, serial, accepted=True, scaling=found[1])
-    return Given(found, [], lot=use, posterior=posterior)
+
+    lot: Lot
+
+    @property
+    def key(self) -> str:
+        return self.lot.checksum
+
+    def check_axis(self, axis: str | None) -> None:
+        """Refuses the recordings of another axis.
+
+        Raises:
+            InputError: They are of another.
+        """
+        if self.lot.axis != axis:
+            raise InputError("--lot", f"of axis {self.lot.axis}", f"a lot of axis {axis}, as the recordings")
+
+    def with_samples(
+        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
+    ) -> Given:
+        """Tests whether a unit fits its lot, and fits it with the lot if it does.
+
+        Args:
+            samples: Cleaned samples of the unit.
+            own: Their scaling.
+            serial: The unit's serial: one of the lot is told.
+            seed: Of the Kohonen network.
+            average_s: Averaging of RMS figures, s.
+        """
+        alone, unit = seen_alone(samples, own)
+        posterior = self.with_runs(unit)
+        if posterior.p_value < FALSE_ALARM:
+            use = _use(self, posterior, serial, accepted=False, scaling=own)
+            return Given(None, [_stranger(use)], lot=use)
+        found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        if isinstance(found, str):
+            use = _use(self, posterior, serial, accepted=False, scaling=own)
+            text = f"The lot is not used: a map with it is refused: {found}."
+            return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}], lot=use)
+        use = _use(self, posterior, serial, accepted=True, scaling=found[1])
+        known = known_map(posterior)
+        return Given(found, [], "the unit fits its lot", lot=use, known=known)
+
+
+def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
+    """The prior that a file holds.
+
+    Raises:
+        InputError: The file contradicts itself: lengths that differ, a covariance that is none.
+    """
+    basis = LotBasis.read(lot.functions)
+    kept = basis.kept
+    directions = (
+        np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
+    )
+    rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
+    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
+    scale = lot.cross_validation.spread_scale * of_few(freedom)
+    means, covariances = _of_clusters(lot, scale, rest, where)
+    sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
+    if not (sizes > 0.0).all():
+        raise InputError(f"{where}, clusters", "one without units", "units in each")
+    shares = sizes / sizes.sum()
+    return LotPrior(
+        basis=basis,
+        center_dph=lot.center_dph,
+        unit_dph=lot.unit_dph,
+        temperature_c=lot.temperature_c,
+        slope_c_per_min=lot.slope_c_per_min,
+        means=means,
+        covariances=covariances,
+        share=shares,
+        rest=processed(lot.rest),
+        asked=_asked(lot, where),
+        freedom=freedom,
+        lot=lot,
+    )
+
+
+def _of_clusters(lot: Lot, scale: float, rest: Floats, where: str) -> tuple[Floats, Floats]:
+    """Means and covariances of a new unit's coefficients, one for each cluster."""
+    n = len(lot.functions.kept)
+    means, covariances = [], []
+    for number, cluster in enumerate(lot.clusters):
+        at = f"{where}, clusters, {number}"
+        lower = triangle(cluster.covariance, n, at)
+        if len(cluster.mean) != n:
+            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{n}, one a function")
+        covariance = scale * (rest + lower + np.tril(lower, -1).T)
+        check_positive(covariance, at)
+        means.append(np.array(cluster.mean))
+        covariances.append(covariance)
+    return np.array(means), np.array(covariances)
+
+
+def _asked(lot: Lot, where: str) -> Asked:
+    """Centers of the cells in which units were."""
+    rows = {len(row) for row in lot.occupancy}
+    shares = np.array(lot.occupancy, dtype=np.float64) if len(rows) == 1 else np.zeros((0, 0))
+    if shares.size == 0 or shares.min() < 0.0 or not shares.sum() > 0.0:
+        raise InputError(f"{where}, occupancy", "rows that differ in length, or no shares", "shares of time")
+    n_r, n_t = shares.shape
+    t, r = np.meshgrid(_centers(lot.temperature_c, n_t), _centers(lot.slope_c_per_min, n_r))
+    there = shares > 0.0
+    return Asked(t[there], r[there], shares[there] / shares.sum(), lot.between_dph)
+
+
+def _centers(span: tuple[float, float], n: int) -> Floats:
+    return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
 
 
 def followed(
@@ -255,3 +328,23 @@ def _stranger(use: LotUse) -> dict[str, Any]:
         "another design, another batch of mirrors, the wrong lot, a fault.",
         "evidence": {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum},
     }
+
+
+def known_map(posterior: MapPosterior) -> KnownMap:
+    """A posterior as `training.json` holds it."""
+    prior = posterior.prior
+    basis, asked = prior.basis, prior.asked
+    return KnownMap(
+        temperature_c=prior.temperature_c,
+        slope_c_per_min=prior.slope_c_per_min,
+        center_dph=prior.center_dph,
+        unit_dph=prior.unit_dph,
+        functions=basis.told(),
+        mean=rounded(posterior.mean),
+        covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
+        rest=process_told(prior.rest),
+        asked_temperature_c=rounded(asked.temperature_c),
+        asked_slope_c_per_min=rounded(asked.slope_c_per_min),
+        asked_share=rounded(asked.share),
+        between_dph=asked.between_dph,
+    )
