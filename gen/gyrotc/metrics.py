@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inputs import need_memory
-from .results.evaluation import Pooled, Statistics
 
 __all__ = [
     "LEAST_SPAN_C",
@@ -23,7 +22,6 @@ __all__ = [
     "average",
     "median",
     "middle_of_five",
-    "pooled",
     "statistics",
     "time_statistics",
 ]
@@ -161,12 +159,3 @@ def _rms_of_windows(a: Averages, window_s: float, average_s: float) -> float | N
     means = np.bincount(number, weights=a.after_dph) / np.maximum(count, 1)
     full = means[count >= 0.9 * window_s / average_s]
     return float(np.sqrt(np.mean(full**2))) if full.size else None
-
-
-def pooled(runs: list[Averages]) -> Pooled:
-    """`before` and `after` over all samples of several runs, and the improvement (RMS ÷ RMS)."""
-    before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
-    after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
-    was, remains = Statistics(**statistics(before)), Statistics(**statistics(after))
-    improvement = was.rms_dph / remains.rms_dph if was.rms_dph is not None and remains.rms_dph else None
-    return Pooled(before=was, after=remains, improvement=improvement, samples=int(after.size))

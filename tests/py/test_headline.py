@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.commands.results import summary
-from gyrotc.metrics import Averages, pooled
+from gyrotc.metrics import Averages
 from gyrotc.pages.published import ENVIRONMENTS
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics
 
@@ -17,7 +17,7 @@ CONSTANT = 7.2e-3  # mean of the training runs
 
 def part(before: np.ndarray, after: np.ndarray) -> Pooled:
     still = np.zeros(len(before))
-    return pooled([Averages(still, before, after, still)])
+    return Pooled.of([Averages(still, before, after, still)])
 
 
 def evaluation(**changes: object) -> Evaluation:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.metrics import average, median, middle_of_five, pooled, statistics, time_statistics
+from gyrotc.metrics import average, median, middle_of_five, statistics, time_statistics
+from gyrotc.results.evaluation import Pooled
 
 
 def _averages(values: np.ndarray, period: float = 10.0, average_s: float = 100.0, **scored: np.ndarray):
@@ -39,7 +40,7 @@ def test_bins_less_than_half_full_are_left_out() -> None:
 
 def test_pooled_figures_weigh_every_sample_alike() -> None:
     runs = [_averages(np.full(1000, 1.0)), _averages(np.full(3000, 3.0))]
-    result = pooled(runs)
+    result = Pooled.of(runs)
     assert result.samples == 400
     assert result.after.rms_dph == pytest.approx(np.sqrt((100 * 1 + 300 * 9) / 400))
     assert result.improvement == pytest.approx(1.0)

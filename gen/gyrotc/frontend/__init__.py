@@ -11,7 +11,19 @@ from __future__ import annotations
 
 from .believe import BELIEVED, HELD, RESTART, Guarded, believe
 from .channels import channel_at
-from .follow import FALLBACK, KEEP, MAP, Settings, Steps, expand_missed, follow, positions, with_missing
+from .follow import (
+    FALLBACK,
+    KEEP,
+    MAP,
+    Settings,
+    Steps,
+    expand_missed,
+    follow,
+    period_us,
+    positions,
+    samples_per_block,
+    with_missing,
+)
 from .numbers import F32, Q31, Arithmetic
 from .screen import departing_rows
 from .stream import Stream
@@ -20,9 +32,7 @@ from .training import (
     Blocks,
     blocks_since_power_on,
     missed_before,
-    period_us,
     run_blocks,
-    samples_per_block,
 )
 
 __all__ = [

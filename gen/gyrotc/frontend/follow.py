@@ -24,7 +24,9 @@ __all__ = [
     "Steps",
     "expand_missed",
     "follow",
+    "period_us",
     "positions",
+    "samples_per_block",
     "with_missing",
 ]
 
@@ -280,3 +282,13 @@ def _closings(
         slope=np.concatenate([none.astype(slope.dtype), slope]),
         remarks=np.concatenate([none, np.where(good & warming, WARMING, 0)]).astype(np.int32),
     )
+
+
+def samples_per_block(block_s: float, row_period_s: float) -> int:
+    """Rows per block, at least 1."""
+    return max(1, round(block_s / row_period_s))
+
+
+def period_us(block_us: int, samples_per_block: int) -> int:
+    """Sample period of a target with so many samples in a block, microseconds; at least 1."""
+    return max(1, (block_us + samples_per_block // 2) // samples_per_block)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import status as status_bits
 from .believe import Guarded
-from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
+from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow, period_us, samples_per_block
 from .numbers import F32
 from .screen import departing_rows
 from .stream import Stream
@@ -18,7 +18,7 @@ from .stream import Stream
 if TYPE_CHECKING:
     from ..dataset import Rows, Run
 
-__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "period_us", "run_blocks", "samples_per_block"]
+__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks"]
 
 PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
 _GAP = 1.5  # median row periods
@@ -57,16 +57,6 @@ class Blocks:
     def used(self) -> NDArray[np.bool_]:
         """Which blocks are training samples."""
         return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
-
-
-def samples_per_block(block_s: float, row_period_s: float) -> int:
-    """Rows per block, at least 1."""
-    return max(1, round(block_s / row_period_s))
-
-
-def period_us(block_us: int, samples_per_block: int) -> int:
-    """Sample period of a target with so many samples in a block, microseconds; at least 1."""
-    return max(1, (block_us + samples_per_block // 2) // samples_per_block)
 
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from .. import __version__
 from ..dataset import Dataset, Run
 from ..errors import InputError
 from ..frontend import Blocks
-from ..metrics import Averages, average, pooled
+from ..metrics import Averages, average
 from ..results.comparison import Comparison, Group, Method
 from ..results.evaluation import Pooled
 from ..train import METHODS, Fit, TrainingData, fit, predict
@@ -143,10 +143,10 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Com
         (h.environment, _averages(h, fitted, options)) for h, fitted in _fits(whole, data, held, options)
     ]
     environments = list(dict.fromkeys(name for name, _ in judged))
-    total = pooled([a for _, a in judged])
+    total = Pooled.of([a for _, a in judged])
     return Method(
         id=method,
-        groups=tuple(_group(name, pooled([a for n, a in judged if n == name])) for name in environments),
+        groups=tuple(_group(name, Pooled.of([a for n, a in judged if n == name])) for name in environments),
         exam_rms_dph=total.after.rms_dph,
         exam_std_dph=total.after.std_dph,
         before_rms_dph=total.before.rms_dph,

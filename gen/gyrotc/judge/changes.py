@@ -6,7 +6,7 @@ envelope is the drift of the gyro, of its thermometer or of the procedure, and b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Set
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from ..results.manifest import Manifest
 from .as_found import as_found, history_of
 from .limits import Limits
 
-__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "refuse_another", "started_on"]
+__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "started_on"]
 
 Floats = NDArray[np.float64]
 
@@ -85,19 +85,6 @@ def earlier_models(folder: Path) -> dict[str, Model]:
     if not models:
         raise InputError(f"--previous {folder}", "has no model.json", "a folder that gyrotc build wrote")
     return {model.axis or "": model for model in models}
-
-
-def refuse_another(models: Mapping[str, Model], serial: str) -> None:
-    """Refuses an earlier result that is of another gyro.
-
-    Raises:
-        InputError: It is not.
-    """
-    for model in models.values():
-        if model.serial != serial:
-            raise InputError(
-                "--previous", f"is of {_name(model.serial, model.axis)}", _name(serial, model.axis)
-            )
 
 
 def changes_since(

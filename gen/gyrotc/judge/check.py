@@ -18,7 +18,6 @@ from ..dataset.problems import Problems
 from ..errors import InputError
 from ..model import Model
 from ..results.check import Checked, CheckedRun, Doubted, MarkedRows, Problem
-from .changes import refuse_another
 from .doubts import Doubt, Envelope, doubts_of_data_set, looked_at, where_of
 
 __all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
@@ -130,7 +129,7 @@ def check(
         problems |= {str(problem): problem for problem in told.found}
         marks |= told.marks
         if dataset is not None:
-            refuse_another(earlier or {}, dataset.serial)
+            _refuse_another(earlier or {}, dataset)
             datasets.append((one, dataset))
             looked = []
             for k, run in enumerate(dataset.runs, 1):
@@ -202,3 +201,11 @@ def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
 
 def _counted(things: Sequence[object], word: str) -> str:
     return f"{len(things)} {word}" + "s" * (len(things) != 1)
+
+
+def _refuse_another(models: Mapping[str, Model], dataset: Dataset) -> None:
+    """Refuses models of an earlier calibration that are of another gyro."""
+    for model in models.values():
+        if model.serial != dataset.serial:
+            axis = f", axis {model.axis}" if model.axis else ""
+            raise InputError("--previous", f"is of gyro {model.serial}{axis}", f"gyro {dataset.serial}{axis}")

@@ -13,7 +13,7 @@ from ..frontend import departing_rows, samples_per_block
 from ..model import Model
 from ..train.left_out import exclude_text, stretches_left_out
 from .advice import advice_of
-from .findings import (
+from .data_findings import (
     contradiction_findings,
     counter_findings,
     earth_rate_findings,

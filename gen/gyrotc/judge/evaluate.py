@@ -20,7 +20,7 @@ from .. import __version__
 from ..dataset import Dataset, Rows, Run, RunFacts, facts_of
 from ..emit import emitted_tables
 from ..errors import CheckFailed, GyrotcError
-from ..metrics import Averages, average, pooled, statistics, time_statistics
+from ..metrics import Averages, average, statistics, time_statistics
 from ..model import Model, load_model
 from ..outputs import create
 from ..quantise import Table
@@ -31,6 +31,7 @@ from ..results.evaluation import (
     FigureUncertainty,
     FoundIn,
     ModelSizes,
+    Pooled,
     RunStatistics,
     Statistics,
 )
@@ -301,8 +302,8 @@ def _result(  # long: one line for each field of the result
         noise_floor_source=source,
         mismatches=sum(compared) if len(compared) == len(parts) else None,
         runs=tuple(_evaluated(p, average_s) for p in parts),
-        train=pooled(train) if train else None,
-        exam=pooled(exam) if exam else None,
+        train=Pooled.of(train) if train else None,
+        exam=Pooled.of(exam) if exam else None,
         findings=(),
         model=ModelSizes(
             method=model.method,

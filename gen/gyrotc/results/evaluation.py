@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ..metrics import Averages, statistics
 from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
 
 __all__ = [
@@ -37,6 +40,15 @@ class Pooled(Part):
     after: Statistics = Field(description="after compensation")
     improvement: Figure = Field(description="RMS before over RMS after")
     samples: Count = Field(description="means over `average_s`")
+
+    @classmethod
+    def of(cls, runs: Sequence[Averages]) -> Pooled:
+        """Figures over all samples of several runs."""
+        before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
+        after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
+        was, remains = Statistics(**statistics(before)), Statistics(**statistics(after))
+        ratio = was.rms_dph / remains.rms_dph if was.rms_dph is not None and remains.rms_dph else None
+        return cls(before=was, after=remains, improvement=ratio, samples=int(after.size))
 
 
 class EvaluatedRun(Part):
