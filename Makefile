@@ -80,7 +80,7 @@ check:
 	@tools/setup.sh check
 	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
-	@cd gen && ../.venv/bin/mypy gyrotc
+	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/promises
 	@$(PYTHON) -m gyrotc.paper docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/test_paper_reference.py

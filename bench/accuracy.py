@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from gyrotc.train import Fit, TrainingData, fit, predict
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import fit
+from gyrotc.train.result import Fit, predict
 
 from . import learning
 from .problems import Gyro, gyro, joined, ratio

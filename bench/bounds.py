@@ -6,10 +6,10 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from gyrotc.emit import emit
 from gyrotc.model import Coverage, Model, load_model
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.reference.table import Table
+from gyrotc.tables.files import emit
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.table import Table
 from gyrotc.verify.bounds import instruction_bounds
 from gyrotc.verify.functions import function_costs
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program

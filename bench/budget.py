@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import load
+from gyrotc.assess.limits import load_limits
 from gyrotc.jobs.build import build_into
-from gyrotc.judge.limits import load_limits
-from gyrotc.quantise import quantise
-from gyrotc.reference import replay
+from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.budget import Budget
-from gyrotc.simulate import simulate
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.history import replay
 from gyrotc.train.fitting import FitOptions
 
 from .sigma import CAMPAIGNS

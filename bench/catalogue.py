@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.jobs.fleet import catalogued
-from gyrotc.jobs.fleet.catalogue import SCHEMA
+from gyrotc.fleet.catalogue import SCHEMA, catalogued
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
 from results import write

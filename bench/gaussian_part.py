@@ -11,9 +11,9 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from gyrotc.emit import emit
 from gyrotc.model import load_model
-from gyrotc.quantise import NUMERICS
+from gyrotc.tables.files import emit
+from gyrotc.tables.quantise import NUMERICS
 from gyrotc.verify.functions import function_costs
 from gyrotc.verify.toolchain import all_targets, disassembly
 

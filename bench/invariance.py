@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gyrotc.train import TrainingData, fit
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import fit
 from numpy.typing import NDArray
 
 from .problems import gyro, joined, means

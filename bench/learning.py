@@ -9,7 +9,9 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from gyrotc.train import TrainingData, fit, predict
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import fit
+from gyrotc.train.result import predict
 from numpy.typing import NDArray
 
 from .problems import Predictor, means

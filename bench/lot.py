@@ -9,7 +9,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from gyrotc.jobs.fleet import load_manifest, run_fleet, summary_of
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.page import summary_of
+from gyrotc.fleet.run import run_fleet
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "py"))

@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gyrotc.train import TrainingData, fit, uncertainty
-from gyrotc.train.data import cleaned, scaling_of
-from gyrotc.train.lot import LotPrior, UnitMeans
-from gyrotc.train.lot.earlier import posterior_of_means, stated_sigma_dph, widened
-from gyrotc.train.lot.held import held
-from gyrotc.train.lot.learn import sums_of
-from gyrotc.train.lot.surprise import FALSE_ALARM
+from gyrotc.train.means import UnitMeans
+from gyrotc.lot.earlier import posterior_of_means, stated_sigma_dph, widened
+from gyrotc.lot.held import held
+from gyrotc.lot.learn import sums_of
+from gyrotc.lot.surprise import FALSE_ALARM
+from gyrotc.lot.use import LotPrior
+from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.means import unit_means
-from gyrotc.train.process import fit_process
+from gyrotc.train.evidence import fit_process
+from gyrotc.train.methods import fit
+from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray
 from scipy.stats import norm
 

@@ -21,17 +21,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import load
+from gyrotc.lot.learn import learn
+from gyrotc.lot.use import LotPrior
+from gyrotc.recordings.load import load
 from gyrotc.results.lot import Lot
-from gyrotc.simulate import read_truth
 from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
-from gyrotc.train import Fit, TrainingData, fit, predict, uncertainty
-from gyrotc.train.data import cleaned, joined, scaling_of
+from gyrotc.simulate.truth import read_truth
+from gyrotc.train.data import TrainingData, cleaned, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.lot import LotPrior, learn
 from gyrotc.train.means import UnitMeans, unit_means
+from gyrotc.train.methods import fit
+from gyrotc.train.result import Fit, predict
+from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray
 
 from .lot_checks import best_power, recalibrated, seen
@@ -143,8 +146,8 @@ def ordered(case: Case) -> LotOrder:
 
 def learnt(units: list[UnitMeans]) -> LotPrior:
     """A lot as `gyrotc lot` makes it, without the way over files."""
-    from gyrotc.jobs.lot import lot_from
-    from gyrotc.train.lot import prior_of
+    from gyrotc.lot.job import lot_from
+    from gyrotc.lot.use import prior_of
 
     t = [float(f(u.temperature_c)) for u in units for f in (np.min, np.max)]
     r = [float(f(u.slope_c_per_min)) for u in units for f in (np.min, np.max)]

@@ -9,10 +9,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from gyrotc.dataset import load
-from gyrotc.simulate import read_truth, simulate
-from gyrotc.train import TrainingData
-from gyrotc.train.data import average, joined
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
+from gyrotc.simulate.truth import read_truth
+from gyrotc.train.data import TrainingData, average, joined
 from gyrotc.train.fitting import front_end, samples_of
 from numpy.typing import NDArray
 

@@ -13,13 +13,14 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from gyrotc.emit import vectors
-from gyrotc.emit.files import emit, emitted_tables
-from gyrotc.emit.vectors import make_vectors
-from gyrotc.errors import CheckFailed
+from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
-from gyrotc.reference import answers, evaluate_map
-from gyrotc.reference.table import Table
+from gyrotc.tables import vectors
+from gyrotc.tables.files import emit, emitted_tables
+from gyrotc.tables.vectors import make_vectors
+from gyrotc.target.history import answers
+from gyrotc.target.maps import evaluate_map
+from gyrotc.target.table import Table
 from gyrotc.verify.board import Job, board_entries
 from gyrotc.verify.exhaustive import visit_all
 from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compiler_version, symbols

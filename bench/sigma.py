@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 from gyrotc.model import Term
-from gyrotc.reference import replay
-from gyrotc.status import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING
+from gyrotc.target.history import replay
+from gyrotc.target.status import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING
 from numpy.typing import NDArray
 from scipy.special import ndtr
 

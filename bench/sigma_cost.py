@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from gyrotc.emit import emit
 from gyrotc.model import load_model
+from gyrotc.tables.files import emit
 from gyrotc.verify.toolchain import all_targets, compile_c, run_program
 
 __all__ = ["cost"]

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import load
 from gyrotc.model import Model, Term
-from gyrotc.quantise import Table, quantise
-from gyrotc.simulate import simulate
-from gyrotc.simulate.campaign import campaign, with_noise
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
-from gyrotc.terms.arithmetic import FLOAT64
-from gyrotc.terms.recursion import TermOutcome, recursion_of
-from gyrotc.train import TrainingData, fit
-from gyrotc.train.data import joined
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.arithmetic import FLOAT64
+from gyrotc.target.recursion import TermOutcome, recursion_of
+from gyrotc.target.table import Table
+from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
+from gyrotc.train.methods import fit
 from gyrotc.train.rules import start_sigma
 from numpy.typing import NDArray
 

@@ -16,18 +16,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import Dataset, Rows, load
-from gyrotc.dataset.records import joined_runs
+from gyrotc.causes.base import Scene
 from gyrotc.model import Model
-from gyrotc.quantise import quantise
-from gyrotc.quantise.applied import applied_of
-from gyrotc.simulate import read_truth, simulate
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset, Rows, joined_runs
+from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
-from gyrotc.terms import Scene
-from gyrotc.train import TrainingData, fit, predict
+from gyrotc.simulate.truth import read_truth
+from gyrotc.tables.applied import applied_of
+from gyrotc.tables.quantise import quantise
 from gyrotc.train.channels import seen_by_target
-from gyrotc.train.data import average, joined
+from gyrotc.train.data import TrainingData, average, joined
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, samples_of
+from gyrotc.train.methods import fit
+from gyrotc.train.result import predict
 from numpy.typing import NDArray
 
 from .gaussian_part import gaussian_instructions

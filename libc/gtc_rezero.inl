@@ -3,7 +3,7 @@
  *
  * The rest is weighed as a Kalman filter weighs a measurement: the constant has the variance P that training saw from
  * power-on to power-on, the mean residual of the rest that of the correction and of the noise over its length, R.
- * The shift takes the share P/(P + R) of it and leaves the variance P R/(P + R). gen/gyrotc/reference/sigma.py is its mirror.
+ * The shift takes the share P/(P + R) of it and leaves the variance P R/(P + R). gen/gyrotc/target/sigma.py is its mirror.
  *
  * SPDX-License-Identifier: MIT
  */

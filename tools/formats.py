@@ -10,7 +10,6 @@ import re
 import sys
 from pathlib import Path
 
-from gyrotc.emit.record import EmissionRecord
 from gyrotc.model import Model
 from gyrotc.results.base import Part
 from gyrotc.results.budget import Budget
@@ -36,6 +35,7 @@ from gyrotc.results.release import Release
 from gyrotc.results.training import Training
 from gyrotc.results.truth import SimulatedTruth
 from gyrotc.results.verification import JointVerification, Verification
+from gyrotc.tables.record import EmissionRecord
 from pydantic import BaseModel
 
 ROOT = Path(__file__).resolve().parents[1]

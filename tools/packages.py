@@ -27,7 +27,7 @@ MODE = 0o100644 << 16
 
 def _amalgamated() -> tuple[str, str]:
     """Header and source by the generator that lies beside this file, whichever is installed."""
-    spec = importlib.util.spec_from_file_location("amalgamate", ROOT / "gen/gyrotc/emit/amalgamate.py")
+    spec = importlib.util.spec_from_file_location("amalgamate", ROOT / "gen/gyrotc/tables/amalgamate.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

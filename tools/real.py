@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
-from gyrotc.dataset import axes_of, load
-from gyrotc.emit import emit
-from gyrotc.judge.evaluate import evaluate
-from gyrotc.metrics import average
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.common.metrics import average
 from gyrotc.pages.plots import AFTER, BEFORE, svg
 from gyrotc.paper.page import filled
+from gyrotc.recordings.load import axes_of, load
+from gyrotc.tables.files import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.spans import training_spans
 from matplotlib.figure import Figure

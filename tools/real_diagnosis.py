@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import load
-from gyrotc.diagnose.attribute.single_cycle import cycle_of
-from gyrotc.diagnose.extend.refit import Effect
-from gyrotc.diagnose.extend.refitting import Refitting
-from gyrotc.diagnose.screen.gather import records_of
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.refit import Effect
+from gyrotc.diagnose.refitting import Refitting
+from gyrotc.diagnose.single_cycle import cycle_of
 from gyrotc.paper.page import filled
-from gyrotc.train import TrainingData
+from gyrotc.recordings.load import load
+from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, front_end, samples_of
 from real import with_exam
 

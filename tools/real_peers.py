@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gyrotc.dataset import Dataset, Run
-from gyrotc.frontend import Blocks
-from gyrotc.metrics import average
-from gyrotc.train import TrainingData
+from gyrotc.common.metrics import average
+from gyrotc.recordings.records import Dataset, Run
+from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.data import average as means_of
-from gyrotc.train.data import joined
 from gyrotc.train.fitting import FrontEnd, front_end, samples_of
+from gyrotc.train.samples import Blocks
 
 BLOCK_S = 10.0
 AVERAGE_S = 100.0

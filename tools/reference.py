@@ -19,8 +19,9 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 #: Modules that may be imported by users' programs; what stands in their `__all__`.
 PYTHON = (
-    "model", "dataset", "frontend", "train", "quantise", "reference", "emit", "verify", "judge.evaluate", "diagnose",
-    "simulate", "plan", "metrics", "errors",
+    "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
+    "tables.files", "target.maps", "target.history", "verify.job", "assess.evaluate", "diagnose.result",
+    "simulate.campaign", "plan.plan", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(
     r"/\* (?P<text>(?:(?!\*/).)*?) ?\*/\n(?P<code>(?:GTC_MUST_CHECK int gtc_\w+\([^;]*;\n)+)", re.DOTALL
@@ -49,7 +50,7 @@ def c_page() -> str:
 
 def cli_page() -> str:
     """Every command with its arguments and options."""
-    from gyrotc.commands import app
+    from gyrotc.cli.commands import app
     from typer.main import get_command
 
     parts = [
@@ -107,9 +108,9 @@ def schemas_page() -> str:
 def python_page() -> str:
     """Every public name of the modules above with its signature and documentation."""
     parts = ["# Python reference\n", "Made from the docstrings by `tools/reference.py`.\n"]
-    for room in PYTHON:
-        module = importlib.import_module(f"gyrotc.{room}")
-        parts += [f"## gyrotc.{room}\n", inspect.cleandoc(module.__doc__ or "") + "\n"]
+    for dotted in PYTHON:
+        module = importlib.import_module(f"gyrotc.{dotted}")
+        parts += [f"## gyrotc.{dotted}\n", inspect.cleandoc(module.__doc__ or "") + "\n"]
         for name in sorted(module.__all__):
             parts += _documented(name, getattr(module, name))
     return "\n".join(parts)

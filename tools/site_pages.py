@@ -1,7 +1,7 @@
 """What the pages need to become a site (`make site`): MkDocs calls `on_files` and `on_page_markdown` (docs/mkdocs.yml).
 
 Pages that stand beside `docs/` come along below `sources/`, as do files that a page links to, so that no link is dead;
-words behind the language of a block, which say how a test runs it, go; the picture of the rooms is drawn here, since
+words behind the language of a block, which say how a test runs it, go; the drawing of the packages is made here, since
 what draws it on a server would be fetched by every reader.
 """
 
@@ -92,7 +92,7 @@ def linked(text: str, page: Path, name: str) -> str:
 
 
 def picture(graph: dict[str, set[str]]) -> str:
-    """The rooms as an SVG drawing: each in the row below the last room that it imports."""
+    """The packages as an SVG drawing: each in the row below the last package that it imports."""
     depth: dict[str, int] = {}
     for name in sorted(graph, key=lambda n: len(architecture.reach(graph, n))):
         depth[name] = max((depth[other] + 1 for other in graph[name]), default=0)
@@ -135,7 +135,7 @@ def _box(name: str, x: int, y: int) -> str:
 def prepared(text: str, page: Path, name: str) -> str:
     """The text of a page as the site takes it."""
     if _PICTURE.search(text):
-        text = _PICTURE.sub(lambda _: picture(architecture.rooms()), text)
+        text = _PICTURE.sub(lambda _: picture(architecture.packages()), text)
     return _WORDS.sub(r"\1", linked(text, page, name))
 
 

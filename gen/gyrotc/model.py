@@ -1,8 +1,7 @@
 # long: one file format; its fields, their checks and the equation are read together
 """The fitted model of one axis of one gyro: frozen in memory, JSON on disk (docs/FORMAT.md, section 1).
 
-Stage 4 of the house (recordings → samples → **model** → tables → C → proof → report). Reads and
-writes `model.json` and evaluates the network's equation in float64; knows nothing of rounding.
+Reads and writes `model.json` and evaluates the network's equation in float64; knows nothing of rounding.
 
 The network is eq. (1), (2) of Ding et al. 2014, with one width per input and center:
 
@@ -34,11 +33,13 @@ from pydantic import (
     model_validator,
 )
 
-from .errors import InputError
-from .inputs import read_json
-from .outputs import digest_of, json_text, write_atomically
-from .terms import CATALOGUE, Cause
-from .terms.tabled import Tabled
+from .causes import CATALOGUE
+from .causes.base import Cause
+from .causes.tabled import Tabled
+from .common.errors import InputError
+from .common.inputs_texts import read_json
+from .store.files import write_atomically
+from .store.jsontext import digest_of, json_text
 
 __all__ = [
     "SCHEMA",

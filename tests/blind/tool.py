@@ -17,8 +17,8 @@ from typing import Any
 
 def main() -> None:
     """Answers until stdin ends."""
-    from gyrotc.dataset import load
-    from gyrotc.diagnose import diagnose
+    from gyrotc.diagnose.result import diagnose
+    from gyrotc.recordings.load import load
 
     for line in sys.stdin:
         folder, target = line.rstrip("\n").split("\t")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import load_model
+from gyrotc.tables.files import emit_texts, quantise_all
 
 HERE = Path(__file__).resolve().parent
 

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from gyrotc.errors import GyrotcError
-from gyrotc.outputs import Interrupted, die_of, raise_on_signals
+from gyrotc.common.errors import GyrotcError
+from gyrotc.store.interrupts import Interrupted, die_of, raise_on_signals
 
 ACTIONS = {
     "KILL": int(signal.SIGKILL),

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrotc.jobs.fleet import load_manifest
-from gyrotc.jobs.fleet.fingerprint import program_of
-from gyrotc.jobs.fleet.unit import Task, do_unit
-from gyrotc.outputs import faults
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
+from gyrotc.store.fingerprint import program_of
+from gyrotc.store.marker import faults
 
 from .driver import run
 from .jobs import GYROTC, Case, command

@@ -12,7 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gyrotc.outputs import MARKER, faults, read_marker, result_folder, write_atomically, write_result
+from gyrotc.store.files import write_atomically
+from gyrotc.store.folder import result_folder, write_result
+from gyrotc.store.marker import MARKER, faults, read_marker
 
 from .driver import Job
 
@@ -179,7 +181,7 @@ def _stamp(root: Path, model: Path) -> Case:
     return Case("stamp", lambda _: command("stamp", changed), (changed,), prepare=change)
 
 
-GYROTC = (sys.executable, "-c", "from gyrotc.cli import main; main()")
+GYROTC = (sys.executable, "-c", "from gyrotc.cli.main import main; main()")
 
 
 def _key(path: Path) -> Path:
@@ -189,7 +191,7 @@ def _key(path: Path) -> Path:
 
 def command(*arguments: object) -> None:
     """A command line, in this process."""
-    from gyrotc.cli import run
+    from gyrotc.cli.main import run
 
     raise SystemExit(
         run([str(a) for a in arguments])

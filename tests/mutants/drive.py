@@ -16,11 +16,11 @@ from pathlib import Path
 sys.meta_path = [finder for finder in sys.meta_path if "gyrotc" not in type(finder).__module__]
 
 import gyrotc  # noqa: E402
-from gyrotc.emit.files import emit  # noqa: E402
-from gyrotc.errors import CheckFailed, InputError  # noqa: E402
+from gyrotc.common.errors import CheckFailed, InputError  # noqa: E402
 from gyrotc.model import load_model  # noqa: E402
-from gyrotc.quantise import NUMERICS  # noqa: E402
-from gyrotc.verify import verify  # noqa: E402
+from gyrotc.tables.files import emit  # noqa: E402
+from gyrotc.tables.quantise import NUMERICS  # noqa: E402
+from gyrotc.verify.job import verify  # noqa: E402
 
 #: One target suffices: what is wrong is the generator, not a compiler.
 TARGET = "host-gcc-O2"

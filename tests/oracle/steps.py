@@ -80,9 +80,9 @@ def _inside(folder: Path) -> Any:
 
 
 def _gyrotc(words: list[str]) -> int:
-    from gyrotc import cli
+    from gyrotc.cli import main
 
-    return cli.run(words)
+    return main.run(words)
 
 
 def _lines(stream: io.StringIO) -> list[str]:

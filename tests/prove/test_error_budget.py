@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from emitted import GOLDEN
-from gyrotc.frontend.believe import Guarded
-from gyrotc.frontend.follow import Settings, follow
-from gyrotc.frontend.numbers import F32, Q31
 from gyrotc.model import Model, load_model
-from gyrotc.quantise import quantise
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.believe import Guarded
+from gyrotc.target.follow import Settings, follow
+from gyrotc.target.numbers import F32, Q31
 from numpy.typing import NDArray
 from results import Results
 

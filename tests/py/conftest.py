@@ -35,7 +35,7 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """The command as a user types it, run in this process: its exit status and what it prints."""
-    from gyrotc import cli
+    from gyrotc.cli import main
 
     words, out, err = [str(a) for a in args], io.StringIO(), io.StringIO()
     before = Path.cwd()
@@ -50,7 +50,7 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
         )  # as the program does; those of our own code fail the tests of that code
         os.chdir(cwd or before)
         try:
-            status = cli.run(words)
+            status = main.run(words)
         finally:
             os.chdir(before)
     return subprocess.CompletedProcess(["gyrotc", *words], status, out.getvalue(), err.getvalue())
@@ -58,7 +58,7 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
 
 def invoked(*args: object) -> Result:
     """The command in this process, which has all modules already."""
-    from gyrotc.commands import app
+    from gyrotc.cli.commands import app
     from typer.testing import CliRunner
 
     return CliRunner().invoke(app, [str(a) for a in args])

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.dataset import Dataset, load
-from gyrotc.emit.files import emit
 from gyrotc.model import Model, load_model
-from gyrotc.verify import verify
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
+from gyrotc.tables.files import emit
+from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import Target, all_targets, compiler_version
 from recordings import csv_text, toml
 

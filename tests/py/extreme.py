@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from gyrotc.model import Envelope, Model, Network, Scale
-from gyrotc.reference import maps
-from gyrotc.reference.table import Table, f32_words
+from gyrotc.target import maps
+from gyrotc.target.table import Table, f32_words
 from models import random_model
 from numpy.typing import NDArray
 

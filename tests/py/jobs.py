@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gyrotc.emit.files import emitted_tables
-from gyrotc.emit.vectors import make_vectors
 from gyrotc.model import load_model
-from gyrotc.reference import answers
+from gyrotc.tables.files import emitted_tables
+from gyrotc.tables.vectors import make_vectors
+from gyrotc.target.history import answers
 from gyrotc.verify.board import Job
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from conftest import ROOT
-from gyrotc.frontend import period_us
 from gyrotc.model import Model
-from gyrotc.reference.table import Table, Words
+from gyrotc.target.follow import period_us
+from gyrotc.target.table import Table, Words
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 

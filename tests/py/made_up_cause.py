@@ -8,14 +8,13 @@ On the target it is a memory with the amplitude −60 b/tau.
 from __future__ import annotations
 
 import numpy as np
-from gyrotc.terms import Cause, Features, History, Parameter, Scene
-from gyrotc.terms.base import Array, Values
-from gyrotc.terms.memory import RATES, lagged
-from gyrotc.terms.operators import first_order
-from gyrotc.terms.recursion import TableKind
-from gyrotc.terms.search import SearchRule, geometric
-from gyrotc.terms.tabled import Tabled, memory_gain
-from gyrotc.terms.words import Wording
+from gyrotc.causes.base import Array, Cause, Features, History, Parameter, Scene, Values
+from gyrotc.causes.memory import RATES, lagged
+from gyrotc.causes.search import SearchRule, geometric
+from gyrotc.causes.tabled import Tabled, memory_gain
+from gyrotc.causes.words import Wording
+from gyrotc.target.operators import first_order
+from gyrotc.target.recursion import TableKind
 
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 

@@ -11,39 +11,39 @@ from typing import Any
 
 import gyrotc.pages.report as pages
 import numpy as np
-from gyrotc.dataset import load
-from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.diagnose.signatures import cache
-from gyrotc.diagnose.signatures.signature_bank import build
-from gyrotc.emit.files import emit
-from gyrotc.emit.record import RECORD, read_options
-from gyrotc.errors import InputError
-from gyrotc.frontend import run_blocks
-from gyrotc.jobs.fleet import load_manifest
-from gyrotc.judge.budget import budget_of
-from gyrotc.judge.changes import Earlier, changes_since
-from gyrotc.judge.check import check
-from gyrotc.judge.evaluate import evaluate
-from gyrotc.judge.limits import held_against, load_limits
-from gyrotc.metrics import average
+from gyrotc.assess.budget import budget_of
+from gyrotc.assess.changes import Earlier, changes_since
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.assess.limits import held_against, load_limits
+from gyrotc.common.errors import InputError
+from gyrotc.common.metrics import average
+from gyrotc.diagnose import cache
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.result import diagnose
+from gyrotc.diagnose.signature_bank import build
+from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
-from gyrotc.outputs import kept
 from gyrotc.pages.diagnosis_page import write_diagnosis_page
 from gyrotc.pages.plan_page import write_plan_page
-from gyrotc.plan import plan
-from gyrotc.quantise import quantise
+from gyrotc.plan.plan import plan
+from gyrotc.quality.check import check
+from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.manifest import Manifest
 from gyrotc.results.planned import Plan
 from gyrotc.results.training import DeclaredUnits
-from gyrotc.simulate import read as read_scenario
-from gyrotc.simulate import simulate
+from gyrotc.simulate.campaign import simulate
+from gyrotc.simulate.scenario import read as read_scenario
 from gyrotc.simulate.truth import simulated_floor
+from gyrotc.store import kept
+from gyrotc.tables.files import emit
+from gyrotc.tables.quantise import quantise
+from gyrotc.tables.record import RECORD, read_options
 from gyrotc.train.fitting import FitOptions, fit_dataset
-from gyrotc.verify import verify
-from gyrotc.verify.boardlog import compared_words
+from gyrotc.train.samples import run_blocks
+from gyrotc.verify.board_log import compared_words
+from gyrotc.verify.job import verify
 from gyrotc.verify.logs import log_parts
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet

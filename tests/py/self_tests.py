@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import gyrotc
-from gyrotc.emit import emit_texts, quantise_all
 from gyrotc.model import Model
+from gyrotc.tables.files import emit_texts, quantise_all
 from gyrotc.verify.confined import run_to_end
 from gyrotc.verify.toolchain import Target, link
 from models import random_model, random_terms

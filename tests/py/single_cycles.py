@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from gyrotc.dataset import load
-from gyrotc.diagnose.screen.blocks import Records
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.simulate import simulate
+from gyrotc.diagnose.blocks import Records
+from gyrotc.diagnose.gather import records_of
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
 
 NOISE = (0.2, 0.5, 1.0, 2.0)
 """Levels of the noise, of 7e-4 deg/h of 100-s means."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from gyrotc.diagnose.detect.search import Search, open_search
-from gyrotc.diagnose.noise_colour.colours import Colour
-from gyrotc.diagnose.screen.blocks import Record, Records
-from gyrotc.diagnose.signatures.signature_bank import SignatureBank, build
-from gyrotc.terms.base import History
+from gyrotc.causes.base import History
+from gyrotc.diagnose.blocks import Record, Records
+from gyrotc.diagnose.colours import Colour
+from gyrotc.diagnose.search import Search, open_search
+from gyrotc.diagnose.signature_bank import SignatureBank, build
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from conftest import ROOT
 from emitted import measured
-from gyrotc.errors import CheckFailed
+from gyrotc.common.errors import CheckFailed
 from gyrotc.results.verification import FunctionCost
 from gyrotc.verify import board
 from gyrotc.verify.flow import parse_flows

@@ -8,23 +8,23 @@ from typing import Any
 
 import pytest
 from conftest import ROOT
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
+from gyrotc.assess.budget import budget_of
+from gyrotc.assess.instruments import instruments_in, last_day
+from gyrotc.assess.limits import Limits, load_limits
+from gyrotc.assess.stated import combined
+from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build_into
-from gyrotc.judge.budget import budget_of
-from gyrotc.judge.instruments import instruments_in, last_day
-from gyrotc.judge.limits import Limits, load_limits
-from gyrotc.judge.stated import combined
 from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
 from gyrotc.pages.words import rounded
+from gyrotc.recordings.load import load
 from gyrotc.results.base import read_optional, read_result
 from gyrotc.results.budget import Budget
 from gyrotc.results.changes import Changes
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.training import Training
 from gyrotc.results.verification import Verification
-from gyrotc.simulate import simulate
+from gyrotc.simulate.campaign import simulate
 from gyrotc.train.fitting import FitOptions
 
 sys.path.insert(0, str(ROOT))

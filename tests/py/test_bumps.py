@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.train import TrainingData, fit, predict
 from gyrotc.train.bumps import Bumps, find_bumps
-from gyrotc.train.data import cleaned, scaling_of
+from gyrotc.train.data import TrainingData, cleaned, scaling_of
+from gyrotc.train.methods import fit
+from gyrotc.train.result import predict
 
 SEED, BLOCK_S, NOISE_DPH = 20261123, 10.0, 3e-3
 HIDDEN = ((-20.0, 1.5, 6e-3), (15.0, 2.0, -4e-3), (40.0, 2.5, 4e-3))  # C, C, deg/h

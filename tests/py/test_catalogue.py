@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT, Command
-from gyrotc.errors import InputError
-from gyrotc.jobs.fleet import catalogued, load_manifest, run_fleet
-from gyrotc.jobs.fleet.catalogue import SCHEMA
-from gyrotc.outputs import sha256
+from gyrotc.common.errors import InputError
+from gyrotc.fleet.catalogue import SCHEMA, catalogued
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.run import run_fleet
+from gyrotc.store.marker import sha256
 from recordings import columns, toml, write_csv
 
 DAYS = ("2026-03-01", "2026-09-01")

@@ -1,4 +1,4 @@
-"""A cause is one file: a new one goes all the way, and nothing outside `terms` knows one by its name."""
+"""A cause is one file: a new one goes all the way, and nothing outside `causes` knows one by its name."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from pathlib import Path
 import made_up_cause
 import numpy as np
 import pytest
-from gyrotc.commands.plan_lines import plan_parts
+from gyrotc.causes import CATALOGUE, register, separate_by
+from gyrotc.causes.base import Cause, History, Parameter, Scene
+from gyrotc.causes.search import Reach
+from gyrotc.cli.plan_lines import plan_parts
 from gyrotc.jobs.build import build
 from gyrotc.model import load_model
 from gyrotc.pages.plan_page import write_plan
-from gyrotc.plan import plan
-from gyrotc.simulate import simulate
-from gyrotc.terms import CATALOGUE, Cause, History, Parameter, Scene, register, separate_by
-from gyrotc.terms.recursion import Course, CourseChannel, TermOutcome
-from gyrotc.terms.search import Reach
+from gyrotc.plan.plan import plan
+from gyrotc.simulate.campaign import simulate
+from gyrotc.target.recursion import Course, CourseChannel, TermOutcome
 from gyrotc.train.fitting import FitOptions
 
 PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"
@@ -164,9 +165,9 @@ def test_every_pair_has_an_experiment_whichever_comes_first(one: str) -> None:
 
 
 def literals() -> Iterator[str]:
-    """Where the id of a cause stands as a text outside `terms`."""
+    """Where the id of a cause stands as a text outside `causes`."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        if path.parent.name == "terms":
+        if path.parent.name == "causes":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Constant) and node.value in CATALOGUE:
@@ -176,7 +177,7 @@ def literals() -> Iterator[str]:
         yield from (f"{path.name} {found}" for found in quoted.findall(path.read_text(encoding="utf-8")))
 
 
-def test_nothing_outside_terms_knows_a_cause_by_its_name() -> None:
+def test_nothing_outside_causes_knows_a_cause_by_its_name() -> None:
     """A rule about a pair may; each says its reason at its line, and they stay few."""
     found = list(literals())
     assert len(found) <= MOST_LITERALS, found

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from campaigns import up_and_down
 from conftest import run_gyrotc
-from gyrotc.dataset import load
 from gyrotc.model import Model, load_model
-from gyrotc.simulate import simulate
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from libc_build import ROOT
 

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaigns import up_and_down
-from gyrotc.dataset import Dataset, Rows, load
-from gyrotc.quantise.applied import applied_of
-from gyrotc.simulate import read_truth, simulate
-from gyrotc.terms import History
-from gyrotc.train import TrainingData
+from gyrotc.causes.base import History
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset, Rows
+from gyrotc.simulate.campaign import simulate
+from gyrotc.simulate.truth import read_truth
+from gyrotc.tables.applied import applied_of
 from gyrotc.train.channels import chosen_channels
+from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.shapes import SHAPES, shape_of
 from numpy.typing import NDArray

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
-from gyrotc.judge.check import CheckResult, check, envelope_of
+from gyrotc.common.errors import InputError
+from gyrotc.quality.check import CheckResult, check, envelope_of
 from recordings import ROWS, RUN, Columns, columns, described, toml, write_csv
 
 

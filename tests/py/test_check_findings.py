@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.dataset.earth import earth_rate
-from gyrotc.judge.advice import advice_of
-from gyrotc.judge.changes import earlier_models
-from gyrotc.judge.check import CheckResult, Doubt, check
-from gyrotc.judge.doubts import __file__ as doubts_file
+from gyrotc.assess.changes import earlier_models
+from gyrotc.quality.advice import advice_of
+from gyrotc.quality.check import CheckResult, Doubt, check
+from gyrotc.quality.doubts import __file__ as doubts_file
+from gyrotc.recordings.earth import earth_rate
 from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
@@ -107,7 +107,7 @@ def test_one_axis_against_earths_rate(sign: float, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Models of three axes, as an earlier `build --axis all` left them."""
-    from gyrotc.dataset import load
+    from gyrotc.recordings.load import load
     from gyrotc.train.fitting import FitOptions, fit_dataset
 
     folder = tmp_path_factory.mktemp("earlier") / "RLG-0042"
@@ -235,7 +235,7 @@ def _entry(name: str, curve: list[float | None]) -> FleetEntry:
 
 @pytest.mark.parametrize("reversed_unit", [None, 3])
 def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
-    from gyrotc.jobs.fleet.turned import turned
+    from gyrotc.fleet.turned import turned
 
     g = np.random.default_rng(1)
     t = np.arange(-60.0, 126.0, 5.0)
@@ -252,7 +252,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
 
 
 def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
-    from gyrotc.jobs.fleet.turned import turned
+    from gyrotc.fleet.turned import turned
 
     g = np.random.default_rng(2)
     for _ in range(200):

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, Command
-from gyrotc.dataset import load
-from gyrotc.emit.files import emit
-from gyrotc.judge.evaluate import evaluate
+from gyrotc.assess.evaluate import evaluate
 from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
-from gyrotc.simulate import simulate
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.files import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[3] / "shared/data/real"))
@@ -259,7 +259,7 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
 def test_traces_of_files_with_one_stem_do_not_meet() -> None:
     from types import SimpleNamespace
 
-    from gyrotc.judge.evaluate import trace_name
+    from gyrotc.assess.evaluate import trace_name
 
     runs = [
         SimpleNamespace(file=f, from_s=s)

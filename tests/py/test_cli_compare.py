@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 
 from conftest import Command
-from gyrotc.dataset import load
-from gyrotc.emit.files import emit
-from gyrotc.judge.evaluate import evaluate
-from gyrotc.simulate import simulate
-from gyrotc.train import METHODS
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.files import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.train.methods import METHODS
 
 
 def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: Command) -> None:

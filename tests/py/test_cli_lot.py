@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, run_here
-from gyrotc.dataset import load
-from gyrotc.diagnose.extend.refitting import Refitting
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.errors import InputError
-from gyrotc.jobs.lot import load_lot, lot_of
+from gyrotc.common.errors import InputError
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.refitting import Refitting
+from gyrotc.lot.job import load_lot, lot_of
+from gyrotc.lot.use import prior_of
+from gyrotc.lot.with_lot import plan_with_lot
 from gyrotc.model import load_model
-from gyrotc.outputs import json_text
-from gyrotc.plan.with_lot import plan_with_lot
+from gyrotc.recordings.load import load
 from gyrotc.results.lot_plan import LotPlan
 from gyrotc.results.next_run import NextRun
-from gyrotc.train import predict
+from gyrotc.store.jsontext import json_text
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
-from gyrotc.train.lot import prior_of
+from gyrotc.train.result import predict
 
 RUNS = """
 title = "Two short cycles"

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 from conftest import Command, quick_and_slow
-from gyrotc import cli
-from gyrotc.outputs import MARKER, Lock, faults
+from gyrotc.cli import main
+from gyrotc.store.lock import Lock
+from gyrotc.store.marker import MARKER, faults
 from recordings import columns, toml, write_csv
 
 
@@ -161,7 +162,7 @@ def test_output_that_cannot_be_written_is_told_once(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(sys, "stdout", Full())
-    assert [cli._flushed(status) for status in (2, 0)] == [2, 2]
+    assert [main._flushed(status) for status in (2, 0)] == [2, 2]
     assert capsys.readouterr().err == "gyrotc: standard output: No space left on device\n"
 
 

@@ -7,13 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
 from gyrotc.jobs.compare import CompareOptions, compare
-from gyrotc.simulate import simulate
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.train import METHODS, TrainingData, fit, predict
+from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
+from gyrotc.train.methods import METHODS, fit
+from gyrotc.train.result import predict
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from gyrotc.errors import CheckFailed
+from gyrotc.common.errors import CheckFailed
 from gyrotc.verify.confined import confined, run_to_end
 
 

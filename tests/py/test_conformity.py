@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.judge.conformity import coverage_factor, decided, worst_of
-from gyrotc.judge.uncertainty import figure_uncertainties
-from gyrotc.metrics import Averages, statistics, time_statistics
+from gyrotc.assess.conformity import coverage_factor, decided, worst_of
+from gyrotc.assess.uncertainty import figure_uncertainties
+from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.results.evaluation import EvaluatedRun, FigureUncertainty, RunStatistics, Statistics
 
 KNOWN = FigureUncertainty(standard=0.05, freedom=None, method="noise")

@@ -15,11 +15,13 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
-from gyrotc.dataset import Applied, axes_of, load, source, survey
-from gyrotc.dataset.csvfile import CsvFile
-from gyrotc.dataset.earth import EARTH_RATE_DPH, earth_rate
-from gyrotc.dataset.problems import Problems
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
+from gyrotc.recordings import source
+from gyrotc.recordings.csv_file import CsvFile
+from gyrotc.recordings.earth import EARTH_RATE_DPH, earth_rate
+from gyrotc.recordings.load import axes_of, load, survey
+from gyrotc.recordings.problems import Problems
+from gyrotc.recordings.records import Applied
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from recordings import ROWS, RUN, columns, columns_of_pulses, csv_text, described, toml, write_csv
@@ -432,7 +434,7 @@ def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path)
     for index in range(1, 6):
         (folder / f"{index}.csv").hardlink_to(folder / "0.csv")
     program = (
-        "import sys; from pathlib import Path; from gyrotc.dataset import load\n"
+        "import sys; from pathlib import Path; from gyrotc.recordings.load import load\n"
         "rows = sum(len(run.rows()) for run in load(Path(sys.argv[1])).runs)\n"
         "peak = Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]\n"
         "print(rows, peak)"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
+from gyrotc.recordings.load import load
 from recordings import ACCEPTED, REFUSED, ROWS
 
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
-from gyrotc.judge.check import check
+from gyrotc.common.errors import InputError
+from gyrotc.quality.check import check
+from gyrotc.recordings.load import load
 from recordings import ACCEPTED
 
 TRIALS = 150

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import get_args
 
 import pytest
-from gyrotc.dataset import load
+from gyrotc.causes import CATALOGUE
 from gyrotc.diagnose.advice import VERDICTS, next_steps
 from gyrotc.diagnose.summary import not_testable
+from gyrotc.recordings.load import load
 from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
-from gyrotc.terms import CATALOGUE
 from gyrotc.train.fitting import FitOptions
 from recordings import ACCEPTED
 

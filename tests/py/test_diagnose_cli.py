@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from campaigns import GRADIENT, simulated
 from conftest import HOST, Command
-from gyrotc.simulate import read
+from gyrotc.simulate.scenario import read
 
 
 @pytest.fixture(scope="module")

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.detect.detection import detect
-from gyrotc.diagnose.detect.detection_limits import detection_limits, limit_of
-from gyrotc.diagnose.detect.joined import JoinedLayout
-from gyrotc.diagnose.detect.project import project
-from gyrotc.diagnose.detect.scores import (
-    Projection,
-    ScoredColumns,
-    draw_null,
-    ratio_of,
-    score,
-    variance_ratio_of,
-)
-from gyrotc.diagnose.detect.search import Search
-from gyrotc.diagnose.detect.views import residual_log_likelihood
-from gyrotc.diagnose.noise_colour.colours import COLOURS
-from gyrotc.diagnose.noise_colour.whitener import Whitener
-from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
+from gyrotc.diagnose.candidates import Candidate, columns_of
+from gyrotc.diagnose.colours import COLOURS
+from gyrotc.diagnose.detection import detect
+from gyrotc.diagnose.detection_limits import detection_limits, limit_of
+from gyrotc.diagnose.joined import JoinedLayout
+from gyrotc.diagnose.project import project
+from gyrotc.diagnose.scores import Projection, ScoredColumns, draw_null, ratio_of, score, variance_ratio_of
+from gyrotc.diagnose.search import Search
+from gyrotc.diagnose.views import residual_log_likelihood
+from gyrotc.diagnose.whitener import Whitener
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import block_diag, null_space

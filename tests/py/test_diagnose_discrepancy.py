@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.discrepancy.declared_noise import _two_sided, noise_findings
-from gyrotc.diagnose.discrepancy.ensemble import _discrepancy, ensemble_of
-from gyrotc.diagnose.noise_colour.colours import Declared
+from gyrotc.diagnose.blocks import Records
+from gyrotc.diagnose.candidates import columns_of
+from gyrotc.diagnose.colours import Declared
+from gyrotc.diagnose.declared_noise import _two_sided, noise_findings
+from gyrotc.diagnose.ensemble import _discrepancy, ensemble_of
 from gyrotc.diagnose.noise_words import NOISE_WORDS
 from gyrotc.diagnose.pipeline import needs_finer, search_of
-from gyrotc.diagnose.screen.blocks import Records
-from gyrotc.diagnose.signatures.candidates import columns_of
 from numpy.typing import NDArray
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign
 

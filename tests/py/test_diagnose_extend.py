@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Dataset, load
-from gyrotc.diagnose.extend.extension import extend
-from gyrotc.diagnose.extend.gain import gain_of
-from gyrotc.diagnose.extend.refit import Effect, known, samples
-from gyrotc.diagnose.extend.refitting import Refitting, folds_of
-from gyrotc.diagnose.extend.shipping import shipping
+from gyrotc.diagnose.extension import extend
+from gyrotc.diagnose.gain import gain_of
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.refit import Effect, known, samples
+from gyrotc.diagnose.refitting import Refitting, folds_of
 from gyrotc.diagnose.result import diagnose
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.terms.operators import first_order
+from gyrotc.diagnose.shipping import shipping
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
+from gyrotc.target.operators import first_order
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from recordings import toml, write_csv

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.extend.gain import floor_of, gain_of
-from gyrotc.metrics import Averages
+from gyrotc.common.metrics import Averages
+from gyrotc.diagnose.gain import floor_of, gain_of
 
 HOURS, AVERAGE_S = 24, 100.0
 

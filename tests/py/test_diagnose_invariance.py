@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.detect.project import project
-from gyrotc.diagnose.detect.scores import _root
-from gyrotc.diagnose.detect.search import open_search
-from gyrotc.diagnose.noise_colour.colours import Declared, declared_noise
+from gyrotc.diagnose.blocks import Record, Records
+from gyrotc.diagnose.colours import Declared, declared_noise
+from gyrotc.diagnose.gather import records_of
 from gyrotc.diagnose.pipeline import Analysis, analyse
-from gyrotc.diagnose.screen.blocks import Record, Records
-from gyrotc.diagnose.screen.gather import records_of
+from gyrotc.diagnose.project import project
+from gyrotc.diagnose.result import diagnose
+from gyrotc.diagnose.scores import _root
+from gyrotc.diagnose.search import open_search
 from gyrotc.diagnose.verdict import verdict_of
+from gyrotc.recordings.load import load
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))

@@ -12,16 +12,16 @@ from pathlib import Path
 
 import pytest
 from campaigns import GRADIENT, simulated
-from gyrotc.dataset import load
-from gyrotc.diagnose import Diagnosis
+from gyrotc.diagnose.result import Diagnosis
 from gyrotc.jobs import diagnosis, kept_diagnosis
 from gyrotc.model import Model
-from gyrotc.outputs import kept
+from gyrotc.recordings.load import load
+from gyrotc.store import kept
 from gyrotc.train.fitting import FitOptions
 
 _LOADED = """
 import json, sys
-from gyrotc.commands import app
+from gyrotc.cli.commands import app
 try:
     app(sys.argv[1:], standalone_mode=False)
 finally:
@@ -83,7 +83,7 @@ class _Counted:
 def counted(data: Path, monkeypatch: pytest.MonkeyPatch) -> _Counted:
     still = load(_still(data.parent / "still"))
     counted = _Counted(diagnosis.diagnose(still))
-    monkeypatch.setattr("gyrotc.diagnose.diagnose", counted)
+    monkeypatch.setattr("gyrotc.diagnose.result.diagnose", counted)
     return counted
 
 

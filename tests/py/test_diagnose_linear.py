@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.orthonormal import TOLERANCE, main_directions, orthonormal
-from gyrotc.metrics import MAD_TO_SIGMA
-from gyrotc.quantiles import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95
+from gyrotc.common.metrics import MAD_TO_SIGMA
+from gyrotc.common.orthonormal import TOLERANCE, main_directions, orthonormal
+from gyrotc.common.quantiles import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95
 from scipy import stats
 from scipy.linalg import subspace_angles
 

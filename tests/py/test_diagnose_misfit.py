@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.attribute.attribution import attribute
-from gyrotc.diagnose.attribute.gains import Gains
-from gyrotc.diagnose.attribute.misfit import Misfit, misfit
-from gyrotc.diagnose.attribute.refine import model_columns, refine
-from gyrotc.diagnose.detect.search import Search
-from gyrotc.diagnose.noise_colour.colours import Colour
-from gyrotc.diagnose.noise_colour.whitener import Whitener
-from gyrotc.diagnose.signatures.candidates import Candidate, columns_of
+from gyrotc.diagnose.attribution import attribute
+from gyrotc.diagnose.candidates import Candidate, columns_of
+from gyrotc.diagnose.colours import Colour
+from gyrotc.diagnose.gains import Gains
+from gyrotc.diagnose.misfit import Misfit, misfit
+from gyrotc.diagnose.refine import model_columns, refine
+from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.verdict import holds, looks_like
+from gyrotc.diagnose.whitener import Whitener
 from numpy.typing import NDArray
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.noise_colour.colours import COLOURS, Colour, Declared, flicker_row, markov_row
-from gyrotc.diagnose.noise_colour.whitener import Whitener
+from gyrotc.diagnose.colours import COLOURS, Colour, Declared, flicker_row, markov_row
+from gyrotc.diagnose.whitener import Whitener
 from scipy.integrate import dblquad
 from scipy.linalg import block_diag
 

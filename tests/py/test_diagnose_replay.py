@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Rows, Run, load
-from gyrotc.diagnose import diagnose
-from gyrotc.diagnose.extend.channel_terms import stand_ins_of
-from gyrotc.diagnose.extend.refit import Effect, Played, added_range, play_runs, samples
-from gyrotc.frontend import missed_before
+from gyrotc.causes import CATALOGUE
+from gyrotc.diagnose.channel_terms import stand_ins_of
+from gyrotc.diagnose.refit import Effect, Played, added_range, play_runs, samples
+from gyrotc.diagnose.result import diagnose
 from gyrotc.model import Model
-from gyrotc.quantise import quantise
-from gyrotc.reference import evaluate_map
-from gyrotc.simulate import simulate
-from gyrotc.terms import CATALOGUE
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Rows, Run
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.maps import evaluate_map
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
+from gyrotc.train.samples import missed_before
 from gyrotc.verify.replay import history_of
 from libc_build import ROOT
 from numpy.typing import NDArray

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Rows
-from gyrotc.diagnose.screen.blocks import Record, Records, centred_slope, singled_out
-from gyrotc.diagnose.screen.gather import _bridged, _thinned, block_length
-from gyrotc.diagnose.screen.screens import cleaned, screen
-from gyrotc.terms.base import History
+from gyrotc.causes.base import History
+from gyrotc.diagnose.blocks import Record, Records, centred_slope, singled_out
+from gyrotc.diagnose.gather import _bridged, _thinned, block_length
+from gyrotc.diagnose.screens import cleaned, screen
+from gyrotc.recordings.records import Rows
 from small_campaign import small_records
 
 SEED = 20260401

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.commands.diagnosis_lines import diagnosis_lines
+from gyrotc.cli.diagnosis_lines import diagnosis_lines
 from gyrotc.diagnose.advice import VERDICTS, next_steps
-from gyrotc.diagnose.attribute.misfit import Misfit
-from gyrotc.diagnose.discrepancy.declared_noise import NoiseFinding
+from gyrotc.diagnose.declared_noise import NoiseFinding
+from gyrotc.diagnose.misfit import Misfit
 from gyrotc.diagnose.verdict import verdict_of
 from gyrotc.results.diagnosed import (
     ConsideredCause,

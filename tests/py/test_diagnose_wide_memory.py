@@ -7,18 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from conftest import quick_and_slow
+from gyrotc.causes import CATALOGUE
+from gyrotc.causes.base import History
 from gyrotc.diagnose.advice import sentence_of, shows_as
-from gyrotc.diagnose.attribute.attribution import Attribution, attribute
-from gyrotc.diagnose.attribute.gains import Gains
-from gyrotc.diagnose.attribute.marginal_likelihood import MarginalLikelihood
-from gyrotc.diagnose.attribute.wide_memory import WideMemory, outlasts, rate_independent
-from gyrotc.diagnose.detect.search import Search
-from gyrotc.diagnose.screen.blocks import Records
-from gyrotc.diagnose.signatures.candidates import columns_of
+from gyrotc.diagnose.attribution import Attribution, attribute
+from gyrotc.diagnose.blocks import Records
+from gyrotc.diagnose.candidates import columns_of
+from gyrotc.diagnose.gains import Gains
+from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
+from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.verdict import holds, verdict_of
-from gyrotc.terms import CATALOGUE
-from gyrotc.terms.base import History
-from gyrotc.terms.operators import first_order, play
+from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
+from gyrotc.target.operators import first_order, play
 from numpy.typing import NDArray
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.diagnose.screen.events import Event, accepted, events_of
-from gyrotc.diagnose.screen.turned import turned_runs
-from gyrotc.diagnose.screen.turned_within import another_gain_throughout, gain_changes
-from gyrotc.frontend import lasting_steps
-from gyrotc.frontend.beginning_drifts import drifts_of
-from gyrotc.frontend.lasting_steps import steps_of
+from gyrotc.quality import lasting_steps
+from gyrotc.quality.drifts import drifts_of
+from gyrotc.quality.events import Event, accepted, events_of
+from gyrotc.quality.lasting_steps import steps_of
+from gyrotc.quality.turned import turned_runs
+from gyrotc.quality.turned_within import another_gain_throughout, gain_changes
+from gyrotc.recordings.load import load
 from recordings import toml, write_csv
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))

@@ -13,11 +13,11 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from gyrotc.emit.files import emit
 from gyrotc.model import Model, load_model
-from gyrotc.quantise import quantise
-from gyrotc.reference import evaluate_map
-from gyrotc.reference.history import replay
+from gyrotc.tables.files import emit
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.history import replay
+from gyrotc.target.maps import evaluate_map
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from conftest import Command
 from emitted import emitted, spoil
-from gyrotc.errors import InputError
-from gyrotc.reference import evaluate_map
-from gyrotc.verify import verify
+from gyrotc.common.errors import InputError
+from gyrotc.target.maps import evaluate_map
 from gyrotc.verify.exhaustive import Visited, visit_all
+from gyrotc.verify.job import verify
 from jobs import job_of
 from models import random_model
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.errors import CheckFailed, InputError
-from gyrotc.jobs.export import Exporting, export
-from gyrotc.jobs.export.grid import csv_text, grid_of
+from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.deliver.cubic import Autopilot, Cubic, best_cubic
+from gyrotc.deliver.export import Exporting, export
+from gyrotc.deliver.grid import csv_text, grid_of
 from gyrotc.model import Model, load_model
-from gyrotc.quantise.cubic import Autopilot, Cubic, best_cubic
 
 # The operations of the firmware, written down from its documentation of the parameters.
 FIRMWARE = """

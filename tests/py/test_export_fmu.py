@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from conftest import ROOT, Command
 from emitted import emitted
-from gyrotc.emit import example_period_us
-from gyrotc.errors import CheckFailed, InputError
-from gyrotc.frontend import samples_per_block
+from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.deliver.export import export
 from gyrotc.jobs.axes import joint_texts
-from gyrotc.jobs.export import export
 from gyrotc.model import Model, load_model
-from gyrotc.outputs import MARKER
-from gyrotc.quantise import quantise
-from gyrotc.quantise.terms import channel_names
-from gyrotc.reference import Replay, replay
+from gyrotc.store.marker import MARKER
+from gyrotc.tables.example import example_period_us
+from gyrotc.tables.quantise import quantise
+from gyrotc.tables.terms import channel_names
+from gyrotc.target.follow import samples_per_block
+from gyrotc.target.history import Replay, replay
 from models import bank_with_channels, random_channels, random_history
 from numpy.typing import NDArray
 

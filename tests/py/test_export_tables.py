@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import ROOT, Command
-from gyrotc.commands.certificates import address_of, points_of
-from gyrotc.errors import InputError
-from gyrotc.jobs.export import Exporting, Format, export
-from gyrotc.jobs.export.grid import grid_of
+from gyrotc.cli.certificates import address_of, points_of
+from gyrotc.common.errors import InputError
+from gyrotc.deliver.export import Exporting, Format, export
+from gyrotc.deliver.grid import grid_of
 from gyrotc.model import Model, load_model
 from numpy.typing import NDArray
 

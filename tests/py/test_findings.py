@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Dataset, facts_of, load
-from gyrotc.judge.findings import findings_of
+from gyrotc.assess.findings import findings_of
 from gyrotc.model import Model
+from gyrotc.quality.facts import facts_of
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
 from gyrotc.results.evaluation import Pooled
 from recordings import Columns, columns, toml, write_csv
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from gyrotc.dataset import Dataset
-from gyrotc.errors import InputError
-from gyrotc.train import METHODS, NETWORK_METHODS
+from gyrotc.common.errors import InputError
+from gyrotc.recordings.records import Dataset
 from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.train.methods import METHODS, NETWORK_METHODS
 
 
 def empty() -> Dataset:

@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.errors import InputError
-from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, outliers, run_fleet
-from gyrotc.jobs.fleet.unit import Task, do_unit
+from gyrotc.common.errors import InputError
+from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
+from gyrotc.fleet.outliers import outliers
+from gyrotc.fleet.run import run_fleet
+from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
@@ -182,7 +184,7 @@ def test_no_file_of_the_summary_outlives_what_it_says(
         raise KeyboardInterrupt
         yield
 
-    monkeypatch.setattr("gyrotc.jobs.fleet.run.on_processes", stopped)
+    monkeypatch.setattr("gyrotc.fleet.run.on_processes", stopped)
     with pytest.raises(KeyboardInterrupt):
         run_fleet(load_manifest(manifest), out)
     [row] = csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines())

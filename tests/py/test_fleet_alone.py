@@ -18,15 +18,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gyrotc.errors import InputError
-from gyrotc.jobs.fleet import Fleet, Unit, load_manifest, pool, run, run_fleet
-from gyrotc.jobs.fleet import unit as units
-from gyrotc.jobs.fleet.fingerprint import inputs_of, program_of
-from gyrotc.jobs.fleet.manifest import SUMMARY
-from gyrotc.jobs.fleet.unit import Task, do_unit
-from gyrotc.judge.limits import load_limits
-from gyrotc.outputs import MARKER, Lock, faults
+from gyrotc.assess.limits import load_limits
+from gyrotc.common.errors import InputError
+from gyrotc.fleet import pool, run
+from gyrotc.fleet import unit as units
+from gyrotc.fleet.manifest import SUMMARY, Fleet, Unit, load_manifest
+from gyrotc.fleet.run import run_fleet
+from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
+from gyrotc.store.fingerprint import inputs_of, program_of
+from gyrotc.store.lock import Lock
+from gyrotc.store.marker import MARKER, faults
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -221,7 +223,7 @@ def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:
 def test_recordings_that_change_while_they_are_read_are_refused(
     task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gyrotc.jobs.fleet import unit
+    from gyrotc.fleet import unit
 
     def load(folder: Path, **given: Any) -> Any:
         dataset = whole(folder, **given)

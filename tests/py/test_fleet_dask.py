@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 from conftest import Command
-from gyrotc.jobs.fleet import load_manifest, run_fleet
-from gyrotc.jobs.fleet import run as running
+from gyrotc.fleet import run as running
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.run import run_fleet
 from gyrotc.results.fleet import FleetEntry
 from recordings import columns, toml, write_csv
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from gyrotc.jobs.fleet.facts import facts_of, step_in
-from gyrotc.jobs.fleet.page import summary_of
-from gyrotc.jobs.fleet.reasons import reasons
-from gyrotc.metrics import Averages
+from gyrotc.common.metrics import Averages
+from gyrotc.fleet.facts import facts_of, step_in
+from gyrotc.fleet.page import summary_of
+from gyrotc.fleet.reasons import reasons
 from gyrotc.results.fleet import Copy, FleetEntry, Reason
 from lot import AXES, FAULTS, Lot
 

@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 from conftest import Command
-from gyrotc.errors import InputError
-from gyrotc.jobs.fleet import Fleet, Unit, gather, load_manifest, run_fleet, run_share, share_of
-from gyrotc.jobs.fleet import pool as pools
-from gyrotc.jobs.fleet.run import tasks_of
-from gyrotc.jobs.fleet.shards import Share, mine
-from gyrotc.jobs.fleet.unit import Task, do_unit
-from gyrotc.outputs import MARKER
+from gyrotc.common.errors import InputError
+from gyrotc.fleet import pool as pools
+from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
+from gyrotc.fleet.run import run_fleet, tasks_of
+from gyrotc.fleet.shards import Share, gather, mine, run_share, share_of
+from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
+from gyrotc.store.marker import MARKER
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 

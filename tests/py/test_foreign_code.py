@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from conftest import Command
 from emitted import emitted, recorded
-from gyrotc.emit.files import emit
-from gyrotc.errors import CheckFailed
-from gyrotc.judge.evaluate import evaluate
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Model, load_model
-from gyrotc.verify import verify
+from gyrotc.tables.files import emit
+from gyrotc.verify.job import verify
 from gyrotc.verify.source import board_files, checked_sources
 
 FAST = "host-gcc-O2"

@@ -7,16 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.frontend import (
-    F32,
-    Blocks,
-    Guarded,
-    Settings,
-    expand_missed,
-    missed_before,
-    run_blocks,
-    samples_per_block,
-)
+from gyrotc.target.believe import Guarded
+from gyrotc.target.follow import Settings, expand_missed, samples_per_block
+from gyrotc.target.numbers import F32
+from gyrotc.train.samples import Blocks, missed_before, run_blocks
 
 
 def recording(temperature: np.ndarray, time_s: np.ndarray | None = None, *, from_s: float = 0.0) -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 from emitted import emitted, measured
-from gyrotc.errors import CheckFailed
+from gyrotc.common.errors import CheckFailed
 from gyrotc.verify.functions import PUBLIC, function_costs, parse_graph
 from gyrotc.verify.toolchain import all_targets
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.reference.q31 import GAUSS_ERROR, exp2_table
+from gyrotc.target.q31 import GAUSS_ERROR, exp2_table
 
 ROOT = Path(__file__).resolve().parents[2]
 _U = 2.0**-24  # unit of the argument

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.model import Guard, Term
-from gyrotc.quantise import quantise
-from gyrotc.reference import replay
-from gyrotc.status import CHANNEL_LOST, CLAMPED
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.history import replay
+from gyrotc.target.status import CHANNEL_LOST, CLAMPED
 from gyrotc.train.guards import longest_same_s, stuck_after_s
 from libc_build import runtime
 from models import random_channels, random_history, random_model, random_terms

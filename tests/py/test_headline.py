@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.commands.results import summary
-from gyrotc.metrics import Averages
+from gyrotc.cli.results import summary
+from gyrotc.common.metrics import Averages
 from gyrotc.pages.published import ENVIRONMENTS
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics
 

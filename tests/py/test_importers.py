@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from conftest import run_gyrotc
-from gyrotc.dataset import load
-from gyrotc.importers.stamps import Stamps
+from gyrotc.recordings.importers.stamps import Stamps
+from gyrotc.recordings.load import load
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
 from logger_strangers import STRANGERS, milliseconds

@@ -12,8 +12,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import Command
-from gyrotc.dataset import load
-from gyrotc.importers import ImportOptions, Map, import_files, load_map
+from gyrotc.recordings.importers.job import ImportOptions, import_files
+from gyrotc.recordings.importers.mapping import Map, load_map
+from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.imported import ImportedFiles
 
@@ -355,7 +356,7 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
                     row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000)
                 )
         program = (
-            "import sys; from gyrotc.cli import run; status = run(sys.argv[1:]); "
+            "import sys; from gyrotc.cli.main import run; status = run(sys.argv[1:]); "
             "facts = dict(line.split(':') for line in open('/proc/self/status')); "  # ru_maxrss has the parent's, too
             "print(status, int(facts['VmHWM'].split()[0]) // 1024)"
         )
@@ -388,7 +389,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     run: Run,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from gyrotc.importers import tables
+    from gyrotc.recordings.importers import tables
 
     class Importlib:
         """Finds nothing."""

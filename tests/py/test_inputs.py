@@ -15,22 +15,24 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from conftest import Command
-from gyrotc import inputs
-from gyrotc.dataset import load
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.diagnose.signatures import cache
-from gyrotc.errors import InputError
-from gyrotc.frontend import run_blocks
-from gyrotc.jobs.fleet import load_manifest
-from gyrotc.judge.limits import load_limits
+from gyrotc.assess.limits import load_limits
+from gyrotc.common import ceilings
+from gyrotc.common.errors import InputError
+from gyrotc.common.inputs_texts import parse_json, parse_toml
+from gyrotc.diagnose import cache
+from gyrotc.diagnose.gather import records_of
+from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
-from gyrotc.outputs import kept
 from gyrotc.pages import report
+from gyrotc.recordings.load import load
 from gyrotc.results.base import checked_result, read_result
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation
 from gyrotc.results.verification import Verification
-from gyrotc.simulate import read, simulate
+from gyrotc.simulate.campaign import simulate
+from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import simulated_floor
+from gyrotc.store import kept
+from gyrotc.train.samples import run_blocks
 from gyrotc.verify.logs import log_parts
 from recordings import columns, csv_text, described, write_csv
 
@@ -101,13 +103,13 @@ JSON = {
 def test_hostile_toml(case: str) -> None:
     text, told = TOML[case]
     data = text.encode("utf-8", "surrogateescape")
-    assert told in refused(lambda: inputs.parse_toml(data, "a.toml", "a file"))
+    assert told in refused(lambda: parse_toml(data, "a.toml", "a file"))
 
 
 @pytest.mark.parametrize("case", JSON)
 def test_hostile_json(case: str) -> None:
     text, told = JSON[case]
-    assert told in refused(lambda: inputs.parse_json(text.encode(), "a.json", "a file"))
+    assert told in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
 
 
 def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
@@ -119,12 +121,12 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     assert (folder / "a.parquet").stat().st_size < 2**20
     del table
     program = (
-        "import resource, sys; from gyrotc.dataset import load; from pathlib import Path\n"
+        "import resource, sys; from gyrotc.recordings.load import load; from pathlib import Path\n"
         "used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "try: load(Path(sys.argv[1]))\nexcept Exception as error: print(error)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used, 'KiB')\n"
     )
-    for ceilings, told in (
+    for limits, told in (
         ("", "bytes that unpack to 201326592 or more; expected at most 250 times"),
         ("rows=1000000", "8388608 rows; expected at most 1000000 (--max rows=...)"),
         (
@@ -134,7 +136,7 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     ):
         done = subprocess.run(
             [sys.executable, "-c", program, folder], capture_output=True, text=True, check=True,
-            env=os.environ | {"GYROTC_MAX": ceilings},
+            env=os.environ | {"GYROTC_MAX": limits},
         )  # fmt: skip
         message, taken = done.stdout.splitlines()
         assert told in message and int(taken.split()[0]) < 2**16, done.stdout
@@ -177,7 +179,7 @@ def test_ceilings_move_by_option_and_environment(tmp_path: Path, gyrotc: Command
 
 def test_every_ceiling_is_documented() -> None:
     text = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text("utf-8")
-    for name, ceiling in inputs.CEILINGS.items():
+    for name, ceiling in ceilings.CEILINGS.items():
         assert f"| `{name}` | {ceiling.default:g} |" in text, name
 
 
@@ -244,11 +246,11 @@ def test_results_of_other_types_are_refused_by_field() -> None:
 @pytest.mark.slow
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
     program = (
-        "import sys, gyrotc.dataset.load as m, gyrotc.judge.check, gyrotc.cli\n"
+        "import sys, gyrotc.recordings.load as m, gyrotc.quality.check, gyrotc.cli.main\n"
         "def fail(*a, **k): raise {0}\n"
-        "gyrotc.judge.check.survey = fail\n"
+        "gyrotc.quality.check.survey = fail\n"
         f"sys.argv = ['gyrotc', 'check', {str(tmp_path)!r}]\n"
-        "gyrotc.cli.main()\n"
+        "gyrotc.cli.main.main()\n"
     )
     state = {"XDG_STATE_HOME": str(tmp_path / "state")}
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from conftest import Command
-from gyrotc.commands import app
+from gyrotc.cli.commands import app
 from gyrotc.model import load_model
 from recordings import columns, described, write_csv
 

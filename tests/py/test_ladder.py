@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.dataset import load
-from gyrotc.train import Fit, TrainingData, fit, predict
-from gyrotc.train.data import gather
+from gyrotc.recordings.load import load
+from gyrotc.train.data import TrainingData, gather
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guard import objection
 from gyrotc.train.ladder import RUNGS, Ladder
+from gyrotc.train.methods import fit
+from gyrotc.train.result import Fit, predict
 from gyrotc.train.simple import SIMPLE, all_solved, design, fit_simple, powers_of, solve
 from gyrotc.train.spans import Fold, history_folds
 from recordings import toml, write_csv

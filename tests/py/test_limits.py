@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import pytest
 from conftest import HOST, Command
-from gyrotc.errors import InputError
-from gyrotc.judge.limits import AtLeast, AtMost, held_against, load_limits
+from gyrotc.assess.limits import AtLeast, AtMost, held_against, load_limits
+from gyrotc.common.errors import InputError
 from gyrotc.model import Model
 from gyrotc.results.evaluation import (
     EvaluatedRun,

@@ -10,17 +10,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
-from gyrotc.jobs.lot import checksum_of, lot_from
+from gyrotc.common.errors import InputError
+from gyrotc.lot import basis as lot_basis
+from gyrotc.lot.basis import PRIOR_LOG, LotBasis
+from gyrotc.lot.job import checksum_of, lot_from
+from gyrotc.lot.learn import Learned, learn, sums_of
+from gyrotc.lot.model import evidence, fitted
+from gyrotc.lot.surprise import p_value, scores
+from gyrotc.lot.use import LotPrior, prior_of
 from gyrotc.results.lot import Lot, LotCluster
-from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty
-from gyrotc.train.lot import LotPrior, learn, prior_of
-from gyrotc.train.lot import basis as lot_basis
-from gyrotc.train.lot.basis import PRIOR_LOG, LotBasis
-from gyrotc.train.lot.learn import Learned, sums_of
-from gyrotc.train.lot.model import evidence, fitted
-from gyrotc.train.lot.surprise import p_value, scores
+from gyrotc.train.data import TrainingData
 from gyrotc.train.means import UnitMeans
+from gyrotc.train.methods import fit
+from gyrotc.train.result import predict
+from gyrotc.train.uncertainty import coverage, uncertainty
 from numpy.typing import NDArray
 from scipy.stats import kstest, multivariate_normal
 

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.dataset import Dataset, joined_runs, load
-from gyrotc.diagnose.attribute.single_cycle import cycle_of
-from gyrotc.diagnose.extend.refit import Effect
-from gyrotc.diagnose.extend.refitting import Refitting
-from gyrotc.diagnose.screen.gather import records_of
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.refit import Effect
+from gyrotc.diagnose.refitting import Refitting
+from gyrotc.diagnose.single_cycle import cycle_of
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset, joined_runs
 from gyrotc.train.fitting import FitOptions
 from recordings import write_csv
 

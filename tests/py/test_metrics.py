@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.metrics import average, median, middle_of_five, statistics, time_statistics
+from gyrotc.common.metrics import average, median, middle_of_five, statistics, time_statistics
 from gyrotc.results.evaluation import Pooled
 
 

@@ -45,7 +45,7 @@ def test_each_way_of_seeing_one_sees_one() -> None:
 
 def test_a_fault_that_changes_nothing_is_seen_by_nobody(tmp_path: Path) -> None:
     """The campaign can fail: what is no fault must not count as seen."""
-    none = Fault("none", "quantise/f32.py", "_GAIN / width", "_GAIN / (width * 1.0)", "plain")
+    none = Fault("none", "tables/f32.py", "_GAIN / width", "_GAIN / (width * 1.0)", "plain")
     assert House(tmp_path).objection("plain", none)["seen_by"] is None
 
 

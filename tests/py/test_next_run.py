@@ -6,16 +6,16 @@ import secrets
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
-from gyrotc.plan.next_run import Price, next_run
-from gyrotc.plan.with_lot import HOLDS, RATES, hours_of, inputs_of, programme_text
+from gyrotc.common.errors import InputError
+from gyrotc.lot.basis import PRIOR_LOG, LotBasis
+from gyrotc.lot.earlier import widened
+from gyrotc.lot.next_run import Price, next_run
+from gyrotc.lot.prior import MapPosterior, MapPrior
+from gyrotc.lot.with_lot import HOLDS, RATES, hours_of, inputs_of, programme_text
 from gyrotc.results.lot_plan import ChamberStep
 from gyrotc.simulate.scenario import read
-from gyrotc.train.lot.basis import PRIOR_LOG, LotBasis
-from gyrotc.train.lot.earlier import widened
-from gyrotc.train.lot.prior import MapPosterior, MapPrior
+from gyrotc.train.evidence import Asked
 from gyrotc.train.means import UnitMeans
-from gyrotc.train.process import Asked
 from models import random_model
 from numpy.typing import NDArray
 

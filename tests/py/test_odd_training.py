@@ -9,8 +9,10 @@ import os
 
 import numpy as np
 import pytest
-from gyrotc.train import Fit, TrainingData, TrainingFailed, fit, predict
-from gyrotc.train.data import average, cleaned
+from gyrotc.train.data import TrainingData, average, cleaned
+from gyrotc.train.evidence import TrainingFailed
+from gyrotc.train.methods import fit
+from gyrotc.train.result import Fit, predict
 from odd_training import odd_samples
 
 SETS = int(os.environ.get("GYROTC_ODD", "40"))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.frontend.screen import departing
-from gyrotc.judge.check import check
+from gyrotc.quality.check import check
+from gyrotc.quality.screen import departing
+from gyrotc.recordings.load import load
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
 from recordings import Columns, toml, write_csv

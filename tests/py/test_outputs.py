@@ -14,20 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gyrotc.errors import GyrotcError, InputError
-from gyrotc.outputs import (
-    MARKER,
-    faults,
-    json_text,
-    read_marker,
-    result_folder,
-    write_atomically,
-    write_result,
-)
-from gyrotc.outputs import exchange as exchanging
-from gyrotc.outputs import folder as folders
-from gyrotc.outputs import update as updating
-from gyrotc.outputs.places import check_apart
+from gyrotc.common.errors import GyrotcError, InputError
+from gyrotc.store import exchange as exchanging
+from gyrotc.store import folder as folders
+from gyrotc.store import update as updating
+from gyrotc.store.files import write_atomically
+from gyrotc.store.folder import result_folder, write_result
+from gyrotc.store.jsontext import json_text
+from gyrotc.store.marker import MARKER, faults, read_marker
+from gyrotc.store.places import check_apart
 
 
 def write(out: Path, text: str, command: str = "build", serial: str = "A", **options: object) -> None:
@@ -211,7 +206,7 @@ def test_a_second_job_is_told_who_holds_the_place(out: Path) -> None:
 
 def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
     code = (
-        "import os, sys; from pathlib import Path; from gyrotc.outputs import result_folder\n"
+        "import os, sys; from pathlib import Path; from gyrotc.store.folder import result_folder\n"
         "with result_folder(Path(sys.argv[1]), 'build') as stage:\n"
         "    (stage.folder / 'half').write_text('x'); os._exit(9)"
     )

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.diagnose.extend.overtones import overtones_of
-from gyrotc.diagnose.extend.refit import MOST_TERMS, Effect, completed, samples, terms_of
-from gyrotc.diagnose.extend.refitting import Refitting
+from gyrotc.causes import CATALOGUE
+from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.overtones import overtones_of
+from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, samples, terms_of
+from gyrotc.diagnose.refitting import Refitting
 from gyrotc.diagnose.result import _entries
-from gyrotc.diagnose.screen.gather import records_of
-from gyrotc.terms import CATALOGUE
-from gyrotc.train import TrainingData
-from gyrotc.train.data import cleaned
+from gyrotc.recordings.load import load
+from gyrotc.train.data import TrainingData, cleaned
 from gyrotc.train.fitting import FitOptions
 from recordings import toml, write_csv
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
 from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from gyrotc.paper.__main__ import page_of, record_of, stale
 from gyrotc.paper.experiment import METHODS

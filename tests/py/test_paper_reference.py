@@ -19,9 +19,9 @@ import pytest
 from gyrotc import _core
 from gyrotc.pages.published import ENVIRONMENTS, NEURONS
 from gyrotc.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
-from gyrotc.simulate import simulate
-from gyrotc.train import trained
+from gyrotc.simulate.campaign import simulate
 from gyrotc.train.data import average, scaling_of
+from gyrotc.train.methods import trained
 from gyrotc.train.result import Outcome
 from numpy.typing import NDArray
 

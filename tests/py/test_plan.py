@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from campaigns import scenario, simulated
 from conftest import Command, invoked
-from gyrotc.commands.plan_lines import limits_of, pair_of
-from gyrotc.errors import InputError
-from gyrotc.plan import plan
+from gyrotc.cli.plan_lines import limits_of, pair_of
+from gyrotc.common.errors import InputError
+from gyrotc.plan.plan import plan
 from gyrotc.plan.programme import programme_of
 from gyrotc.plan.sensitivity import Sensitivity
 from gyrotc.plan.shortest import shortest

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from emitted import spoil
-from gyrotc.reference.q31 import GAUSS_ERROR
+from gyrotc.target.q31 import GAUSS_ERROR
 
 pytestmark = pytest.mark.slow
 

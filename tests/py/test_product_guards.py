@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.emit.files import emit_texts, quantise_all
-from gyrotc.errors import InputError
-from gyrotc.judge.limits import load_limits
-from gyrotc.judge.product_guards import guarded
+from gyrotc.assess.limits import load_limits
+from gyrotc.assess.product_guards import guarded
+from gyrotc.common.errors import InputError
 from gyrotc.model import Guard, Model, Term
-from gyrotc.quantise import quantise
-from gyrotc.reference import replay
-from gyrotc.status import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
+from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.history import replay
+from gyrotc.target.status import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
 from models import random_model
 
 _TERM = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.errors import CheckFailed, InputError
+from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.model import Model, load_model
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.reference import evaluate_map
-from gyrotc.reference.f32 import gauss
-from gyrotc.reference.table import MAGIC, Table
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.f32 import gauss
+from gyrotc.target.maps import evaluate_map
+from gyrotc.target.table import MAGIC, Table
 from models import random_model
 
 C_TESTS = Path(__file__).resolve().parents[1] / "c"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.judge.check import check
+from gyrotc.quality.check import check
 from recordings import Columns, columns, write_csv
 
 

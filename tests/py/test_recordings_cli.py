@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import HOST, Command
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build
 from gyrotc.train.fitting import FitOptions
 from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.reference import evaluate_map, replay
-from gyrotc.reference.q31 import GAUSS_ERROR, exp2
-from gyrotc.reference.table import f32_words
-from gyrotc.status import HELD
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.history import replay
+from gyrotc.target.maps import evaluate_map
+from gyrotc.target.q31 import GAUSS_ERROR, exp2
+from gyrotc.target.status import HELD
+from gyrotc.target.table import f32_words
 from libc_build import runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 

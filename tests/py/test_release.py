@@ -53,7 +53,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     told = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
     assert "git tag -a v0.2.0" in told
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
-    emitter = clone / "gen" / "gyrotc" / "emit" / "amalgamate.py"
+    emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
     emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)

@@ -10,14 +10,14 @@ from types import ModuleType
 
 import pytest
 from conftest import ROOT, Command
-from gyrotc.errors import InputError
-from gyrotc.outputs.marker import marker_of, marker_text
+from gyrotc.common.errors import InputError
 from gyrotc.results.base import checked_result
 from gyrotc.results.changes import Apart, At
 from gyrotc.results.describe import tables
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.limits import HeldLimits, Limit
 from gyrotc.results.marker import Marker
+from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError
 
 

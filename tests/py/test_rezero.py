@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.model import Model, load_model
-from gyrotc.quantise import NUMERICS, quantise
+from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.train.rules import rezero_dph
 from libc_build import runtime
 from libc_device import Device

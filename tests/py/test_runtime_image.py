@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import Model
-from gyrotc.quantise import NUMERICS
-from gyrotc.reference.table import SERIAL_WORDS, Table, Words
-from gyrotc.status import E_ID, E_IMAGE, E_LAYOUT
+from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.quantise import NUMERICS
+from gyrotc.target.status import E_ID, E_IMAGE, E_LAYOUT
+from gyrotc.target.table import SERIAL_WORDS, Table, Words
 from libc_build import Runtime, runtime
 from libc_device import Device, history, variant
 from models import random_model

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from conftest import quick_and_slow
-from gyrotc.emit.amalgamate import amalgamate
-from gyrotc.reference.runtime import runtime_folders
+from gyrotc.common.runtime import runtime_folders
+from gyrotc.tables.amalgamate import amalgamate
 from gyrotc.verify.functions import PUBLIC
 
 ROOT = Path(__file__).resolve().parents[2]

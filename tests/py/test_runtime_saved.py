@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.errors import CheckFailed
+from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Model, Term
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.reference.table import Words
-from gyrotc.status import E_ID, E_IMAGE
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.status import E_ID, E_IMAGE
+from gyrotc.target.table import Words
 from libc_build import Runtime, runtime
 from libc_device import SAVE_WORDS, Device, history, variant
 from models import random_history

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.quantise import quantise
-from gyrotc.quantise.probes import N_PROBES
-from gyrotc.reference import FUSIBLE, evaluate_map
-from gyrotc.reference.f32 import _plus
+from gyrotc.tables.probes import N_PROBES
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.f32 import FUSIBLE, _plus
+from gyrotc.target.maps import evaluate_map
 from self_tests import OK, RIGHT, Verdict, models, native, write_sources
 
 WRONG = {

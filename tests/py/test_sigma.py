@@ -7,10 +7,10 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.errors import CheckFailed
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.reference import replay
-from gyrotc.status import E_LAYOUT
+from gyrotc.common.errors import CheckFailed
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.history import replay
+from gyrotc.target.status import E_LAYOUT
 from libc_build import Runtime, runtime
 from libc_device import history, variant
 from models import random_model, random_uncertainty

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, spoil
-from gyrotc.emit.files import emit
-from gyrotc.emit.record import RELEASE, SIGNATURE
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
-from gyrotc.verify import verify
-from gyrotc.verify.signature import load_private_key, load_public_key
+from gyrotc.tables.files import emit
+from gyrotc.tables.record import RELEASE, SIGNATURE
+from gyrotc.verify.job import verify
+from gyrotc.verify.signatures import load_private_key, load_public_key
 
 
 def _openssl(*arguments: object) -> subprocess.CompletedProcess[bytes]:

@@ -11,14 +11,13 @@ from typing import Any
 import allantools
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
-from gyrotc.simulate import names, read_truth, simulate
-from gyrotc.simulate.campaign import NOISE, campaign, gyro_map
+from gyrotc.causes import CATALOGUE
+from gyrotc.common.errors import InputError
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import NOISE, campaign, gyro_map, simulate
 from gyrotc.simulate.recording import RowLength
-from gyrotc.simulate.scenario import read
-from gyrotc.simulate.truth import simulated_floor
-from gyrotc.terms import CATALOGUE
+from gyrotc.simulate.scenario import names, read
+from gyrotc.simulate.truth import read_truth, simulated_floor
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 

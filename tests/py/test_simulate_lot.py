@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import invoked
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
-from gyrotc.simulate import read_truth
+from gyrotc.common.errors import InputError
+from gyrotc.recordings.load import load
 from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
 from gyrotc.simulate.scenario import read
+from gyrotc.simulate.truth import read_truth
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

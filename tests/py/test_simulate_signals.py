@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import load
-from gyrotc.errors import InputError
-from gyrotc.simulate import read_truth, simulate
-from gyrotc.simulate.campaign import campaign
+from gyrotc.common.errors import InputError
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import campaign, simulate
 from gyrotc.simulate.laser import laser_bias, laser_readings, laser_states
 from gyrotc.simulate.scenario import Scenario, read
 from gyrotc.simulate.signals import Laser, Thermometer
 from gyrotc.simulate.thermometers import thermometer_readings
+from gyrotc.simulate.truth import read_truth
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

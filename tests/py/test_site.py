@@ -54,7 +54,7 @@ def test_links_of_a_page_lead_to_what_the_site_has(page: Path) -> None:
 
 
 def test_the_picture_shows_every_room_and_no_reader_fetches_its_painter() -> None:
-    graph = architecture.rooms()
+    graph = architecture.packages()
     drawn = site_pages.picture(graph)
     assert re.findall(r">([^<>]+)</text>", drawn) == list(graph)
     assert drawn.count("marker-end") == len(list(architecture.arrows(graph)))

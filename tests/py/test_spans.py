@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Run
+from gyrotc.recordings.records import Run
 from gyrotc.train.spans import Span, training_spans
 
 

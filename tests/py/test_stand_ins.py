@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.dataset import Rows, load
 from gyrotc.model import Model, Network, Scale, Term
-from gyrotc.quantise import NUMERICS, quantise
-from gyrotc.quantise.applied import channels_of
-from gyrotc.reference import Replay, replay
-from gyrotc.reference.maps import stand_in
-from gyrotc.reference.table import Table
-from gyrotc.simulate import simulate
-from gyrotc.status import CHANNEL_LOST
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Rows
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.applied import channels_of
+from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.target.history import Replay, replay
+from gyrotc.target.maps import stand_in
+from gyrotc.target.status import CHANNEL_LOST
+from gyrotc.target.table import Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.result import rescaled
 from libc_build import ROOT, runtime

@@ -15,17 +15,18 @@ from typing import Any
 
 import pytest
 from conftest import run_gyrotc
-from gyrotc.dataset import load
-from gyrotc.errors import GyrotcError, InputError
+from gyrotc.assess.limits import load_limits
+from gyrotc.common.errors import GyrotcError, InputError
+from gyrotc.deliver import printing
+from gyrotc.deliver.certificate import certificate
+from gyrotc.deliver.export import export
 from gyrotc.jobs.build import build_into
-from gyrotc.jobs.certificate import certificate
-from gyrotc.jobs.export import export
-from gyrotc.jobs.lot import _unit
 from gyrotc.jobs.release import release_of, unit_of
-from gyrotc.judge.limits import load_limits
-from gyrotc.outputs import MARKER, result_folder
-from gyrotc.pages import printing
+from gyrotc.lot.job import _unit
+from gyrotc.recordings.load import load
 from gyrotc.results.release import RELEASED
+from gyrotc.store.folder import result_folder
+from gyrotc.store.marker import MARKER
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -202,7 +203,7 @@ def test_no_limits_are_no_pass(
     tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Before: a limits file of `schema = 1` alone gave "limits: PASS"."""
-    from gyrotc.commands.results import limit_lines
+    from gyrotc.cli.results import limit_lines
 
     folder = _built(tmp_path, text)
     held = json.loads((folder / "limits.json").read_text())
@@ -252,7 +253,7 @@ def _mutated(content: Any, path: tuple[str | int, ...]) -> Any:
 
 def test_every_leaf_and_payload_is_guarded(passing: Path, tmp_path: Path, key: Path) -> None:
     """Certificate, signing, export, lot and the signature's own check refuse whatever of it was changed."""
-    from gyrotc.verify.signature import check_signature, load_private_key, load_public_key, sign_record
+    from gyrotc.verify.signatures import check_signature, load_private_key, load_public_key, sign_record
 
     print(f"seed {SEED}")
     rng = random.Random(SEED)

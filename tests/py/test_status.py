@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gyrotc import status
+from gyrotc.target import status
 
 HEADER = Path(__file__).resolve().parents[2] / "include" / "gtc.h"
 

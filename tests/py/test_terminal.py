@@ -17,13 +17,13 @@ from typing import Any
 import pytest
 from conftest import Command
 from emitted import emitted
-from gyrotc.cli import _hoisted
-from gyrotc.commands import stages as stage_module
-from gyrotc.commands.base import folded
-from gyrotc.commands.stages import BUILD, DIAGNOSE, EMIT, FIT, StageLine, time_left
-from gyrotc.emit import emit
+from gyrotc.cli import stages as stage_module
+from gyrotc.cli.base import folded
+from gyrotc.cli.main import _hoisted
+from gyrotc.cli.stages import BUILD, DIAGNOSE, EMIT, FIT, StageLine, time_left
 from gyrotc.model import Model
-from gyrotc.outputs import kept
+from gyrotc.store import kept
+from gyrotc.tables.files import emit
 from recordings import described
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -158,20 +158,16 @@ def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
 
 def test_ctrl_c_before_anything_is_begun_is_silent() -> None:
     """Before: a traceback out of the middle of an import."""
-    early = "import os, signal, gyrotc.cli as c; c._quiet_start(); os.kill(os.getpid(), signal.SIGINT)"
+    early = "import os, signal, gyrotc.cli.main as c; c._quiet_start(); os.kill(os.getpid(), signal.SIGINT)"
     command = ["env", "--default-signal", sys.executable, "-c", early]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
-    light = (
-        "import sys, gyrotc.cli; sys.exit(bool({'numpy', 'pydantic', 'rich', 'typer'} & set(sys.modules)))"
-    )
+    light = "import sys, gyrotc.cli.main; sys.exit(bool({'numpy', 'pydantic', 'rich', 'typer'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", light], check=False).returncode == 0
 
 
 def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
-    code = (
-        "import warnings, gyrotc.cli as c; c.run = lambda _: (warnings.warn('of a library'), 0)[1]; c.main()"
-    )
+    code = "import warnings, gyrotc.cli.main as c; c.run = lambda _: (warnings.warn('of a library'), 0)[1]; c.main()"
     plain = os.environ | {"PYTHONWARNINGS": ""}
     for options, shown in (((), False), (("-W", "default"), True)):
         command = [sys.executable, *options, "-c", code]

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
+from gyrotc.causes import CATALOGUE
+from gyrotc.causes.base import History, Scene
+from gyrotc.common.errors import InputError
 from gyrotc.simulate.biasmap import draw
-from gyrotc.terms import CATALOGUE, History, Scene
-from gyrotc.terms.operators import delayed, first_order, play
-from gyrotc.terms.recursion import Course, CourseChannel, TermOutcome
+from gyrotc.target.operators import delayed, first_order, play
+from gyrotc.target.recursion import Course, CourseChannel, TermOutcome
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ def test_ids_families_and_parameters_are_those_of_the_interface(cause: str) -> N
 @pytest.mark.parametrize("cause", CATALOGUE)
 def test_every_cause_has_its_module_and_something_to_simulate(cause: str) -> None:
     term = CATALOGUE[cause]
-    assert (Path(__file__).parents[2] / "gen" / "gyrotc" / "terms" / f"{cause}.py").exists()
+    assert (Path(__file__).parents[2] / "gen" / "gyrotc" / "causes" / f"{cause}.py").exists()
     assert term.cavity or term.bias or term.record
     assert term.equation and term.source
     assert all(p.low < p.high for p in term.parameters)

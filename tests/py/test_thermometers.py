@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.dataset import Dataset, load
-from gyrotc.judge.thermometers import thermometer_findings
-from gyrotc.simulate import simulate
+from gyrotc.quality.thermometers import thermometer_findings
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
+from gyrotc.simulate.campaign import simulate
 
 RUNS = """
 extends = "signals"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from gyrotc.errors import CheckFailed, InputError
+from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.verify.toolchain import (
     Target,
     all_targets,

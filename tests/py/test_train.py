@@ -6,8 +6,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from gyrotc.errors import InputError
-from gyrotc.train import METHODS, TrainingData, fit, predict
+from gyrotc.common.errors import InputError
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import METHODS, fit
+from gyrotc.train.result import predict
 from training_data import NOISE_DPH, rms, samples, true_bias
 
 SEEDS = range(4)

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gyrotc.model import Model
-from gyrotc.train import SIZE_RULES, TrainingData, fit, predict
-from gyrotc.train.data import average
+from gyrotc.train.data import TrainingData, average
+from gyrotc.train.methods import fit
+from gyrotc.train.ols import SIZE_RULES
+from gyrotc.train.result import predict
 from numpy.typing import NDArray
 from training_data import NOISE_DPH, rms, samples, true_bias
 

@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from gyrotc.dataset import load
-from gyrotc.simulate import simulate
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.train import Fit, TrainingData, fit, predict
-from gyrotc.train.data import average, joined
+from gyrotc.train.data import TrainingData, average, joined
 from gyrotc.train.fitting import front_end, samples_of
+from gyrotc.train.methods import fit
+from gyrotc.train.result import Fit, predict
 from training_data import rms
 
 AVERAGE_S = 100.0

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty
-from gyrotc.train.uncertainty import _least_deviance, _likeliest
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import fit
+from gyrotc.train.result import predict
+from gyrotc.train.uncertainty import _least_deviance, _likeliest, coverage, uncertainty
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 

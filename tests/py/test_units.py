@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.dataset import load
-from gyrotc.dataset.earth import EARTH_RATE_DPH, earth_rate
-from gyrotc.dataset.units import UnitError, channel_unit, conversion, kind_of
-from gyrotc.errors import InputError
-from gyrotc.judge.check import check
+from gyrotc.common.errors import InputError
+from gyrotc.quality.check import check
+from gyrotc.recordings.earth import EARTH_RATE_DPH, earth_rate
+from gyrotc.recordings.load import load
+from gyrotc.recordings.units import UnitError, channel_unit, conversion, kind_of
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from recordings import Columns, columns, toml, write_csv
 
@@ -97,7 +97,7 @@ def test_kinds_and_names_of_channels() -> None:
 
 
 def test_the_bounds_in_other_units_are_those_of_pint() -> None:
-    from gyrotc.dataset import plausible
+    from gyrotc.recordings import plausible
 
     for unit, factor in plausible._RATES.items():
         assert conversion(unit, "rate").factor == pytest.approx(factor, rel=1e-15)

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from conftest import Command
 from emitted import emitted, entries, flip, recorded, spoil
-from gyrotc import verify as package
-from gyrotc.emit import expected_answers
-from gyrotc.errors import CheckFailed, InputError
-from gyrotc.verify import verify
-from gyrotc.verify.boardlog import compared_words, read_output
+from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.tables.files import expected_answers
+from gyrotc.verify import job as package
+from gyrotc.verify.board_log import compared_words, read_output
+from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 
 FAST = "host-gcc-O2"

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, flip, spoil
-from gyrotc.emit.files import emit
-from gyrotc.errors import InputError
+from gyrotc.common.errors import InputError
 from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
-from gyrotc.verify import verify
+from gyrotc.tables.files import emit
+from gyrotc.verify.job import verify
 
 Spoil = Callable[[Path], object]
 

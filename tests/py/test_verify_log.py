@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from emitted import emitted
-from gyrotc.errors import CheckFailed
-from gyrotc.verify import verify
+from gyrotc.common.errors import CheckFailed
+from gyrotc.verify.job import verify
 from jobs import job_of
 
 

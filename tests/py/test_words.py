@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.errors import CheckFailed
-from gyrotc.quantise import quantise
-from gyrotc.quantise.legal import _limits, outside
-from gyrotc.reference.table import ARRAYS, Table
+from gyrotc.common.errors import CheckFailed
+from gyrotc.tables.legal import _limits, outside
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.table import ARRAYS, Table
 from libc_build import ROOT, runtime
 from models import bank_with_channels, random_model, random_terms
 

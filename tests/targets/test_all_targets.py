@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from emitted import GOLDEN, emitted, recorded
 from gyrotc.model import Model, load_model
-from gyrotc.verify import verify
+from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import all_targets
 from metered import metered
 from models import bank_with_channels, random_model, with_memories

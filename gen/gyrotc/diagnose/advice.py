@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ..causes import CATALOGUE
 from ..results.diagnosed import DiagnosisVerdict, ExtendedModel, NamedCause
-from ..terms import CATALOGUE
-from .attribute.wide_memory import WideMemory
-from .signatures.candidates import searched
+from .candidates import searched
+from .wide_memory import WideMemory
 
 __all__ = ["VERDICTS", "next_steps", "sentence_of", "shows_as"]
 

@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from ..terms import CATALOGUE
-from .attribute.attribution import Attribution, attribute
-from .attribute.gains import Gains
-from .attribute.overlap import overlap
-from .detect.detection_limits import CauseLimit, detection_limits
-from .detect.joined import Channels
-from .detect.search import Search, open_search
-from .discrepancy.declared_noise import NoiseFinding, noise_findings
-from .discrepancy.ensemble import Ensemble, ensemble_of
-from .noise_colour.colours import Declared
+from ..causes import CATALOGUE
+from ..common.orthonormal import main_directions, orthonormal
+from .attribution import Attribution, attribute
+from .blocks import Records
+from .cache import bank_of
+from .candidates import Candidate, columns_of, diagnosed, searched
+from .colours import Declared
+from .declared_noise import NoiseFinding, noise_findings
+from .detection_limits import CauseLimit, detection_limits
+from .ensemble import Ensemble, ensemble_of
+from .gains import Gains
+from .joined import Channels
 from .noise_words import NOISE_WORDS
-from .orthonormal import main_directions, orthonormal
-from .screen.blocks import Records
-from .screen.screens import Screened, cleaned, screen
-from .signatures.cache import bank_of
-from .signatures.candidates import Candidate, columns_of, diagnosed, searched
+from .overlap import overlap
+from .screens import Screened, cleaned, screen
+from .search import Search, open_search
 
 __all__ = ["Analysis", "analyse", "search_of"]
 

@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..dataset import Dataset, Run, joined_runs
-from ..metrics import LEAST_SPAN_C
+from ..common.metrics import LEAST_SPAN_C
 from ..model import Model
+from ..quality.events import Event, accepted, events_of
+from ..quality.turned import turned_runs
+from ..quality.turned_within import gain_changes
+from ..recordings.records import Dataset, Run, joined_runs
 from ..results.diagnosed import Diagnosed
 from ..results.training import Training
 from ..train.data import TrainingData
@@ -19,16 +22,13 @@ from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.rules import start_sigma
 from ..train.spans import training_spans
 from ..train.stand_ins import StandIn
-from .attribute.single_cycle import Cycle, cycle_of, is_single_cycle
-from .extend.channel_terms import stand_ins_of
-from .extend.extension import Extension, extend
-from .extend.refit import Effect, added_range, play_runs, terms_of
-from .noise_colour.colours import declared_noise
+from .channel_terms import stand_ins_of
+from .colours import declared_noise
+from .extension import Extension, extend
+from .gather import records_of
 from .pipeline import Analysis, analyse
-from .screen.events import Event, accepted, events_of
-from .screen.gather import records_of
-from .screen.turned import turned_runs
-from .screen.turned_within import gain_changes
+from .refit import Effect, added_range, play_runs, terms_of
+from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .summary import not_testable, result_of
 from .verdict import holds
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from .. import __version__
-from ..dataset import Dataset
+from ..causes import CATALOGUE, separate_by
+from ..recordings.records import Dataset
 from ..results.diagnosed import (
     Baseline,
     ComparedStatistic,
@@ -24,20 +25,19 @@ from ..results.diagnosed import (
     WithoutRate,
 )
 from ..results.planned import DetectionLimit
-from ..terms import CATALOGUE, separate_by
 from ..train.fitting import FitOptions, front_end
 from .advice import VERDICTS, next_steps, sentence_of, shows_as
-from .attribute.cycle_fits import memories
-from .attribute.intervals import Interval
-from .attribute.refine import Refined
-from .attribute.single_cycle import Cycle
-from .detect.detection_limits import CauseLimit
-from .discrepancy.declared_noise import NoiseFinding
-from .extend.extension import Extension
-from .extend.refit import terms_of
+from .candidates import diagnosed
+from .cycle_fits import memories
+from .declared_noise import NoiseFinding
+from .detection_limits import CauseLimit
+from .extension import Extension
+from .intervals import Interval
 from .noise_words import NOISE_WORDS
 from .pipeline import Analysis
-from .signatures.candidates import diagnosed
+from .refine import Refined
+from .refit import terms_of
+from .single_cycle import Cycle
 from .verdict import looks_like, verdict_of
 
 __all__ = ["not_testable", "result_of"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..results.diagnosed import DiagnosisVerdict
-from .attribute.attribution import Attribution
-from .discrepancy.declared_noise import NoiseFinding
-from .signatures.candidates import shape_parameter
+from .attribution import Attribution
+from .candidates import shape_parameter
+from .declared_noise import NoiseFinding
 
 __all__ = ["holds", "looks_like", "verdict_of"]
 

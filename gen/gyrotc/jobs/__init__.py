@@ -1,1 +1,1 @@
-"""Whole jobs over the stages of the house: build, fleet, compare, diagnose into a folder."""
+"""Whole jobs for one unit: build, compare, diagnose, recalibrate, release."""

@@ -6,18 +6,22 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit import emitted_tables, example_period_us, example_samples
-from ..emit.amalgamate import ARITHMETICS, amalgamate
-from ..emit.record import RECORD, joint_record_text
-from ..errors import CheckFailed, InputError
+from ..common.errors import CheckFailed, InputError
+from ..common.runtime import runtime_folders
+from ..common.texts import c_environment
 from ..model import Model, load_model
-from ..outputs import scratch_folder, write_atomically, write_own
 from ..pages.report import axes_page
-from ..reference.runtime import runtime_folders
 from ..results.verification import JointVerification, Verification
-from ..texts import c_environment
-from ..verify import file_entries, verify
-from ..verify.signature import check_signature, load_public_key
+from ..store.files import write_atomically
+from ..store.opening import write_own
+from ..store.scratch import scratch_folder
+from ..tables.amalgamate import ARITHMETICS, amalgamate
+from ..tables.example import example_period_us, example_samples
+from ..tables.files import emitted_tables
+from ..tables.record import RECORD, joint_record_text
+from ..verify.emitted import file_entries
+from ..verify.job import verify
+from ..verify.signatures import check_signature, load_public_key
 from ..verify.toolchain import all_targets, compile_c, run_program
 
 __all__ = ["axes_in", "check_emitted", "join_axes", "joint_texts", "verify_axes"]

@@ -11,18 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..dataset import Dataset, axes_of, load
-from ..emit import emit
-from ..errors import InputError
-from ..judge.budget import budget_of
-from ..judge.changes import changes_since, load_earlier
-from ..judge.evaluate import Watch, evaluate
-from ..judge.limits import Limits, held_against, load_limits
-from ..judge.product_guards import guarded
+from ..assess.budget import budget_of
+from ..assess.changes import changes_since, load_earlier
+from ..assess.evaluate import Watch, evaluate
+from ..assess.limits import Limits, held_against, load_limits
+from ..assess.product_guards import guarded
+from ..common.errors import InputError
 from ..model import Model
-from ..outputs import MARKER, json_text, result_folder, sha256, write_atomically
 from ..pages.report import write_report
-from ..quantise.applied import applied_of
+from ..recordings.load import axes_of, load
+from ..recordings.records import Dataset
 from ..results.changes import Changes
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Evaluation
@@ -30,8 +28,14 @@ from ..results.limits import HeldLimits
 from ..results.manifest import Manifest
 from ..results.training import Training
 from ..results.verification import Verification
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
+from ..store.marker import MARKER, sha256
+from ..tables.applied import applied_of
+from ..tables.files import emit
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
-from ..verify import chosen_targets, verify
+from ..verify.job import chosen_targets, verify
 from .axes import join_axes
 from .recalibration import refuse_together, with_prior
 
@@ -290,7 +294,7 @@ def _versions() -> dict[str, str]:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
-    from .fleet.fingerprint import program_of  # the package of fleets imports this module
+    from ..store.fingerprint import program_of  # the package of fleets imports this module
 
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return Manifest(

@@ -15,15 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..dataset import Dataset, Run
-from ..errors import InputError
-from ..frontend import Blocks
-from ..metrics import Averages, average
+from ..common.errors import InputError
+from ..common.metrics import Averages, average
+from ..recordings.records import Dataset, Run
 from ..results.comparison import Comparison, Group, Method
 from ..results.evaluation import Pooled
-from ..train import METHODS, Fit, TrainingData, fit, predict
-from ..train.data import joined
+from ..train.data import TrainingData, joined
 from ..train.fitting import front_end, samples_of
+from ..train.methods import METHODS, fit
+from ..train.result import Fit, predict
+from ..train.samples import Blocks
 from ..train.spans import training_spans
 
 __all__ = ["CompareOptions", "compare"]

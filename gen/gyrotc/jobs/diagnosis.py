@@ -11,14 +11,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from ..dataset import Dataset
-from ..diagnose import Diagnosis, diagnose
+from ..common.texts import toml_comment, toml_key, toml_value
+from ..diagnose.result import Diagnosis, diagnose
 from ..model import Model
-from ..outputs import json_text, result_folder, write_atomically
 from ..pages.diagnosis_page import PICTURES, write_diagnosis_page
 from ..pages.diagnosis_plots import draw
+from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
-from ..texts import toml_comment, toml_key, toml_value
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
 from ..train.fitting import FitOptions
 
 __all__ = ["diagnose_into", "extended_scenario", "save"]

@@ -17,12 +17,15 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from .. import _core
-from ..dataset import Dataset
-from ..dataset.schema import FILE
 from ..model import Model
-from ..outputs import digest_of, kept, result_folder, write_atomically
+from ..recordings.records import Dataset
+from ..recordings.schema import FILE
 from ..results.base import checked_result
 from ..results.diagnosed import Diagnosed
+from ..store import kept
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import digest_of
 from ..train.fitting import FitOptions
 
 __all__ = ["diagnosed"]
@@ -84,7 +87,9 @@ def _anew(
     progress: Progress | None,
     accept_events: bool,
 ) -> Diagnosed:
-    from ..diagnose import diagnose  # all that searches and draws: a second for who has the answer already
+    from ..diagnose.result import (
+        diagnose,  # all that searches and draws: a second for who has the answer already
+    )
     from .diagnosis import diagnose_into
 
     into = diagnose if out is None else functools.partial(diagnose_into, out)

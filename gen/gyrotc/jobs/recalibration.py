@@ -9,26 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ..dataset import Dataset
-from ..errors import InputError
-from ..judge.changes import Earlier, load_earlier, started_on
-from ..judge.limits import Limits
-from ..judge.stated import DAYS_A_YEAR, yearly_drifts
+from ..assess.changes import Earlier, load_earlier, started_on
+from ..assess.limits import Limits
+from ..assess.stated import DAYS_A_YEAR, yearly_drifts
+from ..common.errors import InputError
+from ..lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, stated_sigma_dph, widened
+from ..lot.prior import MapPosterior
+from ..lot.surprise import FALSE_ALARM
+from ..lot.use import prior_of
 from ..model import Model, load_model
+from ..recordings.records import Dataset
 from ..results.base import read_result
 from ..results.lot import Lot
 from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
-from ..train.lot import prior_of
-from ..train.lot.earlier import (
-    EarlierPrior,
-    posterior_of_known,
-    posterior_of_means,
-    stated_sigma_dph,
-    widened,
-)
-from ..train.lot.prior import MapPosterior
-from ..train.lot.surprise import FALSE_ALARM
 from ..train.means import means_of
 
 __all__ = ["posterior_in", "prior_from", "refuse_together", "unit_in", "with_prior"]

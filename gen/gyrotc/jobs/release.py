@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..emit.record import RECORD
-from ..errors import InputError
-from ..judge.conformity import worst_of
-from ..judge.consistent import check_budget, check_figures, check_limits
+from ..assess.conformity import worst_of
+from ..assess.consistency import check_budget, check_figures, check_limits
+from ..common.errors import InputError
 from ..model import Model, load_model
-from ..outputs import check_intact, sha256
 from ..pages.unit import UnitResults, unit_in
 from ..results.release import RELEASED, STATED, Release, ReleasedUnit
+from ..store.marker import check_intact, sha256
+from ..tables.record import RECORD
 from .axes import axes_in
 
 __all__ = ["accepted", "release_of", "unit_of"]

@@ -1,1 +1,1 @@
-"""What people read: HTML pages and the pictures in them. Computes nothing new."""
+"""What people read: HTML pages and the pictures in them, made from results."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import chain
 from pathlib import Path
 
-from ..judge.check import CheckResult
-from ..judge.pictured import pictured
-from ..outputs import write_result
+from ..quality.check import CheckResult
+from ..quality.pictured import pictured
+from ..store.folder import write_result
 from .check_plots import picture
 from .report import page_environment
 

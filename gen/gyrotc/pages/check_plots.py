@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..dataset import Curve
-from ..judge.pictured import Columned, Compared, Covered, Seen, Strip
-from ..texts import picture_text
+from ..common.texts import picture_text
+from ..quality.pictured import Columned, Compared, Covered, Seen, Strip
+from ..recordings.records import Curve
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["picture"]

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from ..common.texts import picture_text
 from ..results.comparison import Comparison, Group, Method, Published
-from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 from .published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from ..errors import InputError
-from ..inputs import read_input
+from ..common.errors import InputError
+from ..common.opening import read_input
+from ..common.texts import checked_svg
 from ..results.base import read_result
 from ..results.diagnosed import Diagnosed, GainOnUnseen
-from ..texts import checked_svg
 from .report import page_environment, page_from, write_page
 
 __all__ = ["PICTURES", "is_diagnosis", "write_diagnosis_page"]

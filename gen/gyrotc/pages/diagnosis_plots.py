@@ -15,18 +15,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from ..diagnose import Diagnosis
-from ..diagnose.attribute.attribution import Attribution
-from ..diagnose.attribute.refine import Refined
-from ..diagnose.attribute.single_cycle import Cycle
-from ..diagnose.detect.detection import Found
-from ..diagnose.discrepancy.ensemble import Discrepancy, Ensemble
-from ..diagnose.screen.blocks import Records, centred_slope
-from ..diagnose.signatures.candidates import diagnosed
-from ..metrics import Averages
+from ..causes import CATALOGUE
+from ..common.metrics import Averages
+from ..common.texts import picture_text
+from ..diagnose.attribution import Attribution
+from ..diagnose.blocks import Records, centred_slope
+from ..diagnose.candidates import diagnosed
+from ..diagnose.detection import Found
+from ..diagnose.ensemble import Discrepancy, Ensemble
+from ..diagnose.refine import Refined
+from ..diagnose.result import Diagnosis
+from ..diagnose.single_cycle import Cycle
 from ..results.diagnosed import FoundEvent
-from ..terms import CATALOGUE
-from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["draw"]

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..common.texts import picture_text
 from ..results.changes import Calibration
-from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["calibrations_over_time"]

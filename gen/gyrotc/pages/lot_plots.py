@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..common.texts import picture_text
 from ..results.fleet import Facts, FleetEntry, Reason, ResidualSeries
-from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["lot_picture", "unit_apart"]

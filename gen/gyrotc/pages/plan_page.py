@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..outputs import json_text, result_folder, write_atomically
 from ..results.base import read_result
 from ..results.planned import Plan
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
 from .plan_plots import accuracy_by_hours, separability_matrix, temperatures
 from .report import page_environment, page_from, write_page
 

@@ -6,8 +6,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..common.texts import picture_text
 from ..results.planned import Plan
-from ..texts import picture_text
 from .plots import ACCENT, AFTER, BEFORE, STYLE, svg
 
 __all__ = ["accuracy_by_hours", "separability_matrix", "temperatures"]

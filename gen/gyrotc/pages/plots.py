@@ -18,10 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..metrics import Averages
+from ..common.metrics import Averages
+from ..common.texts import checked_svg, picture_text
 from ..model import Model
 from ..results.training import NoiseTerms, Training
-from ..texts import checked_svg, picture_text
 
 __all__ = [
     "ACCENT",

@@ -12,15 +12,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
-from ..errors import InputError
-from ..inputs import need_memory, open_input, refuse_above
-from ..metrics import Averages, average
-from ..outputs import result_folder, write_atomically
+from ..causes import CATALOGUE
+from ..common.ceilings import need_memory, refuse_above
+from ..common.errors import InputError
+from ..common.metrics import Averages, average
+from ..common.opening import open_input
+from ..common.texts import file_stem, html_environment
+from ..quality.left_out import exclude_text
 from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
-from ..terms import CATALOGUE
-from ..texts import file_stem, html_environment
-from ..train.left_out import exclude_text
+from ..store.files import write_atomically
+from ..store.folder import result_folder
 from .history_plots import calibrations_over_time
 from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
 from .prior_plots import prior_and_posterior

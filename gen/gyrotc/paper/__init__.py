@@ -1,4 +1,1 @@
-"""The paper repeated: its experiment on simulated recordings, its table and its figures (`make paper`).
-
-Ding, Zhang, Huang and Chen, "Laser Gyro Temperature Compensation Using Modified RBFNN", Sensors 2014.
-"""
+"""The experiment of the paper on simulated recordings, its table and its figures (`make paper`)."""

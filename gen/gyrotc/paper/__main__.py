@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..outputs import write_atomically
-from ..simulate import read
 from ..simulate.campaign import campaign, with_noise
+from ..simulate.scenario import read
+from ..store.files import write_atomically
 from .figures import FIGURES, checksum, draw, draw_run
 from .page import filled, parts
 from .record import SEEDS, departures, measured

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import load
-from ..metrics import average, statistics
+from ..common.metrics import average, statistics
 from ..pages.published import ENVIRONMENTS, NEURONS
-from ..simulate import simulate
-from ..simulate.campaign import Noise
+from ..recordings.load import load
+from ..simulate.campaign import Noise, simulate
 from ..simulate.truth import simulated_floor
-from ..train import Fit, TrainingData, fit, predict, trained
-from ..train.data import joined, scaling_of
+from ..train.data import TrainingData, joined, scaling_of
 from ..train.fitting import front_end, samples_of
+from ..train.methods import fit, trained
+from ..train.result import Fit, predict
 
 __all__ = [
     "AVERAGE_S",

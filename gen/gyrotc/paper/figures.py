@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..outputs import write_atomically
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
 from ..pages.published import ENVIRONMENTS
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
+from ..store.files import write_atomically
 from .experiment import AVERAGE_S
 
 __all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run"]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 from .experiment import METHODS
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.noise_colour.colours import Declared
-from ..diagnose.screen.blocks import Record, Records
-from ..diagnose.screen.gather import block_length
-from ..errors import InputError
+from ..causes.base import History
+from ..common.errors import InputError
+from ..diagnose.blocks import Record, Records
+from ..diagnose.colours import Declared
+from ..diagnose.gather import block_length
 from ..simulate.campaign import Noise, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, read
 from ..simulate.signals import Thermometer
-from ..terms.base import History
 
 __all__ = ["NodeTemperatures", "Programme", "library", "node_temperatures", "programme_of"]
 

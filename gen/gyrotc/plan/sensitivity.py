@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.detect.detection_limits import CauseLimit, amplitude_energy, limit_of
-from ..diagnose.detect.search import Search, open_search
-from ..diagnose.noise_colour.colours import COLOURS, Colour
-from ..diagnose.noise_colour.whitener import Whitener
-from ..diagnose.signatures.cache import bank_of
-from ..diagnose.signatures.candidates import Candidate, planned
-from ..diagnose.signatures.signature_bank import SignatureBank
+from ..diagnose.cache import bank_of
+from ..diagnose.candidates import Candidate, planned
+from ..diagnose.colours import COLOURS, Colour
+from ..diagnose.detection_limits import CauseLimit, amplitude_energy, limit_of
+from ..diagnose.search import Search, open_search
+from ..diagnose.signature_bank import SignatureBank
+from ..diagnose.whitener import Whitener
 from .programme import Programme
 
 __all__ = ["Sensitivity"]

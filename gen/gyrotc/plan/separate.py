@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.attribute.gains import Gains
-from ..diagnose.orthonormal import orthonormal
-from ..diagnose.screen.blocks import singled_out
-from ..diagnose.signatures.candidates import Candidate, columns_of, planned, searched, shape_parameter
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.orthonormal import orthonormal
+from ..diagnose.blocks import singled_out
+from ..diagnose.candidates import Candidate, columns_of, planned, searched, shape_parameter
+from ..diagnose.gains import Gains
 from ..simulate.campaign import Noise
 from .programme import library, programme_of
 from .sensitivity import Sensitivity

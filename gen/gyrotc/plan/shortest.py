@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .sensitivity import Sensitivity
 
 __all__ = ["FoundProfile", "shortest"]

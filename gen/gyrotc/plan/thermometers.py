@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.attribute.gains import Gains
-from ..diagnose.orthonormal import orthonormal
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.orthonormal import orthonormal
+from ..diagnose.gains import Gains
 from ..simulate.campaign import Noise
 from .programme import node_temperatures
 from .sensitivity import Sensitivity

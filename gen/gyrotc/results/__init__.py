@@ -1,5 +1,4 @@
 """The JSON results as typed objects: one class writes a result, and pages and lines read the same class.
 
-Third room of the house (errors → inputs → **results** → outputs → ...). docs/FORMAT.md and the JSON Schemas beside
-these modules are made from the classes (`make formats`).
+docs/FORMAT.md and the JSON Schemas beside these modules are made from the classes (`make formats`).
 """

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from ..metrics import Averages, statistics
+from ..common.metrics import Averages, statistics
 from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
 
 __all__ = [

@@ -12,10 +12,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset.text import dataset_toml
-from ..errors import InputError
-from ..outputs import create, json_text, result_folder, write_own
+from ..common.errors import InputError
+from ..recordings.text import dataset_toml
 from ..results.truth import SimulatedTruth, TrueLot, TrueRun
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
+from ..store.opening import create, write_own
 from .biasmap import BiasMap, draw
 from .instrument import SimulatedRecord, record
 from .noise import CELL_S

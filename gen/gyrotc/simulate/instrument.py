@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs import need_memory
-from ..terms import CATALOGUE, Scene
-from ..terms.operators import first_order
+from ..causes import CATALOGUE
+from ..causes.base import Scene
+from ..common.ceilings import need_memory
+from ..target.operators import first_order
 from . import chamber, channels, noise, profile, thermal
 from .biasmap import BiasMap
 from .internal import internal_of, internal_readings

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import Scene
+from ..causes.base import Scene
 from .channels import true_values
 from .laser import LaserStates, laser_bias, laser_readings, laser_states
 from .noise import CELL_S

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..outputs import result_folder
+from ..common.errors import InputError
 from ..results.truth import TrueLot
+from ..store.folder import result_folder
 from .biasmap import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .campaign import Noise, RowForm, SimulatedGyro, with_noise, write_gyro
 from .scenario import Gyro, Scenario, read

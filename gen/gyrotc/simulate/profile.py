@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from ..errors import InputError
+from ..common.errors import InputError
 
 __all__ = ["Step", "corners", "sample"]
 

@@ -13,9 +13,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from ..errors import InputError
-from ..inputs import read_toml, refuse_above
-from ..terms import CATALOGUE
+from ..causes import CATALOGUE
+from ..common.ceilings import refuse_above
+from ..common.errors import InputError
+from ..common.inputs_texts import read_toml
 from .profile import Step
 from .signals import Laser, NodeDifference, Thermometer
 

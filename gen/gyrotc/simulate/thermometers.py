@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms.operators import first_order
+from ..target.operators import first_order
 from .signals import Thermometer
 
 __all__ = ["quantised_c", "thermometer_readings"]

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..inputs import read_input
+from ..common.errors import InputError
+from ..common.opening import read_input
 from ..results.base import read_optional
 from ..results.truth import SimulatedTruth
 

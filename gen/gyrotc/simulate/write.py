@@ -12,7 +12,7 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from ..outputs import create
+from ..store.opening import create
 from .recording import RecordingPart
 
 __all__ = ["Format", "SimulatedRunFile"]

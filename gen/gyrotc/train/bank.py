@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..metrics import LEAST_SPAN_C
+from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData
 from .mrbf import fit_mrbf
 from .result import Outcome

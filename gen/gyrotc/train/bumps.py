@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import MAD_TO_SIGMA
+from ..common.metrics import MAD_TO_SIGMA
 from .data import Scaling, TrainingData
-from .process import fit_process
+from .evidence import fit_process
 from .simple import FLAT
 
 __all__ = ["BesideSmooth", "Bumps", "beside_smooth", "find_bumps"]

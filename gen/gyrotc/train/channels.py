@@ -17,16 +17,20 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
-from ..dataset import Dataset, Rows, Run
-from ..dataset.units import channel_kind
-from ..frontend import F32, Blocks, Guarded, channel_at, with_missing
 from ..model import Model
+from ..recordings.records import Dataset, Rows, Run
+from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
-from ..terms.recursion import CourseChannel
+from ..target.believe import Guarded
+from ..target.channels import channel_at
+from ..target.follow import with_missing
+from ..target.numbers import F32
+from ..target.recursion import CourseChannel
 from .data import Scaling, TrainingData, scaling_of
+from .evidence import Process, TrainingFailed, conditioned, fit_process
 from .guards import channel_guard
 from .parts import Parts, PartsTrial, bent_parts, chosen_parts
-from .process import Process, TrainingFailed, conditioned, fit_process
+from .samples import Blocks
 from .shapes import SHAPES, ChannelShape, shape_of
 from .stand_ins import stand_in_of
 

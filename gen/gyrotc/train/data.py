@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..metrics import median
+from ..common.errors import InputError
+from ..common.metrics import median
 
 __all__ = [
     "Bins",

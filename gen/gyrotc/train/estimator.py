@@ -1,6 +1,6 @@
 """`RBFNetworkRegressor`: a small Gaussian network as a scikit-learn estimator.
 
-Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train`, any
+Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train.methods`, any
 other number of inputs by orthogonal least squares: samples as centers, one width, size by BIC. Needs
 scikit-learn 1.6 or later (`pip install gyrotc[sklearn]`).
 """
@@ -18,8 +18,8 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .. import _core
 from .data import Scaling, TrainingData
+from .evidence import MEAN_S
 from .mrbf import fit_mrbf
-from .process import MEAN_S
 
 __all__ = ["RBFNetworkRegressor"]
 

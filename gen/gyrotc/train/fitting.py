@@ -15,37 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..dataset import Dataset, Run, earth_rate_warning, joined_runs
-from ..errors import InputError
-from ..frontend import Blocks, run_blocks
-from ..metrics import Averages
+from ..common.errors import InputError
+from ..common.metrics import Averages
 from ..model import Model
+from ..quality.left_out import outliers_of, stretches_left_out
+from ..recordings.earth import earth_rate_warning
+from ..recordings.records import Dataset, Run, joined_runs
 from ..results.evaluation import FoundIn, Pooled
 from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
-from . import (
-    AUTO,
-    METHODS,
-    NETWORK_METHODS,
-    SIMPLE,
-    Fit,
-    TrainingData,
-    TrainingFailed,
-    coverage,
-    fit,
-    predict,
-    uncertainty,
-)
 from .bumps import Bumps
 from .channels import chosen_channels, seen_by_target, with_channels
-from .data import cleaned, joined, scaling_of
+from .data import TrainingData, cleaned, joined, scaling_of
+from .evidence import TrainingFailed
 from .guards import AGREE_S, longest_same_s, stuck_after_s
-from .left_out import outliers_of, stretches_left_out
 from .means import unit_means
+from .methods import AUTO, METHODS, NETWORK_METHODS, fit
 from .noisefloor import noise_terms, sensitivities, stretches
 from .prior import Prior
-from .result import snapped
+from .result import Fit, predict, snapped
 from .rules import rezero_dph
+from .samples import Blocks, run_blocks
+from .simple import SIMPLE
 from .spans import Span, training_spans
+from .uncertainty import coverage, uncertainty
 
 __all__ = [
     "HOLD_S",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Run
+from ..recordings.records import Run
 
 __all__ = ["AGREE_S", "channel_guard", "longest_same_s", "stuck_after_s"]
 

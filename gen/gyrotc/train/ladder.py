@@ -31,10 +31,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import LEAST_SPAN_C
+from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average, cells_of, weighted_mean
+from .evidence import MEAN_S, Process, TrainingFailed, conditioned
 from .paired import more_than_error_of_pieces, more_than_its_error, of_pieces, surely_above_0, t_statistic
-from .process import MEAN_S, Process, TrainingFailed, conditioned
 from .residual_noise import difference_sigma
 from .simple import SIMPLE, all_solved, powers_of
 from .spans import Fold, history_folds

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..results.training import MapMeans
 from .data import Scaling, TrainingData, average, gather
-from .process import MEAN_S, Process
+from .evidence import MEAN_S, Process
 from .residual_noise import difference_sigma
 
 __all__ = ["UnitMeans", "means_of", "unit_means"]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .data import Scaling, TrainingData, scaling_of
-from .process import Process, fit_process
+from .evidence import Process, fit_process
 from .residual_noise import not_white
 from .result import Outcome, network
 from .simple import without_rate

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import LEAST_SPAN_C
+from ..common.metrics import LEAST_SPAN_C
 from ..results.training import AllanPoint, BiasPlane, NoiseTerms
 
 __all__ = ["allan_variance", "noise_terms", "sensitivities", "stretches"]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..errors import InputError
+from ..common.errors import InputError
 from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
 from .result import Outcome, network

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .data import Scaling, TrainingData, average
+from .evidence import MEAN_S, Process, conditioned, fit_process
 from .ladder import pieces_of
 from .paired import more_than_its_error, of_pieces, surely_above_0
-from .process import MEAN_S, Process, conditioned, fit_process
 from .residual_noise import difference_sigma
 from .spans import Fold, history_folds
 

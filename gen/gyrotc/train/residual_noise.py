@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from ..metrics import MAD_TO_SIGMA, median
+from ..common.metrics import MAD_TO_SIGMA, median
 from .data import TrainingData, average
 
 __all__ = ["difference_sigma", "floor_dph", "not_white"]

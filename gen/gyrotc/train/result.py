@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..results.earlier import EarlierUse
 from ..results.lot import KnownMap, LotUse
 from .data import Scaling
-from .process import Process
+from .evidence import Process
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict", "rescaled", "snapped"]
 

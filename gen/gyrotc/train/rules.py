@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..terms.operators import play
+from ..target.operators import play
 from .data import TrainingData
-from .process import Process
+from .evidence import Process
 from .result import Fit, predict
 
 __all__ = ["Known", "rezero_dph", "rules_of", "start_sigma"]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .data import Scaling, TrainingData
+from .evidence import Process, TrainingFailed, fit_process
 from .guard import objection
 from .ladder import MAPS, RUNGS, YARDSTICKS, Ladder, climb
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .process import Process, TrainingFailed, fit_process
 from .result import Outcome
 from .simple import fit_simple
 

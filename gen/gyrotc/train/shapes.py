@@ -15,8 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..terms import CATALOGUE, Cause, History
-from ..terms.recursion import TableKind
+from ..causes import CATALOGUE
+from ..causes.base import Cause, History
+from ..target.recursion import TableKind
 from .data import TrainingData
 
 __all__ = ["SHAPES", "ChannelShape", "ShapeId", "shape_of"]

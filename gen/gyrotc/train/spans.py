@@ -19,7 +19,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Run
+from ..recordings.records import Run
 from ..results.training import SpanLeftOut
 
 __all__ = ["Fold", "Span", "history_folds", "training_spans", "turning_points"]

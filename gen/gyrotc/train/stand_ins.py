@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Model
-from . import fit
 from .data import TrainingData
-from .process import TrainingFailed
+from .evidence import TrainingFailed
+from .methods import fit
 from .result import predict, rescaled, snapped
 from .uncertainty import of_few
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from .data import TrainingData, cleaned
-from .process import Process, fit_process
+from .evidence import Process, fit_process
 from .result import Fit, predict
 from .rules import Known, rules_of
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
 from ..model import Model
-from ..outputs import scratch_folder
-from ..reference.table import Table
 from ..results.verification import CallCost, FunctionCost, VerifiedTarget
-from .boardlog import BoardOutput, compared_words, read_output
+from ..store.scratch import scratch_folder
+from ..target.table import Table
+from .board_log import BoardOutput, compared_words, read_output
 from .bounds import instruction_bounds
 from .functions import function_costs
 from .source import board_files, checked_sources

@@ -11,8 +11,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..outputs import write_own
-from ..reference.table import Table
+from ..store.opening import write_own
+from ..target.table import Table
 from .flow import parse_flows
 from .functions import PUBLIC
 from .loops import MEMORY, POWER, LoopText, counts_of, totals

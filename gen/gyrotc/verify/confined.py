@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
 
 __all__ = ["LIMIT_S", "ProgramRun", "confined", "end_all", "run_to_end"]
 

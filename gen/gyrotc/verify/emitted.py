@@ -12,11 +12,11 @@ import stat
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
-from ..emit import Emission, quantise_all
-from ..emit.record import BESIDES, Options, read_options
-from ..errors import CheckFailed, InputError
+from ..common.errors import CheckFailed, InputError
 from ..model import Model
 from ..results.verification import VerifiedFile
+from ..tables.files import Emission, quantise_all
+from ..tables.record import BESIDES, Options, read_options
 
 __all__ = ["EDITABLE", "c_hash", "file_entries", "made_again"]
 

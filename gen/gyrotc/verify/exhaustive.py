@@ -17,11 +17,11 @@ from pathlib import Path
 from subprocess import DEVNULL, PIPE
 from typing import Any
 
-from ..errors import CheckFailed, GyrotcError
+from ..common.errors import CheckFailed, GyrotcError
 from ..model import Model
-from ..outputs import scratch_folder
-from ..reference.q31 import exp2_table
-from ..reference.table import Table
+from ..store.scratch import scratch_folder
+from ..target.q31 import exp2_table
+from ..target.table import Table
 from .confined import confined
 from .source import checked_sources, table_files
 from .toolchain import Target, all_targets, compile_objects, link

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
 
 __all__ = ["Block", "Flow", "Instruction", "Loop", "parse_flows"]
 

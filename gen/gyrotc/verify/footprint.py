@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..emit import example_period_us
+from ..common.texts import c_environment
 from ..model import Model
-from ..outputs import scratch_folder, write_own
-from ..reference.table import Table
-from ..texts import c_environment
+from ..store.opening import write_own
+from ..store.scratch import scratch_folder
+from ..tables.example import example_period_us
+from ..target.table import Table
 from .source import checked_sources, table_files
 from .toolchain import Target, all_targets, compile_objects, link, symbols
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
 from ..results.verification import FunctionCost
 from .toolchain import Target, compile_objects, symbols
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..emit.vectors import Vectors
-from ..errors import CheckFailed
-from ..inputs import read_input
-from ..reference import answers
+from ..common.errors import CheckFailed
+from ..common.opening import read_input
 from ..results.verification import CallCost, LogPart, ReadLog, VerifiedTarget
+from ..tables.vectors import Vectors
+from ..target.history import answers
 from .board import Job, check_identity
-from .boardlog import BoardComparison, BoardLog, BoardOutput, compared_words, read_log
+from .board_log import BoardComparison, BoardLog, BoardOutput, compared_words, read_log
 
 __all__ = ["log_entries", "log_parts"]
 

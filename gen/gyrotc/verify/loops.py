@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from ..errors import CheckFailed
-from ..reference.table import ARRAYS, Table
+from ..common.errors import CheckFailed
+from ..target.table import ARRAYS, Table
 
 __all__ = ["MEMORY", "POWER", "SHORT_QUOTIENTS", "Counts", "LoopText", "counts_of", "totals"]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
 from .flow import Block, Flow, Loop
 from .functions import TERM_CODES
 from .loops import SHORT_QUOTIENTS, LoopText

@@ -9,10 +9,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..dataset import Dataset
-from ..errors import CheckFailed
-from ..reference.table import Table
+from ..common.errors import CheckFailed
+from ..recordings.records import Dataset
 from ..results.verification import ReplayedRows, VerifiedTarget
+from ..target.table import Table
 from .board import Job
 from .replay import ReplayCase, history_of, replay_on, replay_program
 from .toolchain import Target

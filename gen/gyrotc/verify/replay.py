@@ -14,15 +14,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dataset import Rows, Run
-from ..errors import CheckFailed, InputError
-from ..frontend import blocks_since_power_on, missed_before, period_us, samples_per_block
+from ..common.errors import CheckFailed, InputError
+from ..common.texts import c_environment
 from ..model import Model
-from ..outputs import scratch_folder, write_own
-from ..quantise.applied import channels_of
-from ..reference import Replay, replay
-from ..reference.table import Table, Words
-from ..texts import c_environment
+from ..recordings.records import Rows, Run
+from ..store.opening import write_own
+from ..store.scratch import scratch_folder
+from ..tables.applied import channels_of
+from ..target.follow import period_us, samples_per_block
+from ..target.history import Replay, replay
+from ..target.table import Table, Words
+from ..train.samples import blocks_since_power_on, missed_before
 from .source import checked_sources, table_files
 from .toolchain import Target, compile_c, run_program
 

@@ -11,13 +11,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..emit import board_test_text
-from ..emit.amalgamate import ARITHMETICS, amalgamate
-from ..errors import CheckFailed
+from ..common.errors import CheckFailed
+from ..common.runtime import runtime_folders
+from ..common.texts import C_COMMENT, C_INITIALISER
 from ..model import SERIAL, Model
-from ..outputs import write_own
-from ..reference.runtime import runtime_folders
-from ..texts import C_COMMENT, C_INITIALISER
+from ..store.opening import write_own
+from ..tables.amalgamate import ARITHMETICS, amalgamate
+from ..tables.files import board_test_text
 
 __all__ = ["board_files", "checked_sources", "table_files"]
 

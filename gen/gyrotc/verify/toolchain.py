@@ -18,9 +18,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..errors import CheckFailed, InputError
-from ..inputs import read_toml
-from ..outputs import scratch_folder, write_own
+from ..common.errors import CheckFailed, InputError
+from ..common.inputs_texts import read_toml
+from ..store.opening import write_own
+from ..store.scratch import scratch_folder
 from .confined import ProgramRun, run_to_end
 
 __all__ = [

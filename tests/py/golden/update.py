@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from gyrotc.emit.files import emit_texts, quantise_all
 from gyrotc.model import load_model
+from gyrotc.tables.files import emit_texts, quantise_all
 
 GOLDEN = Path(__file__).resolve().parent
 EXAMPLE = GOLDEN.parents[2] / "examples" / "minimal"

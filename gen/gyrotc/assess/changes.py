@@ -1,0 +1,267 @@
+"""What a build changed against an earlier one of the same gyro: recordings, map, figures, files.
+
+A gyro that is calibrated again should give nearly the same map. Where it does not, the difference over the
+envelope is the drift of the gyro, of its thermometer or of the procedure, and belongs into the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Set
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..common.errors import InputError
+from ..model import Model, load_model
+from ..recordings.records import Dataset
+from ..results.base import read_optional
+from ..results.changes import (
+    Apart,
+    At,
+    Changes,
+    Envelopes,
+    FigureChange,
+    FileChanges,
+    NameChanges,
+    TextChange,
+)
+from ..results.evaluation import Evaluation
+from ..results.manifest import Manifest
+from .as_found import as_found, history_of
+from .limits import Limits
+
+__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "started_on"]
+
+Floats = NDArray[np.float64]
+
+_GRID = (61, 25)  # points of T and of dT/dt over the common envelope
+
+
+class Earlier:
+    """An earlier result: its model and the results beside it (None where a file is not there)."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.model = load_model(folder / "model.json")
+        self.evaluation = read_optional(folder / "evaluate.json", Evaluation)
+        self.manifest = read_optional(folder / "manifest.json", Manifest)
+        changes = read_optional(folder / "changes.json", Changes)
+        self.history = changes.history if changes else ()
+        self.date = _stated(self.model)
+
+
+def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--previous") -> Earlier:
+    """Reads an earlier result folder of a gyro, of one of its axes where it has several.
+
+    Args:
+        folder: The result.
+        serial, axis: Of the gyro.
+        option: By which it was named.
+
+    Raises:
+        InputError: There is none, it is of another gyro or axis, or a file of it cannot be read.
+    """
+    if axis is not None and not (folder / "model.json").is_file() and (folder / axis).is_dir():
+        folder = folder / axis
+    if not (folder / "model.json").is_file():
+        raise InputError(f"{option} {folder}", "has no model.json", "a folder that gyrotc build wrote")
+    earlier = Earlier(folder)
+    old = earlier.model
+    if (old.serial, old.axis) != (serial, axis):
+        raise InputError(f"{option} {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
+    return earlier
+
+
+def earlier_models(folder: Path) -> dict[str, Model]:
+    """Models of an earlier result by axis, "" where it has one rate.
+
+    Raises:
+        InputError: There is none, or one cannot be read.
+    """
+    places = [folder, *(folder / axis for axis in ("x", "y", "z"))]
+    models = [load_model(place / "model.json") for place in places if (place / "model.json").is_file()]
+    if not models:
+        raise InputError(f"--previous {folder}", "has no model.json", "a folder that gyrotc build wrote")
+    return {model.axis or "": model for model in models}
+
+
+def changes_since(
+    earlier: Earlier,
+    model: Model,
+    evaluation: Evaluation,
+    manifest: Manifest,
+    *,
+    dataset: Dataset | None = None,
+    limits: Limits | None = None,
+) -> Changes:
+    """What is different from an earlier result.
+
+    Args:
+        dataset: The new recordings, to say how the unit was found.
+        limits: Limits of the product, which hold for the state as found as well.
+    """
+    old = earlier.model
+    moved = _map(old, model, _of_means(earlier.evaluation, evaluation))
+    found, missing = (None, "not asked for")
+    if dataset is not None:
+        found, missing = as_found(earlier, dataset, limits, evaluation.average_s)
+    before, after = _ids(earlier.evaluation), _ids(evaluation)
+    return Changes(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        same_model=old.hash == model.hash,
+        model_hash=TextChange(before=old.hash, after=model.hash),
+        recordings=_recordings(old, model),
+        map=moved,
+        envelope=Envelopes.of(
+            temperature_c=(old.envelope.temperature_c, model.envelope.temperature_c),
+            slope_c_per_min=(old.envelope.slope_c_per_min, model.envelope.slope_c_per_min),
+        ),
+        figures=dict(_figures(earlier, model, evaluation)),
+        findings=NameChanges(new=_only(after, before), gone=_only(before, after)),
+        versions=dict(_versions(earlier.manifest, manifest)),
+        files=_files(earlier.manifest, manifest),
+        as_found=found,
+        as_found_missing=missing,
+        history=history_of(earlier, model, evaluation, found, moved, _stated(model) or started_on(dataset)),
+    )
+
+
+def _stated(model: Model) -> str | None:
+    date = model.meta.get("calibrated_on")
+    return None if date is None else str(date)
+
+
+def started_on(dataset: Dataset | None) -> str | None:
+    """Day of the last recording, where the recordings carry dates."""
+    days = [run.started for run in dataset.runs if run.started is not None] if dataset else []
+    return max(days).date().isoformat() if days else None
+
+
+def _name(serial: str, axis: str | None) -> str:
+    return f"gyro {serial}" + (f", axis {axis}" if axis else "")
+
+
+def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:
+    return tuple(sorted(names - others))
+
+
+def _hashes_apart(before: dict[str, str], after: dict[str, str]) -> FileChanges:
+    """Of files by name, with their hashes: which came, went, or have other bytes."""
+    other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
+    return FileChanges(
+        new=_only(after.keys(), before.keys()),
+        gone=_only(before.keys(), after.keys()),
+        other_bytes=tuple(other),
+    )
+
+
+def _recordings(old: Model, new: Model) -> FileChanges:
+    before, after = ({d.file: d.sha256 for d in m.data} for m in (old, new))
+    return _hashes_apart(before, after)
+
+
+def _of_means(*evaluations: Evaluation | None) -> float | None:
+    """Standard uncertainty of the difference of the means of what remains; None where one is not known."""
+    variance = 0.0
+    for evaluation in evaluations:
+        known = (evaluation.uncertainty or {}).get("mean_dph") if evaluation else None
+        if known is None:
+            return None
+        variance += known.standard**2
+    return float(np.sqrt(variance))
+
+
+def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
+    """How far the maps lie apart where both were calibrated, deg/h; None where nothing is common.
+
+    Args:
+        of_means: What two means differ by although nothing moved; it stands in where a map states no uncertainty.
+    """
+    limits = []
+    for name in ("temperature_c", "slope_c_per_min"):
+        (a, b), (c, d) = getattr(old.envelope, name), getattr(new.envelope, name)
+        limits.append((max(a, c), min(b, d)))
+    if any(low > high for low, high in limits):
+        return None
+    t, slope = np.meshgrid(*(np.linspace(*span, n) for span, n in zip(limits, _GRID, strict=True)))
+    apart = new.map_dph(t, slope) - old.map_dph(t, slope)
+    worst = np.unravel_index(int(np.argmax(np.abs(apart))), apart.shape)
+    floor = new.noise_floor_dph
+    rms = float(np.sqrt(np.mean(apart**2)))
+    expected = _expected_rms(old, new, t, slope)
+    expected = of_means if expected is None else expected
+    return Apart(
+        rms_dph=rms,
+        mean_dph=float(np.mean(apart)),
+        max_abs_dph=float(np.abs(apart[worst])),
+        at=At(temperature_c=float(t[worst]), slope_c_per_min=float(slope[worst])),
+        rms_over_floor=rms / floor if floor else None,
+        expanded_uncertainty_dph=None if expected is None else 2.0 * expected,
+        # Errors of a map hang together over its envelope, at most all of them: then the ratio is one normal number.
+        significant=None if expected is None else rms > 2.0 * expected,
+    )
+
+
+def _expected_rms(old: Model, new: Model, t: Floats, slope: Floats) -> float | None:
+    """RMS that the uncertainties of two maps give over points of T and dT/dt although nothing has moved."""
+    before, after = (_variance(model, t, slope) for model in (old, new))
+    if before is None or after is None:
+        return None
+    return float(np.sqrt(np.mean(before + after)))
+
+
+def _variance(model: Model, t: Floats, slope: Floats) -> Floats | None:
+    if model.uncertainty_dph is None:
+        return None
+    rows = np.array(model.uncertainty_dph.rows)
+    place = []
+    for x, span, n in (
+        (slope, model.envelope.slope_c_per_min, rows.shape[0]),
+        (t, model.envelope.temperature_c, rows.shape[1]),
+    ):
+        low, high = span
+        share = (x - low) / (high - low) if high > low else np.zeros_like(x)
+        place.append(np.clip((share * n).astype(np.int64), 0, n - 1))
+    return np.asarray(rows[place[0], place[1]] ** 2)
+
+
+def _figures(
+    earlier: Earlier, model: Model, evaluation: Evaluation
+) -> Iterator[tuple[str, FigureChange | str]]:
+    """Figures before and after; those of recordings only where both were judged on the same kind."""
+    yield "centers", FigureChange(before=earlier.model.n_centers, after=model.n_centers)
+    yield "noise_floor_dph", FigureChange(before=earlier.model.noise_floor_dph, after=model.noise_floor_dph)
+    old = earlier.evaluation.judged() if earlier.evaluation else None
+    new = evaluation.judged()
+    if old is None or new is None or old[0] != new[0]:
+        return
+    yield "judged_on", new[0]
+    before, after = old[1].after, new[1].after
+    yield "rms_dph", FigureChange(before=before.rms_dph, after=after.rms_dph)
+    yield "std_dph", FigureChange(before=before.std_dph, after=after.std_dph)
+    yield "max_abs_dph", FigureChange(before=before.max_abs_dph, after=after.max_abs_dph)
+
+
+def _ids(evaluation: Evaluation | None) -> set[str]:
+    return {finding.id for finding in evaluation.findings} if evaluation else set()
+
+
+def _versions(old: Manifest | None, new: Manifest) -> Iterator[tuple[str, TextChange]]:
+    """Programs whose version is another."""
+    before = old.versions | {"gyrotc": old.gyrotc_version} if old else {}
+    after = new.versions | {"gyrotc": new.gyrotc_version}
+    for name in sorted(before.keys() | after.keys()):
+        if before.get(name) != after.get(name):
+            yield name, TextChange(before=before.get(name), after=after.get(name))
+
+
+def _files(old: Manifest | None, new: Manifest) -> FileChanges:
+    """Emitted files."""
+    before, after = (
+        {k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new)
+    )
+    return _hashes_apart(before, after)

@@ -1,0 +1,318 @@
+"""Replay recordings through the compiled C code, compare every step with the reference, measure.
+
+Needs `DIR/model.json` and `DIR/c/` and a data set; `truth.json` beside simulated recordings gives the
+noise that was really added. Writes the trace (docs/FORMAT.md, section 4) where asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..common.errors import CheckFailed, GyrotcError
+from ..common.metrics import Averages, average, statistics, time_statistics
+from ..common.texts import file_stem
+from ..model import Model, load_model
+from ..quality.facts import RunFacts, facts_of
+from ..recordings.records import Dataset, Rows, Run
+from ..results.base import read_result
+from ..results.evaluation import (
+    EvaluatedRun,
+    Evaluation,
+    FigureUncertainty,
+    FoundIn,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+    Statistics,
+)
+from ..results.training import Training
+from ..simulate.truth import simulated_floor
+from ..store.opening import create
+from ..tables.files import emitted_tables
+from ..target.table import Table
+from ..verify.footprint import Footprint, footprint
+from ..verify.replay import history_of, replay_on, replay_program
+from ..verify.toolchain import Target, all_targets
+from .findings import findings_of
+from .uncertainty import figure_uncertainties, root_mean, squares_of
+
+__all__ = ["ReplayedRun", "Watch", "evaluate", "trace_name"]
+
+Progress = Callable[[str], None]
+Watch = Callable[[Run, Averages], None]
+_HOST = "host-gcc-O2"
+_TRACE_ROWS = 2**16  # written at once
+_TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayedRun:
+    """One run replayed, every row of the file.
+
+    Correction in force (deg/h), status bits, whether the row is judged (its block is valid, and a correction has been
+    made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None: none is stated).
+    """
+
+    bias_dph: NDArray[np.float64]
+    status: NDArray[np.int32]
+    scored: NDArray[np.bool_]
+    mismatches: int | None
+    sigma_dph: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A run, its averaged samples, the steps that differ from the reference, plain facts, squares of its 1 sigma."""
+
+    run: Run
+    averages: Averages
+    mismatches: int | None
+    facts: RunFacts
+    squares: tuple[float, int]
+
+
+def evaluate(
+    folder: Path,
+    dataset: Dataset,
+    *,
+    numeric: str | None = None,
+    average_s: float | None = None,
+    trace: Path | None = None,
+    training: Training | None = None,
+    compiled: bool = True,
+    trust_code: bool = False,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+) -> Evaluation:
+    """Evaluates `folder` (model and C) on a data set; what `evaluate.json` holds.
+
+    Args:
+        numeric: Arithmetic to run; default the first emitted one.
+        average_s: Averaging of all RMS figures; default the model's.
+        trace: Folder for one CSV per run.
+        training: What `training.json` says; default that of `folder`, where it was made from these
+            recordings. Without an exam run its figures of spans left out count.
+        compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
+        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
+        watch: Called with each run and its means.
+
+    Raises:
+        InputError: No emitted code of the model, or the data lack a channel it needs.
+        CheckFailed: The C code does not compile, or is not gyrotc's.
+    """
+    model = load_model(folder / "model.json")
+    tables = emitted_tables(folder / "c", model)
+    chosen = numeric or next(iter(tables))
+    if chosen not in tables:
+        raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
+    table = tables[chosen]
+    window = average_s or model.average_s
+    parts = []
+    compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
+    with compiling as program:
+        for k, run in enumerate(dataset.runs, 1):
+            if progress:
+                progress(f"{run.file}, {k} of {len(dataset.runs)}")
+            parts.append(
+                _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
+            )
+            if watch:
+                watch(run, parts[-1].averages)
+    sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
+    result = _result(model, dataset, table, parts, sizes, average_s=window)
+    training = training or _training_of(folder, dataset, model)
+    if result.exam is None and training:
+        result = result.model_copy(update={"left_out": training.left_out})
+    result = _with_what_is_known(result, parts, training)
+    found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
+    return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
+
+
+def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Training | None) -> Evaluation:
+    """The result with what training says of it, and with uncertainties."""
+    outliers = training.outliers if training else None
+    role = "exam" if result.exam else "train"
+    update = {
+        "generalises": training.generalises if training else None,
+        "rows_left_out": outliers.rows if outliers else None,
+        "uncertainty": _uncertainties(result, parts),
+        "sigma_rms_dph": root_mean(p.squares for p in parts if p.run.role == role),
+    }
+    return result.model_copy(update=update)
+
+
+def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, FigureUncertainty] | None:
+    """Of the figures that the model is judged by; where spans were left out, from the scatter of training runs."""
+    role = "exam" if result.exam else "train"
+    own = [(p.averages, run) for p, run in zip(parts, result.runs, strict=True) if run.role == role]
+    scale = 1.0
+    if result.exam is None and result.left_out and result.train:
+        left_out, train = result.left_out.after.rms_dph, result.train.after.rms_dph
+        scale = left_out / train if left_out and train else 1.0
+    floor = None
+    if result.noise_floor_dph:
+        samples = max(result.train.samples, 1) if result.train else 1
+        floor = (result.noise_floor_dph, None if result.noise_floor_source == "simulated" else samples)
+    found = figure_uncertainties(
+        [a for a, _ in own], [run for _, run in own], result.average_s, scale=scale, floor=floor
+    )
+    return found or None
+
+
+def _training_of(folder: Path, dataset: Dataset, model: Model) -> Training | None:
+    """What `fit` wrote into the folder, where these are the recordings that it was made from."""
+    known = {(d.file, d.sha256) for d in model.data}
+    path = folder / "training.json"
+    if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
+        return None
+    return read_result(path, Training)
+
+
+@contextmanager
+def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> Iterator[tuple[Target, Path]]:
+    """The replay program of a table, compiled for the host."""
+    target = all_targets()[_HOST]
+    if target.missing():
+        raise GyrotcError(f"no C compiler: install {target.package}")
+    with replay_program(c_folder, model, table, target, trusted=trusted) as program:
+        yield target, program
+
+
+def replay_run(
+    rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
+) -> ReplayedRun:
+    """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
+    history = history_of(rows, run, model, table)
+    known = history.reference
+    scored = known.block_valid & known.begun
+    sigma = None if known.sigma is None else table.decode_bias(known.sigma)
+    if program is None:
+        return ReplayedRun(table.decode_bias(known.bits), known.status, scored, None, sigma)
+    try:
+        replayed = replay_on(*program, history)
+    except CheckFailed as error:
+        raise CheckFailed(f"{run.file}: {error}") from error
+    return ReplayedRun(
+        bias_dph=table.decode_bias(replayed.bits),
+        status=replayed.status,
+        scored=scored,
+        mismatches=replayed.mismatches,
+        sigma_dph=sigma,
+    )
+
+
+def _one_run(
+    run: Run,
+    model: Model,
+    table: Table,
+    program: tuple[Target, Path] | None,
+    *,
+    average_s: float,
+    trace: Path | None,
+    all_runs: Sequence[Run],
+) -> _Part:
+    rows = run.rows()
+    replayed = replay_run(rows, run, model, table, program)
+    inside = run.in_span(rows.time_s)
+    span = slice(None) if inside.all() else inside  # no copies of a whole file
+    averages = average(
+        rows.time_s[span],
+        rows.temperature_c[span],
+        rows.rate_dph[span],
+        (rows.rate_dph - replayed.bias_dph)[span],
+        scored=replayed.scored[span],
+        average_s=average_s,
+    )
+    if trace is not None:
+        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span)
+    plain = (replayed.status[span] == 0) & replayed.scored[span]
+    squares = squares_of(None if replayed.sigma_dph is None else replayed.sigma_dph[span][plain])
+    return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares)
+
+
+def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
+    """Name of a run's trace: the file's stem, its start where runs share a file, its folders where stems collide."""
+    stem = Path(run.file).stem
+    if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
+        stem = run.file.replace("/", "_")
+    shared = sum(r.file == run.file for r in all_runs) > 1
+    return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
+
+
+def _write_trace(path: Path, rows: Rows, replayed: ReplayedRun, span: slice | NDArray[np.bool_]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    time, temperature = rows.time_s[span], rows.temperature_c[span]
+    rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]
+    options = pacsv.WriteOptions(include_header=False, quoting_style="none")
+    part = path.with_name(f".{path.name}.part")
+    with create(part) as stream:
+        stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
+        for start in range(0, time.size, _TRACE_ROWS):
+            k = slice(start, start + _TRACE_ROWS)
+            columns = (time[k], temperature[k], rate[k], bias[k], rate[k] - bias[k], status[k])
+            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True))), stream, options)
+    part.replace(path)
+
+
+def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
+    run, a = part.run, part.averages
+    entry = EvaluatedRun(
+        file=run.file,
+        role=run.role,
+        environment=run.environment,
+        samples=int(a.after_dph.size),
+        before=Statistics(**statistics(a.before_dph)),
+        after=RunStatistics(**statistics(a.after_dph), **time_statistics(a, average_s)),
+    )
+    if run.from_s is None and run.to_s is None:
+        return entry
+    return entry.model_copy(update={"from_s": run.from_s, "to_s": run.to_s})
+
+
+def _result(  # long: one line for each field of the result
+    model: Model,
+    dataset: Dataset,
+    table: Table,
+    parts: list[_Part],
+    sizes: Footprint | None,
+    *,
+    average_s: float,
+) -> Evaluation:
+    exam = [p.averages for p in parts if p.run.role == "exam"]
+    train = [p.averages for p in parts if p.run.role == "train"]
+    floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
+    source = "simulated" if floor is not None else model.noise_floor_source
+    compared = [p.mismatches for p in parts if p.mismatches is not None]
+    return Evaluation(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        numeric=table.numeric,
+        block_s=model.block_s,
+        average_s=average_s,
+        noise_floor_dph=floor if floor is not None else model.noise_floor_dph,
+        noise_floor_source=source,
+        mismatches=sum(compared) if len(compared) == len(parts) else None,
+        runs=tuple(_evaluated(p, average_s) for p in parts),
+        train=Pooled.of(train) if train else None,
+        exam=Pooled.of(exam) if exam else None,
+        findings=(),
+        model=ModelSizes(
+            method=model.method,
+            centers=model.n_centers,
+            table_bytes=table.table_bytes,
+            rom_bytes=sizes.rom_bytes if sizes else None,
+            ram_bytes=sizes.ram_bytes if sizes else None,
+            sizes_on=sizes.target if sizes else None,
+            sum_abs_weights_dph=model.sum_abs_weights_dph,
+        ),
+    )

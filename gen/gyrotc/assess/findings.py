@@ -1,0 +1,181 @@
+"""What a user should know about a model and the data behind it, computed from the data.
+
+A finding has an id that stays stable, a text, and the numbers behind it. Findings never stop a job. They follow
+from figures alone: no name of a file, folder or serial plays a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..common.metrics import MAD_TO_SIGMA
+from ..model import Model
+from ..quality.data_findings import (
+    Finding,
+    contradiction_findings,
+    counter_findings,
+    earth_rate_findings,
+    finding,
+    jump_findings,
+    outlier_findings,
+    temperature_findings,
+)
+from ..quality.facts import RunFacts
+from ..quality.recorded import shared_rows_findings, sign_findings
+from ..quality.thermometers import thermometer_findings
+from ..recordings.records import Dataset
+from ..results.training import Training
+
+__all__ = ["findings_of"]
+
+_UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
+_UNSEEN_TO_FLOOR = 3.0  # below it most of what is left is noise, whatever training left
+_WEIGHTS_TO_RANGE = 10.0  # times the swing: a digit of the correction is then lost to cancelling
+_LEAST_COVERAGE = 0.25  # below it three quarters of the envelope are interpolation
+_OUTLIER_SIGMAS = 6.0  # once in 5e8 normal runs
+_OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not told
+_LEAST_RUNS = 4  # fewer runs do not say what a usual run is
+_OF_TRAINING = (
+    "does_not_generalise",
+    "map_refused",
+    "map_beyond_data",
+    "not_of_its_lot",
+    "prior_does_not_hold",
+)
+_POLYNOMIALS = ("cubic", "cubic_slope")
+
+
+def findings_of(
+    dataset: Dataset,
+    facts: Sequence[RunFacts],
+    model: Model,
+    result: Mapping[str, Any],
+    training: Training | None = None,
+) -> list[Finding]:
+    """All findings, the gravest first.
+
+    Args:
+        facts: What was seen in each run that was evaluated.
+        model: The model that was evaluated.
+        result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
+        training: What `training.json` says, for figures of spans left out of training.
+    """
+    found = [*temperature_findings(facts)]
+    if not found:
+        found += _of_training(training)
+        found += _unseen(result, training)
+        found += _coverage(model)
+    found += jump_findings(facts)
+    found += counter_findings(facts)
+    found += outlier_findings(facts)
+    found += contradiction_findings(facts)
+    found += shared_rows_findings(dataset)
+    found += sign_findings(facts)
+    found += thermometer_findings(dataset)
+    found += earth_rate_findings(dataset, facts)
+    found += _weights(model)
+    found += _outliers(result)
+    return found
+
+
+def _of_training(training: Training | None) -> Iterator[Finding]:
+    """What the choice of the correction found; `fit` wrote it."""
+    for said in training.findings if training else ():
+        if said.id in _OF_TRAINING:
+            yield said.content()
+
+
+def _unseen(result: Mapping[str, Any], training: Training | None) -> Iterator[Finding]:
+    """The residual on runs or spans that were not trained on, against that of training and the noise."""
+    seen, floor = _rms(result.get("train")), result.get("noise_floor_dph")
+    left_out = training.left_out if training else None
+    unseen = (
+        ("exam runs", _rms(result.get("exam"))),
+        ("spans left out in turn", left_out.after.rms_dph if left_out else None),
+    )
+    for name, rms in unseen:
+        if rms is None or seen is None or rms <= _UNSEEN_TO_SEEN * seen:
+            continue
+        if floor is None or rms > _UNSEEN_TO_FLOOR * floor:
+            yield finding(
+                "fails_on_unseen_span",
+                f"A static map of temperature and its rate fails on what it has not seen: RMS {rms:.4g} deg/h on "
+                f"{name}, {seen:.4g} deg/h in training. Record more cycles, or see `gyrotc diagnose`.",
+                unseen=name,
+                unseen_rms_dph=rms,
+                train_rms_dph=seen,
+                noise_floor_dph=floor,
+                spans=[span.after.rms_dph for span in training.left_out_spans] if training else [],
+            )
+            return
+
+
+def _rms(pooled: Mapping[str, Any] | None) -> float | None:
+    return pooled["after"]["rms_dph"] if pooled else None
+
+
+def _coverage(model: Model) -> Iterator[Finding]:
+    """Share of the envelope in which there was data."""
+    if model.coverage is None:
+        return
+    cells = "".join(model.coverage.rows)
+    share = cells.count("1") / len(cells)
+    if share < _LEAST_COVERAGE:
+        yield finding(
+            "sparse_coverage",
+            f"Training data lie in {share:.0%} of the envelope of temperature and its rate; between them the map "
+            "is interpolation. Record ramps at further rates.",
+            share=share,
+            required=_LEAST_COVERAGE,
+            envelope=model.envelope.model_dump(),
+        )
+
+
+def _weights(model: Model) -> Iterator[Finding]:
+    """Weights that cancel one another are a lever for rounding and for every input out of the ordinary.
+
+    Those of a polynomial written as wide Gaussians cancel as they must; it ends at the edge of the envelope.
+    """
+    if model.method in _POLYNOMIALS:
+        return
+    swing = float(np.ptp(model.map_dph(*model.trained_inputs())))
+    total = model.sum_abs_weights_dph
+    if swing > 0.0 and total > _WEIGHTS_TO_RANGE * swing:
+        yield finding(
+            "large_weights",
+            f"The weights add up to {total:.4g} deg/h for a correction that swings by {swing:.4g} deg/h: they cancel "
+            "one another, and outside the training data the correction can be anything.",
+            sum_abs_weights_dph=total,
+            swing_dph=swing,
+        )
+
+
+def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:
+    """Runs whose mean residual, or whose scatter, is not that of the others."""
+    runs = [run for run in result["runs"] if run["after"]["rms_dph"] is not None]
+    if len(runs) < _LEAST_RUNS:
+        return
+    mean = np.array([run["after"]["mean_dph"] for run in runs])
+    scatter = np.array([run["after"]["std_dph"] for run in runs])
+    samples = np.array([run["samples"] for run in runs])
+    floor = result.get("noise_floor_dph") or float(np.median(scatter))
+    departure = np.abs(mean - np.median(mean))
+    usual = np.maximum(MAD_TO_SIGMA * np.median(departure), floor / np.sqrt(samples))
+    off = (departure > _OUTLIER_SIGMAS * usual) & (departure > floor)
+    loud = scatter > _OUTLIER_SCATTER * np.maximum(np.median(scatter), floor)
+    for k in np.flatnonzero(off | loud):
+        what = f"mean {mean[k]:.4g} deg/h" if off[k] else f"standard deviation {scatter[k]:.4g} deg/h"
+        usually = f"{np.median(mean):.4g}" if off[k] else f"{np.median(scatter):.4g}"
+        yield finding(
+            "run_outlier",
+            f"{runs[k]['file']} differs from the other runs after compensation: {what}, usually {usually}.",
+            file=runs[k]["file"],
+            from_s=runs[k].get("from_s"),
+            mean_dph=float(mean[k]),
+            std_dph=float(scatter[k]),
+            median_mean_dph=float(np.median(mean)),
+            median_std_dph=float(np.median(scatter)),
+        )

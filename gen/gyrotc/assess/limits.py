@@ -1,0 +1,274 @@
+"""Limits of a product: what a built table must keep to, from a TOML file, held against what was measured.
+
+Where `evaluate` and `verify` say what is, this says whether it is enough. A figure that was not measured does not
+keep a limit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from .. import __version__
+from ..common.errors import InputError
+from ..common.inputs_texts import parse_toml
+from ..common.opening import read_input
+from ..model import Model
+from ..results.evaluation import Evaluation
+from ..results.limits import DecisionRule, HeldLimits, Limit, Value, Verdict
+from ..results.verification import Verification
+from ..verify.toolchain import all_targets
+from .conformity import decided, worst_of
+from .instruments import StatedInstrument
+from .product_guards import ProductGuard
+
+__all__ = ["Limits", "held_against", "load_limits"]
+
+Finding = Literal[
+    "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
+    "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
+    "does_not_generalise", "map_refused", "map_beyond_data",
+    "not_of_its_lot", "prior_does_not_hold",
+    "shared_rows", "sign_reversed",
+]  # fmt: skip
+Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
+
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError("the lower end comes first")
+    return pair
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
+CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Temperatures = Annotated[tuple[Celsius, Celsius], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
+Slopes = Annotated[tuple[CelsiusPerMin, CelsiusPerMin], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
+
+
+class _Part(BaseModel):
+    # Strict: `true` is no number and "1" none either.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class AtMost(_Part):
+    """Upper limits. RMS and the like of compensated means, on exam runs, else on spans left out, else in training."""
+
+    rms_dph: Amount = None
+    std_dph: Amount = None
+    mean_dph: Amount = None  # of its absolute value
+    max_abs_dph: Amount = None
+    rms_over_floor: Amount = None
+    rms_30min_dph: Amount = None  # of the worst run
+    angle_1h_arcsec: Amount = None  # of the worst run
+    first_10min_rms_dph: Amount = None  # of the worst run
+    uncertainty_dph: Amount = None  # largest 1 sigma over the envelope
+    error_bound_dph: Amount = None
+    centers: Amount = None
+    table_bytes: Amount = None
+    rom_bytes: Amount = None
+    ram_bytes: Amount = None
+    rows_left_out: Amount = None  # rows of training that were spikes or bursts
+
+
+class AtLeast(_Part):
+    """Lower limits."""
+
+    improvement: Amount = None
+    covered: Annotated[float, Field(ge=0.0, le=1.0)] | None = None  # share of the envelope with training data
+
+
+class Covers(_Part):
+    """Ranges that the envelope of the model must contain."""
+
+    temperature_c: Temperatures | None = None
+    slope_c_per_min: Slopes | None = None
+
+
+class Required(_Part):
+    """What must be there, and what must not."""
+
+    arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
+    targets: Annotated[
+        tuple[str, ...], BeforeValidator(_as_tuple)
+    ] = ()  # bit for bit, in all their arithmetics
+    no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
+    generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
+
+
+class Recalibration(_Part):
+    """How long a calibration is meant to hold, and what the bias of the type does in that time."""
+
+    days: Annotated[float, Field(gt=0.0, le=36525.0)]
+    drift_dph_per_year: Amount = None  # the most that units of the type do
+
+
+class Limits(_Part):
+    """The content of a limits file."""
+
+    schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
+    product: str = ""
+    decision_rule: DecisionRule = "guard_band"
+    at_most: AtMost = AtMost()
+    at_least: AtLeast = AtLeast()
+    covers: Covers = Covers()
+    needs: Required = Required()
+    interval: Recalibration | None = None
+    instrument: Annotated[tuple[StatedInstrument, ...], BeforeValidator(_as_tuple)] = ()
+    guards: dict[str, ProductGuard] = {}  # by channel: what the runtime believes of it
+    sha256: str = ""  # of the file ...
+    file: str = ""  # ... and its name
+
+
+def load_limits(path: Path) -> Limits:
+    """Reads and checks a limits file.
+
+    Raises:
+        InputError: It cannot be read, is no TOML, or a field is wrong or not known.
+    """
+    data = read_input(path, "text_mib", "a limits file")
+    content = parse_toml(data, str(path), "a limits file")
+    own = {"sha256": hashlib.sha256(data).hexdigest(), "file": str(path)}
+    for name in own:
+        if name in content:
+            raise InputError(f"{path}, field {name}", "is not known", "a field named in docs/limits.md")
+    try:
+        limits = Limits.model_validate(content | own)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
+        if detail["type"] == "extra_forbidden":
+            raise InputError(where, "is not known", "a field named in docs/limits.md") from error
+        if detail["type"] == "missing":
+            raise InputError(where, "is missing", "schema = 1") from error
+        expected = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        raise InputError(where, repr(detail["input"])[:80], expected) from error
+    known = all_targets()
+    for name in limits.needs.targets:
+        if name not in known:
+            raise InputError(f"{path}, field needs.targets", repr(name), ", ".join(known))
+    return limits
+
+
+def held_against(
+    limits: Limits, model: Model, evaluation: Evaluation, verification: Verification | None
+) -> HeldLimits:
+    """Every limit with what was measured, and whether all are met."""
+    checks = (
+        *_amounts(limits, _measured(model, evaluation, verification), evaluation),
+        *_ranges(limits.covers, model),
+        *_needs(limits.needs, evaluation, verification),
+    )
+    return HeldLimits(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        product=limits.product,
+        sha256=limits.sha256,
+        met=bool(checks) and all(check.met for check in checks),
+        limits=checks,
+        verdict=worst_of(check.verdict for check in checks),
+        decision_rule=limits.decision_rule,
+    )
+
+
+def _measured(model: Model, evaluation: Evaluation, verification: Verification | None) -> dict[str, Any]:
+    """Figures by the names of limits; None: not measured."""
+    found = evaluation.judged()
+    judged = found[1] if found else None
+    role = "exam" if evaluation.exam else "train"
+    runs = [run.after for run in evaluation.runs if run.role == role]
+    after = judged.after if judged else None
+    floor, rms = evaluation.noise_floor_dph, after.rms_dph if after else None
+    cells = "".join(model.coverage.rows) if model.coverage else ""
+    sigma = model.uncertainty_dph
+
+    def worst(values: Iterable[float | None]) -> float | None:
+        return max((value for value in values if value is not None), default=None)
+
+    return {
+        "rms_dph": rms,
+        "std_dph": after.std_dph if after else None,
+        "max_abs_dph": after.max_abs_dph if after else None,
+        "mean_dph": abs(after.mean_dph) if after and after.mean_dph is not None else None,
+        "rms_over_floor": rms / floor if floor and rms is not None else None,
+        "rms_30min_dph": worst(run.rms_30min_dph for run in runs),
+        "angle_1h_arcsec": worst(run.angle_1h_arcsec for run in runs),
+        "first_10min_rms_dph": worst(run.first_10min_rms_dph for run in runs),
+        "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
+        "error_bound_dph": verification.error_bound_dph if verification else None,
+        "centers": evaluation.model.centers,
+        "table_bytes": evaluation.model.table_bytes,
+        "rom_bytes": evaluation.model.rom_bytes,
+        "ram_bytes": evaluation.model.ram_bytes,
+        "rows_left_out": evaluation.rows_left_out,
+        "improvement": judged.improvement if judged else None,
+        "covered": cells.count("1") / len(cells) if cells else None,
+    }
+
+
+_NOT_RANDOM = {
+    "uncertainty_dph": "is itself a standard uncertainty",
+    "error_bound_dph": "proven for every input",
+    "covered": "counted",
+    "centers": "counted",
+    "table_bytes": "counted",
+    "rom_bytes": "counted",
+    "ram_bytes": "counted",
+    "rows_left_out": "counted",
+}
+"""Figures that no noise of a recording moves."""
+
+
+def _limit(name: str, measured: Value, bound: Value, met: bool, why: str) -> Limit:
+    """A limit of something that is so or not."""
+    verdict: Verdict = "PASS" if met else "FAIL"
+    return Limit(limit=name, measured=measured, bound=bound, met=met, verdict=verdict, uncertainty_from=why)
+
+
+def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -> Iterator[Limit]:
+    known = evaluation.uncertainty or {}
+    for part, sign in (("at_most", 1.0), ("at_least", -1.0)):
+        for name, bound in getattr(limits, part).model_dump(exclude_none=True).items():
+            yield decided(
+                f"{part}.{name}",
+                measured[name],
+                bound,
+                sign,
+                limits.decision_rule,
+                _NOT_RANDOM.get(name) or known.get(name),
+            )
+
+
+def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
+    for name, (low, high) in covers.model_dump(exclude_none=True).items():
+        has = getattr(model.envelope, name)
+        yield _limit(
+            f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1], "range of the recordings"
+        )
+
+
+def _needs(needs: Required, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
+    entries = verification.targets if verification else ()
+    bounds = [error.numeric for error in verification.errors] if verification else []
+    for numeric in needs.arithmetics:
+        yield _limit("needs.arithmetics", tuple(sorted(bounds)), numeric, numeric in bounds, "compared")
+    for target in needs.targets:
+        status = tuple(sorted({entry.status for entry in entries if entry.name == target}))
+        yield _limit("needs.targets", status, target, status == ("pass",), "compared")
+    if needs.generalises:
+        yield _limit(
+            "needs.generalises", evaluation.generalises, True, evaluation.generalises is True, "yes or no"
+        )
+    found = tuple(finding.id for finding in evaluation.findings)
+    for name in needs.no_findings:
+        there = found if name == "any" else tuple(f for f in found if f == name)
+        yield _limit("needs.no_findings", there, name, not there, "yes or no")

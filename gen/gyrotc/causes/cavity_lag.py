@@ -1,0 +1,59 @@
+"""The cavity lags the temperature sensor: the bias acts on a filtered temperature.
+
+tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
+"""
+
+from __future__ import annotations
+
+from ..target.operators import first_order
+from ..target.recursion import TableKind
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .memory import RATES, lagged
+from .search import SearchRule, geometric
+from .tabled import Tabled, blocks_per_tau, memory_gain
+from .words import Wording
+
+__all__ = ["CAUSE"]
+
+
+def _cavity(scene: Scene, values: Values) -> Array:
+    return first_order(values["tau_s"], scene.time_s, scene.cavity_c)
+
+
+def _features(history: History, values: Values) -> Features:
+    return lagged(history, values["tau_s"])[1]
+
+
+_TAU = Parameter("tau_s", "s", 60.0, 4000.0)
+
+
+def _record(values: Values, block_s: float) -> list[float]:
+    return [memory_gain(block_s, values["tau_s"]), 0.0, blocks_per_tau(block_s, values["tau_s"])]
+
+
+CAUSE = Cause(
+    id="cavity_lag",
+    family="thermal_memory",
+    rank=10,
+    kind="input",
+    equation="tau dz/dt = T - z; bias = f(z, dz/dt)",
+    source="first-order heat conduction from the sensor into the cavity; glass ceramics conduct poorly",
+    parameters=(_TAU,),
+    words=Wording(
+        name="The cavity lags the temperature sensor",
+        short="lag",
+        signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
+        remedy="one first-order state: the map sees the cavity's temperature",
+        experiment=RATES,
+    ),
+    search=SearchRule(
+        price=2,
+        grid=geometric(_TAU, 22),
+        over=_TAU.name,
+        imitates=True,
+        shown=(300.0, 900.0),
+    ),
+    table=Tabled(TableKind.MEMORY, _record),
+    cavity=_cavity,
+    features=_features,
+)

@@ -1,0 +1,56 @@
+"""Earth rate through thermal twist of the fixture: an east axis turns out of east with temperature.
+
+An east axis that is twisted by psi about the vertical and tilted by theta towards north sees
+Omega (cos(lat) psi + sin(lat) theta): 5e-5 deg/h for each arcsec at 45 degrees. On one axis it cannot be told
+from the static map, which holds it; it is a simulation of the bench, with nothing to fit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..target.operators import first_order
+from .base import Array, Cause, Parameter, Scene, Values
+from .words import Telling, Wording
+
+__all__ = ["CAUSE", "EARTH_RATE_DPH"]
+
+EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
+_REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    fixture_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
+    latitude = math.radians(values["latitude_deg"])
+    arcsec_per_c = (
+        math.cos(latitude) * values["twist_arcsec_per_c"] + math.sin(latitude) * values["tilt_arcsec_per_c"]
+    )
+    angle = math.radians(arcsec_per_c / 3600.0) * (fixture_c - _REFERENCE_C)
+    return np.asarray(EARTH_RATE_DPH * angle)
+
+
+CAUSE = Cause(
+    id="earth_rate_tilt",
+    family="bench",
+    rank=120,
+    kind="static",
+    equation="bias += Omega (cos(lat) twist + sin(lat) tilt) (T_fixture - 20 C)",
+    source="Earth rate 15.041 deg/h seen by a misaligned east axis",
+    parameters=(
+        Parameter("latitude_deg", "deg", -90.0, 90.0, logarithmic=False, default=45.0),
+        Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
+        Parameter("twist_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
+        Parameter("tilt_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
+    ),
+    words=Wording(
+        name="The fixture turns the axis through Earth rate",
+        short="tilt",
+        signature="none on one axis: the static map holds it",
+        remedy="a stiffer fixture, or Earth rate computed from its measured angles",
+        experiment="the same profile with the gyro turned by 180 degrees on its fixture",
+        telling=Telling.STATIC,
+    ),
+    bias=_bias,
+)

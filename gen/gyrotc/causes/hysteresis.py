@@ -1,0 +1,81 @@
+"""Rate-independent hysteresis: a play operator, as mounts, glue joints and mirror contacts show.
+
+    z = max(T − w, min(T + w, z)),    bias += a (z − T)
+
+Source: the play of Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..target.operators import play
+from ..target.recursion import TableKind
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .search import SearchRule, SingleCycle, geometric
+from .tabled import Tabled
+from .words import Telling, Wording
+
+__all__ = ["CAUSE"]
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    z = play(values["width_c"], scene.cavity_c)
+    return np.asarray(values["amplitude_dph_per_c"] * (z - scene.cavity_c))
+
+
+def _features(history: History, values: Values) -> Features:
+    """z starts at T; known from the first excursion over the whole width 2w on."""
+    temperature = history.temperature_c
+    z = play(values["width_c"], temperature)
+    span = np.maximum.accumulate(temperature) - np.minimum.accumulate(temperature)
+    return Features((z - temperature)[:, None], span >= 2.0 * values["width_c"])
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"amplitude_dph_per_c": float(weights[0])}
+
+
+_WIDTH = Parameter("width_c", "C", 0.5, 40.0)
+_BOTH_SIDES = "the same hold temperature reached from both sides, at two rates, and nested shrinking loops"
+
+
+def _record(values: Values, block_s: float) -> list[float]:
+    return [values["width_c"], values["amplitude_dph_per_c"]]
+
+
+CAUSE = Cause(
+    id="hysteresis",
+    family="hysteresis",
+    rank=40,
+    kind="add",
+    equation="z = max(T - w, min(T + w, z)); bias += amplitude (z - T)",
+    source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
+    parameters=(
+        _WIDTH,
+        Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
+    ),
+    words=Wording(
+        name="The bias remembers the direction of the last temperature change",
+        short="hyster.",
+        signature="loops over T whose width does not depend on the rate; "
+        "holds differ by the side they were reached from",
+        remedy="one play operator, saved over power cycles",
+        experiment=_BOTH_SIDES,
+        telling=Telling.DIRECTION,
+        beside={"turn_on_offset": _BOTH_SIDES + ", all within one power-on"},
+    ),
+    search=SearchRule(
+        price=2,
+        grid=geometric(_WIDTH, 20),
+        over=_WIDTH.name,
+        imitates=True,
+        loops=True,
+        shown=(4.0, 12.0),
+        cycle=SingleCycle(points=24, usual=False),
+    ),
+    table=Tabled(TableKind.PLAY, _record),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)

@@ -1,0 +1,38 @@
+"""The sensor lags the cavity: a negative control.
+
+If tau dT_s/dt = T − T_s then T = T_s + tau dT_s/dt exactly, so f(T) is again a static function of (T_s,
+dT_s/dt):
+a static map absorbs it and nothing in its residual can show it. There is nothing to fit and no reference.
+"""
+
+from __future__ import annotations
+
+from ..target.operators import first_order
+from .base import Array, Cause, Parameter, Scene, Values
+from .memory import RATES
+from .words import Wording
+
+__all__ = ["CAUSE"]
+
+
+def _record(scene: Scene, values: Values) -> Array:
+    return first_order(values["tau_s"], scene.time_s, scene.sensed_c)
+
+
+CAUSE = Cause(
+    id="sensor_lag",
+    family="control",
+    rank=110,
+    kind="record",
+    equation="tau dT_s/dt = T - T_s; f(T) = f(T_s + tau dT_s/dt)",
+    source="identity; a static map of (T_s, dT_s/dt) absorbs it",
+    parameters=(Parameter("tau_s", "s", 10.0, 1000.0),),
+    words=Wording(
+        name="The temperature sensor lags the cavity",
+        short="sensor",
+        signature="none: a static map absorbs it",
+        remedy="none is needed",
+        experiment=RATES,
+    ),
+    record=_record,
+)

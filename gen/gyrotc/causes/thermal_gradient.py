@@ -1,0 +1,86 @@
+"""A second thermal node: the bias follows its temperature difference to the sensor (gas flow, alignment).
+
+    tau dz/dt = T − z,    bias += a (z − T)
+
+Source: in the two arms of the discharge Langmuir flow drags the light and cancels only while both are alike; a
+temperature difference unbalances them (Podgorski and Aronowitz, "Langmuir flow effects in the laser gyro", IEEE
+J. Quantum Electronics 4, 1968).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..target.operators import first_order
+from ..target.recursion import TableKind
+from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .memory import RATES, lagged
+from .search import SearchRule, SingleCycle, geometric
+from .tabled import Tabled, half_block_before, memory_gain
+from .words import Wording
+
+__all__ = ["CAUSE"]
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    second_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
+    return np.asarray(values["amplitude_dph_per_c"] * (second_c - scene.node_c))
+
+
+def _features(history: History, values: Values) -> Features:
+    z, memory = lagged(history, values["tau_s"])
+    return Features((z - history.temperature_c)[:, None], memory.known)
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"amplitude_dph_per_c": float(weights[0])}
+
+
+_TAU = Parameter("tau_s", "s", 60.0, 8000.0)
+
+
+def _record(values: Values, block_s: float) -> list[float]:
+    tau_s = values["tau_s"]
+    return [
+        memory_gain(block_s, tau_s),
+        values["amplitude_dph_per_c"] * half_block_before(block_s, tau_s),
+        0.0,
+    ]
+
+
+CAUSE = Cause(
+    id="thermal_gradient",
+    family="thermal_memory",
+    rank=20,
+    kind="add",
+    equation="tau dz/dt = T - z; bias += amplitude (z - T)",
+    source="Langmuir flow and alignment follow temperature differences in the block "
+    "(Podgorski and Aronowitz 1968, Aronowitz and Lim 1979)",
+    parameters=(
+        _TAU,
+        Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True),
+    ),
+    words=Wording(
+        name="The bias follows a temperature difference inside the gyro",
+        short="gradient",
+        signature="residual follows the ramp with the same size at every temperature and fades in holds",
+        remedy="one first-order state and a linear term",
+        experiment=RATES,
+        advice="A fixture that tilts with a temperature of its own shows the same through Earth's rate (5e-5 deg/h for "
+        "each arcsec at 45 degrees): repeat a run with the gyro turned by 180 degrees; what then changes its sign is "
+        "the fixture's.",
+    ),
+    search=SearchRule(
+        price=2,
+        grid=geometric(_TAU, 24),
+        over=_TAU.name,
+        twice=True,
+        imitates=True,
+        shown=(300.0, 1500.0),
+        cycle=SingleCycle(points=48, usual=True),
+    ),
+    table=Tabled(TableKind.MEMORY, _record),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)

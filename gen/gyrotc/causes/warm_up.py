@@ -1,0 +1,76 @@
+"""Warm-up: fades with the time since power-on whatever T does (discharge, electrodes, electronics).
+
+bias += A exp(−t_on/tau)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..target.recursion import TableKind
+from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .memory import COLD_STARTS
+from .search import SearchRule, geometric
+from .tabled import Tabled, half_block_before, octaves_per_block
+from .words import Telling, Wording
+
+__all__ = ["CAUSE"]
+
+
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+    return np.asarray(values["amplitude_dph"] * _fading(scene.on_s, values["tau_s"]))
+
+
+def _fading(on_s: Array, tau_s: float) -> Array:
+    return np.where(on_s >= 0.0, np.exp(-np.maximum(on_s, 0.0) / tau_s), 0.0)
+
+
+def _features(history: History, values: Values) -> Features:
+    """Nothing is known where the time of power-on is not."""
+    if history.on_s is None:
+        none = np.zeros(len(history.time_s))
+        return Features(none[:, None], none.astype(bool))
+    return Features(_fading(history.on_s, values["tau_s"])[:, None], history.on_s >= 0.0)
+
+
+def _amplitudes(weights: Array) -> dict[str, float]:
+    return {"amplitude_dph": float(weights[0])}
+
+
+_TAU = Parameter("tau_s", "s", 200.0, 8000.0)
+
+
+def _record(values: Values, block_s: float) -> list[float]:
+    tau_s = values["tau_s"]
+    middle = 1.0 / half_block_before(block_s, tau_s)  # the target counts to the start of a block
+    return [octaves_per_block(block_s, tau_s), values["amplitude_dph"] * middle]
+
+
+CAUSE = Cause(
+    id="warm_up",
+    family="power_on",
+    rank=50,
+    kind="add",
+    equation="bias += amplitude exp(-t_on/tau)",
+    source="start-up drift: discharge, clean-up of the gas at the electrodes, dither, electronics",
+    parameters=(
+        _TAU,
+        Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True),
+    ),
+    words=Wording(
+        name="The bias settles after power-on whatever the temperature is",
+        short="warm-up",
+        signature="residuals of all runs agree over the time since power-on",
+        remedy="one exponential of the time since power-on",
+        experiment="cold starts at two constant chamber temperatures, and a hot restart",
+        telling=Telling.COLD_START,
+        beside={"thermal_gradient": COLD_STARTS, "cavity_lag": COLD_STARTS},
+        recording="note the time of power-on of every run (power_on_s)",
+    ),
+    search=SearchRule(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True, shown=(1800.0,)),
+    table=Tabled(TableKind.WARM_UP, _record),
+    needs=Needs(power_on=True),
+    bias=_bias,
+    features=_features,
+    amplitudes=_amplitudes,
+)

@@ -1,0 +1,278 @@
+"""What every command shares: the application, its options, progress on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from .. import __version__
+from ..common.ceilings import CEILINGS, set_ceilings
+from ..common.texts import terminal_line, terminal_text
+from ..store.files import check_replaceable
+from ..store.folder import write_result
+from ..store.jsontext import json_text
+from .stages import StageLine, Stages
+
+if TYPE_CHECKING:
+    from ..lot.use import LotPrior
+    from ..recordings.records import Applied
+
+app = typer.Typer(
+    name="gyrotc",
+    help="From thermal-chamber recordings of a gyro to verified C tables that compensate its bias.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+class _Loudness:
+    """How much is told, for this process."""
+
+    quiet = False
+    verbose = False
+
+
+class _Console(Console):
+    """Shows text of users as it is: no markup of rich, no names of emoji, nothing that a terminal would obey."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(terminal_text(text), **options | {"markup": False, "emoji": False})
+
+
+_TO_COPY = re.compile(r"\w+ = \[\{.*?\}\]|\S+")
+
+OUT = _Console(width=None if sys.stdout.isatty() else 120)
+ERR = _Console(stderr=True)
+
+DatasetArg = Annotated[Path, typer.Argument(help="Folder of recordings, with or without dataset.toml.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the result.")]
+
+
+def written_place(path: Path | None) -> Path | None:
+    """Checks, before the work begins, that gyrotc wrote what stands in the place of the result."""
+    if path is not None:
+        check_replaceable(path)
+    return path
+
+
+JsonOption = Annotated[
+    Path | None,
+    typer.Option("--json", callback=written_place, help="Write the machine-readable result here."),
+]
+AxisOption = Annotated[
+    str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
+]
+AverageOption = Annotated[
+    float,
+    typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
+]
+ChannelsOption = Annotated[
+    bool,
+    typer.Option(
+        "--channels", help="Let recorded channels be inputs, those that hold on unseen history alone."
+    ),
+]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ...",
+    ),
+]
+SeedOption = Annotated[
+    int,
+    typer.Option(
+        "--seed", help="Number from which everything random is drawn; the same number, the same result."
+    ),
+]
+CentersOption = Annotated[
+    int | None,
+    typer.Option("--centers", min=0, max=512, help="Number of centers; by default the data decide."),
+]
+RhoOption = Annotated[
+    float | None,
+    typer.Option(
+        "--rho", min=0.0, max=1.0, help="Threshold of error reduction, eq. (16) of Ding et al. 2014."
+    ),
+]
+BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
+NumericOption = Annotated[
+    str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
+]
+TargetOption = Annotated[
+    list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
+]
+LotOption = Annotated[
+    Path | None,
+    typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs."),
+]
+PriorOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."
+    ),
+]
+AgeingOption = Annotated[
+    float | None,
+    typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h."),
+]
+AppliedOption = Annotated[
+    Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-code",
+        help="Compile and run DIR/c although it holds code that this gyrotc did not write: only what is your own.",
+    ),
+]
+TrustUnitsOption = Annotated[
+    bool, typer.Option("--trust-units", help="Take units that the values contradict; the result records it.")
+]
+AcceptOption = Annotated[
+    str | None,
+    typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL; says why."),
+]
+DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
+
+
+@contextmanager
+def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
+    """A line on stderr that says what is being done; nothing when stderr is no terminal, or with --quiet.
+
+    From 2 s on with percent and time left, as far as `stages` or counts ("3 of 12") in the texts tell them. With
+    --verbose every stage is a line of its own with the seconds since the start, also where stderr is a file.
+    """
+    if _Loudness.verbose:
+        start, said = time.monotonic(), [""]
+
+        def line(text: str) -> None:
+            if text != said[0]:
+                print(f"{time.monotonic() - start:8.1f} s  {terminal_text(text)}", file=sys.stderr)
+            said[0] = text
+
+        yield line
+        return
+    if _Loudness.quiet or not ERR.is_terminal:
+        yield lambda _: None
+        return
+    course = StageLine(stages)
+    status = ERR.status(course)
+
+    def shown(text: str) -> None:
+        course.say(text)
+        status.start()  # with the first stage: a question that comes before it has the terminal for itself
+
+    try:
+        yield shown
+    finally:
+        status.stop()
+
+
+def tell(text: str, *, wrong: bool = False) -> None:
+    """A line of the result on stdout, on a terminal broken between words; with --quiet only what went wrong."""
+    if _Loudness.quiet and not wrong:
+        return
+    line = terminal_line(text)
+    OUT.print(folded(line, OUT.width) if OUT.is_terminal else line, highlight=False, soft_wrap=True)
+
+
+def folded(line: str, width: int) -> str:
+    """A line in lines of at most so many characters, the further ones indented by two more.
+
+    A word that is longer stays whole, and so does an entry for dataset.toml: both are there to be copied.
+    """
+    if len(line) <= width:
+        return line
+    margin = line[: len(line) - len(line.lstrip())]
+    lines, at = [margin], len(margin)
+    for word in _TO_COPY.findall(line):
+        blank = " " if len(lines[-1]) > at else ""
+        if blank and len(lines[-1]) + 1 + len(word) > width:
+            at = len(margin) + 2
+            lines.append(" " * at)
+            blank = ""
+        lines[-1] += blank + word
+    return "\n".join(lines)
+
+
+def show(table: Table) -> None:
+    """A table of the result on stdout; none with --quiet."""
+    if not _Loudness.quiet:
+        OUT.print(table)
+
+
+def write_json(path: Path | None, result: dict[str, Any]) -> None:
+    if path is not None:
+        write_result(path, json_text(result))
+
+
+def numerics_of(text: str | None) -> list[str] | None:
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def _ceilings(texts: list[str] | None) -> None:
+    set_ceilings(texts or [])
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"gyrotc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    ceilings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--max",
+            metavar="NAME=VALUE",
+            callback=_ceilings,
+            help="Move a ceiling of inputs, before the command; may be repeated: "
+            + ", ".join(CEILINGS)
+            + ".",
+        ),
+    ] = None,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Tell nothing but what went wrong; also after the command.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Tell every stage with its time on stderr; also after it.")
+    ] = False,
+) -> None:
+    _Loudness.quiet, _Loudness.verbose = quiet, verbose
+
+
+def lot_in(path: Path | None) -> LotPrior | None:
+    """The lot of `--lot` as what is known of a unit. Raises as `load_lot`."""
+    if path is None:
+        return None
+    from ..lot.job import load_lot  # with what learns one: not for who has none
+    from ..lot.use import prior_of
+
+    return prior_of(load_lot(path))
+
+
+def applied_in(path: Path | None) -> Applied | None:
+    """The model of `--applied`. Raises as `applied_of`."""
+    if path is None:
+        return None
+    from ..tables.applied import applied_of  # with the reference: not for who has none
+
+    return applied_of(path)

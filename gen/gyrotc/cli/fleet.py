@@ -1,0 +1,184 @@
+"""The command `fleet`: many serials at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..common.errors import CheckFailed, InputError
+from .base import JsonOption, LotOption, OutOption, app, lot_in, progress, tell, write_json
+from .stages import time_left
+
+if TYPE_CHECKING:
+    from ..results.fleet import FleetEntry, FleetSummary
+
+
+@app.command()
+def fleet(
+    manifest: Annotated[
+        Path, typer.Argument(help="A manifest (TOML), or a folder with a data set in each of its folders.")
+    ],
+    out: OutOption,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, max=256, help="Processes on this machine.")] = 2,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
+    ] = False,
+    tag: Annotated[
+        str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")
+    ] = "",
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs."),
+    ] = None,
+    gathered: Annotated[
+        bool, typer.Option("--gather", help="Only the summary of what shares have done.")
+    ] = False,
+    lot: LotOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
+
+    What is done is not done again, and one that fails does not stop the others.
+
+    Example: gyrotc fleet recordings --out fleet
+    """
+    from ..fleet.manifest import load_manifest
+    from ..fleet.page import summary_of
+    from ..fleet.run import run_fleet
+    from ..fleet.shards import gather, run_share, share_of
+
+    share = share_of(shard) if shard else None
+    if share and gathered:
+        raise InputError("--gather", "goes with no --shard", "one of them")
+    wanted = load_manifest(manifest)
+    wanted = replace(wanted, options=replace(wanted.options, prior=lot_in(lot)))
+    with progress() as say:
+        told = _Told(len(wanted.units), say)
+        if share:
+            entries = run_share(wanted, out, share, jobs=jobs, scheduler=scheduler, full=full, told=told)
+        elif gathered:
+            entries = gather(wanted, out, full=full, tag=tag, told=told)
+        else:
+            entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, tag=tag, told=told)
+    if share:
+        _tell_share(shard or "", entries)
+        return
+    summary = summary_of(entries)
+    write_json(json_file, summary.content())
+    _tell_comparison(summary)
+    tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
+    if summary.failed or summary.unfinished:
+        left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
+        raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed{left}")
+
+
+def _tell_share(name: str, entries: Sequence[FleetEntry]) -> None:
+    failed = sum(entry.status != "done" for entry in entries)
+    tell(
+        f"share {name}: {len(entries) - failed} of {len(entries)} done; gyrotc fleet --gather makes the summary"
+    )
+    if failed:
+        raise CheckFailed(f"{failed} of {len(entries)} gyros of the share failed")
+
+
+@app.command()
+def catalogue(
+    place: Annotated[Path, typer.Argument(help="The --out of fleet, or a catalogue.sqlite.")],
+    serial: Annotated[str | None, typer.Argument(help="Which table may this gyro carry?")] = None,
+    day: Annotated[str | None, typer.Option("--on", help="On this day, ISO 8601; default today.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
+
+    Exit status 1 where there is none.
+
+    Example: gyrotc catalogue fleet RLG-0042 --on 2026-09-01
+    """
+    from ..fleet.catalogue import catalogued
+
+    asked = _day(day)
+    answer = catalogued(place, serial, asked)
+    write_json(json_file, answer.content())
+    for one in answer.found:
+        until = f" to {one.valid_until}" if one.valid_until else ""
+        spread = f", U {one.expanded_dph:.2g} deg/h" if one.expanded_dph is not None else ""
+        tell(
+            f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
+            f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
+        )
+        tell(f"  model {one.model_hash}")
+        tell(f"  image {one.image_sha256}")
+        for file in one.recordings if serial else ():
+            tell(f"  {file.role} {file.file} {file.sha256}")
+    if serial is None:
+        tell(f"{answer.calibrations} calibrations in all")
+    elif not answer.found:
+        raise CheckFailed(f"{serial} may carry no table of this catalogue on {asked}")
+
+
+def _day(text: str | None) -> str:
+    try:
+        return (date.fromisoformat(text) if text else date.today()).isoformat()
+    except ValueError as error:
+        raise InputError("--on", repr(text), "a day such as 2026-09-01") from error
+
+
+def _tell_comparison(summary: FleetSummary) -> None:
+    """A line for what each gyro was found by, when it was compared with the others."""
+    from ..pages.words import words
+
+    for reason in summary.apart:
+        tell(f"stands apart: {reason.name}: {reason.text}")
+    named = {reason.name for reason in summary.apart}
+    for outlier in (outlier for outlier in summary.outliers if outlier.name not in named):
+        tell(
+            f"stands apart: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
+            f"axis {outlier.median:.3g} ({outlier.sigmas:.0f} robust standard deviations)"
+        )
+    for copy in summary.copies:
+        tell(
+            f"copy of another: {copy.name} (serial {copy.serial}) has about {copy.share:.0%} of its rows in "
+            f"common with {copy.other} (serial {copy.other_serial}): one gyro under two serials"
+        )
+
+
+class _Told:
+    """Tells each gyro as it comes, and how many are left."""
+
+    def __init__(self, total: int, say: Callable[[str], None]) -> None:
+        self._total, self._say, self._start = total, say, time.monotonic()
+        self._seen, self._done = 0, 0
+        say(f"{total} gyros")
+
+    def __call__(self, entry: FleetEntry) -> None:
+        self._seen += 1
+        self._done += not entry.kept  # what is kept takes no time
+        _tell_entry(entry)
+        left = time_left(self._done, self._total - self._seen + self._done, time.monotonic() - self._start)
+        self._say(f"{self._seen} of {self._total} gyros{left}")
+
+
+def _tell_entry(entry: FleetEntry) -> None:
+    """One line a gyro."""
+    kept = " (done before)" if entry.kept else ""
+    text = f"{entry.name}: {entry.status}{kept}"
+    if entry.after_rms_dph is not None:
+        floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
+        text += (
+            f"; RMS {entry.before_rms_dph:.3e} -> {entry.after_rms_dph:.3e} deg/h{floor}, "
+            f"{entry.centers} centers, {entry.table_bytes} bytes"
+        )
+    if entry.status != "done":
+        text += f"; {entry.reason}"
+    if entry.aside:
+        text += f"; its earlier result had been changed and is now {entry.aside}"
+    tell(text)

@@ -1,0 +1,286 @@
+"""Whole jobs: build, compare, diagnose."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..common.errors import CheckFailed, InputError
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
+from .base import (
+    AgeingOption,
+    AppliedOption,
+    AverageOption,
+    AxisOption,
+    BlockOption,
+    CentersOption,
+    ChannelsOption,
+    DatasetArg,
+    JsonOption,
+    LotOption,
+    MethodOption,
+    NumericOption,
+    OutOption,
+    PriorOption,
+    RhoOption,
+    SeedOption,
+    TargetOption,
+    TrustUnitsOption,
+    app,
+    applied_in,
+    lot_in,
+    numerics_of,
+    progress,
+    show,
+    tell,
+    write_json,
+)
+from .diagnosis_lines import diagnosis_lines, extension_lines
+from .results import (
+    change_lines,
+    channel_lines,
+    evaluation_table,
+    ladder_lines,
+    limit_lines,
+    lot_lines,
+    not_installed_lines,
+    span_lines,
+    summary,
+    verify_table,
+)
+from .stages import BUILD, COMPARE, DIAGNOSE
+
+if TYPE_CHECKING:
+    from ..jobs.build import Built
+    from ..results.diagnosed import Diagnosed
+
+
+@app.command()
+def build(
+    dataset: DatasetArg,
+    out: OutOption = Path("build"),
+    method: MethodOption = "auto",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    channels: ChannelsOption = False,
+    numeric: NumericOption = None,
+    target: TargetOption = None,
+    applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
+    extend: Annotated[
+        bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
+    ] = False,
+    limits: Annotated[
+        Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met.")
+    ] = None,
+    lot: LotOption = None,
+    prior: PriorOption = None,
+    ageing: AgeingOption = None,
+    previous: Annotated[
+        Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
+    ] = None,
+    any_serial: Annotated[
+        bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:  # long: the options of the main job, handed on one by one
+    """The main job: check, fit, emit, verify, evaluate, report.
+
+    Example: gyrotc build recordings --out result
+    """
+    from ..jobs.build import build as run
+    from ..train.fitting import FitOptions
+
+    shared = lot_in(lot)
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
+    with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
+        results = run(
+            dataset,
+            out,
+            options,
+            axis=axis,
+            numerics=numerics_of(numeric),
+            targets=target or (),
+            applied=applied,
+            trust_units=trust_units,
+            extend=extend,
+            limits=limits,
+            previous=previous,
+            prior=prior,
+            ageing_dph=ageing,
+            any_serial=any_serial,
+            progress=say,
+        )
+    if len(results) == 1:
+        write_json(json_file, results[0].evaluation.content())
+    else:
+        write_json(json_file, {str(r.evaluation.axis): r.evaluation.content() for r in results})
+    for result in results:
+        if result.model.axis:
+            tell(f"axis {result.model.axis}")
+        _print_built(result)
+    tell(f"report: {out / 'report.html'}")
+    if failures := "; ".join(failure for result in results for failure in _failures(result)):
+        raise CheckFailed(failures)
+
+
+def _failures(result: Built) -> list[str]:
+    axis = result.model.axis
+    return [f"axis {axis}: {failure}" if axis else failure for failure in result.failures]
+
+
+def _print_built(result: Built) -> None:
+    show(evaluation_table(result.evaluation))
+    show(verify_table(result.verification))
+    for line in (
+        *not_installed_lines(result.verification),
+        *span_lines(result.training),
+        *ladder_lines(result.training),
+        *channel_lines(result.training),
+        *lot_lines(result.training),
+    ):
+        tell(line)
+    for name, reason in result.refused.items():
+        tell(f"{name} left out: {reason}")
+    for line in extension_lines(result.diagnosis) if result.diagnosis else ():
+        tell(line)
+    for line in limit_lines(result.limits) if result.limits else ():
+        tell(line)
+    for line in change_lines(result.changes) if result.changes else ():
+        tell(line)
+    for finding in result.evaluation.findings:
+        tell(f"finding {finding.id}: {finding.text}")
+    tell(summary(result.evaluation))
+
+
+@app.command()
+def compare(
+    dataset: DatasetArg,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
+    ] = None,
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Train every method on this data and show them side by side, as in the paper's Table 1.
+
+    Example: gyrotc compare recordings --out comparison
+    """
+    from ..jobs.compare import CompareOptions
+    from ..jobs.compare import compare as run
+    from ..pages.comparison import comparison_picture, comparison_tables, with_published
+    from ..recordings.load import load
+
+    options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
+    with (
+        result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
+        progress(COMPARE) as say,
+    ):
+        subtracted = applied_in(applied)
+        recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
+        if stage:
+            stage.of(recordings.serial, axis)
+        result = with_published(run(recordings, options, progress=say))
+        if stage:
+            write_atomically(stage.folder / "compare.json", json_text(result.content()))
+            write_atomically(stage.folder / "compare.svg", comparison_picture(result))
+    write_json(json_file, result.content())
+    for table in comparison_tables(result):
+        show(table)
+
+
+@app.command()
+def diagnose(  # long: the parts of a command in the order in which they are printed
+    dataset: DatasetArg,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", help="A model.json made before, whose method, block and number of centers are used."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
+    ] = None,
+    method: MethodOption = "auto",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
+    lot: LotOption = None,
+    accept_events: Annotated[
+        bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
+    ] = False,
+    fresh: Annotated[
+        bool,
+        typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings."),
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
+
+    Example: gyrotc diagnose recordings --out diagnosis
+    """
+    from ..jobs.kept_diagnosis import diagnosed
+    from ..model import load_model
+    from ..recordings.load import axes_of, load
+    from ..recordings.records import Dataset
+    from ..train.fitting import FitOptions
+
+    if lot is not None and model is not None:
+        raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
+    known = load_model(model) if model else None
+    shared = lot_in(lot)
+    options = (
+        FitOptions(method, seed, centers, rho, block_s, average_s, prior=shared) if known is None else None
+    )
+    subtracted = applied_in(applied)
+    axes = axes_of(dataset) if axis == "all" else (axis,)
+    if not axes:
+        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    results: dict[str, Diagnosed] = {}
+
+    def one(name: str | None, into: Path | None) -> None:
+        recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
+        with progress(DIAGNOSE) as say:
+            results[name or ""] = diagnosed(
+                recordings,
+                into,
+                model=known,
+                options=options,
+                progress=say,
+                accept_events=accept_events,
+                fresh=fresh,
+            )
+
+    if axis != "all" or out is None:
+        for name in axes:
+            one(name, out)
+    else:
+        with result_folder(out, "diagnose", inputs=[dataset]) as stage:
+            for name in axes:
+                one(name, stage.folder / str(name))
+    contents = {name: result.content() for name, result in results.items()}
+    write_json(json_file, contents if axis == "all" else contents[axis or ""])
+    for name, result in results.items():
+        for line in diagnosis_lines(result):
+            tell(line)
+        if out is not None:
+            tell(f"report: {(out / name if axis == 'all' else out) / 'report.html'}")

@@ -1,0 +1,135 @@
+"""The command `gyrotc`: the entry point. Commands print in `commands`; only this module exits."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import warnings
+
+from ..common.errors import GyrotcError, InputError
+from ..common.texts import terminal_line, terminal_text
+
+_CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
+
+
+def main() -> None:
+    """Entry point: the command's exit status, without tearing the interpreter down.
+
+    Arrow's read-ahead threads may still hold a Python file when the interpreter goes; it would end them inside C++
+    code, which aborts the process after its work is done.
+    """
+    _quiet_start()
+    _single_threaded()
+    _without_warnings()
+    from ..store.interrupts import Interrupted, die_of, raise_on_signals
+
+    raise_on_signals()
+    try:
+        status = _flushed(run(sys.argv[1:]))
+    except Interrupted as end:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
+        die_of(end.number)
+    os._exit(status)
+
+
+def _quiet_start() -> None:
+    """Until `raise_on_signals` Ctrl-C ends the process as it ends any other: nothing is begun that could be cleaned up.
+
+    Python's own answer would be a traceback out of the middle of an import. A signal that is ignored stays so.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _flushed(status: int) -> int:
+    """What is still to be printed is: the command's status, or that of what went wrong, which is told once."""
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError as error:
+        return status if status == GyrotcError.exit_status else _failed(error)
+    return status
+
+
+def _failed(error: OSError) -> int:
+    """One line of a file that cannot be read or written; none where the reader of stdout has gone."""
+    if isinstance(error, BrokenPipeError):
+        return _CLOSED
+    where = error.filename or "standard output"
+    with contextlib.suppress(OSError):
+        print(f"gyrotc: {terminal_line(f'{where}: {error.strerror or error}')}", file=sys.stderr, flush=True)
+    return GyrotcError.exit_status
+
+
+def _single_threaded() -> None:
+    """One thread of BLAS unless the user says otherwise; read when numpy is first imported.
+
+    The matrices here are small: more threads gain nothing, and on a busy machine they cost many times the work.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def _without_warnings() -> None:
+    """What libraries warn of is no news for who typed a command, here and in processes of a fleet.
+
+    Whoever asks for warnings (`PYTHONWARNINGS`, `python -W`) gets them; in tests each one is an error (`pytest.ini`).
+    """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+        os.environ.setdefault("PYTHONWARNINGS", "ignore")
+
+
+_COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`
+_ANYWHERE = (
+    "-q",
+    "--quiet",
+    "-v",
+    "--verbose",
+)  # options of the whole program, taken after the command as well
+
+
+def _hoisted(arguments: list[str]) -> list[str]:
+    """The arguments with what concerns the whole program in front; what stands behind `--` is left alone."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    front = [a for a in arguments[:end] if a in _ANYWHERE]
+    return [*front, *(a for a in arguments[:end] if a not in _ANYWHERE), *arguments[end:]]
+
+
+def run(arguments: list[str]) -> int:
+    """Runs one command in this process and returns its exit status; errors become one message on stderr.
+
+    Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
+    """
+    try:
+        from .commands import app
+
+        if _COMPLETE in os.environ:  # a shell asks what could follow
+            from typer._completion_classes import completion_init
+
+            completion_init()
+        app(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
+    except GyrotcError as error:
+        shown = (
+            terminal_line if isinstance(error, InputError) else terminal_text
+        )  # compilers say more than a line
+        print(f"gyrotc: {shown(str(error))}", file=sys.stderr)
+        return error.exit_status
+    except OSError as error:
+        return _failed(error)
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # typer's own way of ending then
+            return _CLOSED
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    except MemoryError:
+        print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
+        return GyrotcError.exit_status
+    except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
+        from .crash import EXIT_STATUS, crash_line
+
+        print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
+        return EXIT_STATUS
+    return 0

@@ -1,0 +1,50 @@
+"""What concerns the user's own machine: completion of a shell, and the cache."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..common.errors import InputError
+from .base import app, tell
+
+_SHELLS = ("bash", "zsh", "fish")
+
+
+@app.command()
+def completion(
+    shell: Annotated[str, typer.Argument(help="bash, zsh or fish.")],
+) -> None:
+    """A script that completes commands and options in a shell, on stdout.
+
+    Example: gyrotc completion bash > ~/.local/share/bash-completion/completions/gyrotc
+    """
+    from typer._completion_shared import get_completion_script
+
+    if shell not in _SHELLS:
+        raise InputError("completion", repr(shell), ", ".join(_SHELLS))
+    typer.echo(get_completion_script(prog_name="gyrotc", complete_var="_GYROTC_COMPLETE", shell=shell))
+
+
+@app.command()
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all of it.")] = False,
+    limit_gb: Annotated[
+        float | None,
+        typer.Option("--limit", min=0.0, max=1e6, help="Most GB that it may take, from now on; default 2."),
+    ] = None,
+) -> None:
+    """What gyrotc keeps between calls of diagnose: where, how much of it, and how much it may be.
+
+    Example: gyrotc cache --limit 0.5
+    """
+    from ..store import kept
+
+    if limit_gb is not None:
+        kept.set_limit(round(limit_gb * 1e9))
+    if clear:
+        kept.clear()
+    (banks, _), (diagnoses, _), (_, size) = kept.held("bank"), kept.held("diagnosis"), kept.held()
+    counted = f"{banks} banks of signatures, {diagnoses} diagnoses"
+    tell(f"{kept.folder()}: {counted}, {size / 1e9:.3f} GB of at most {kept.limit() / 1e9:g} GB")

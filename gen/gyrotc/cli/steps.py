@@ -1,0 +1,292 @@
+"""The steps of the main job, one by one: fit, emit, verify, evaluate, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from ..common.errors import CheckFailed, InputError
+from ..store.files import write_atomically
+from ..store.folder import result_folder
+from ..store.jsontext import json_text
+from .base import (
+    ERR,
+    AgeingOption,
+    AppliedOption,
+    AverageOption,
+    AxisOption,
+    BlockOption,
+    CentersOption,
+    ChannelsOption,
+    DatasetArg,
+    DirArg,
+    JsonOption,
+    LotOption,
+    MethodOption,
+    NumericOption,
+    OutOption,
+    PriorOption,
+    RhoOption,
+    SeedOption,
+    TargetOption,
+    TrustOption,
+    TrustUnitsOption,
+    app,
+    lot_in,
+    numerics_of,
+    progress,
+    show,
+    tell,
+    write_json,
+)
+from .results import (
+    channel_lines,
+    evaluation_table,
+    file_notes,
+    ladder_lines,
+    lot_lines,
+    prediction_line,
+    span_lines,
+    verify_notes,
+    verify_table,
+)
+from .stages import EMIT, FIT, VERIFY
+from .traces import evaluation_folders
+
+
+@app.command()
+def fit(
+    dataset: DatasetArg,
+    out: OutOption,
+    method: MethodOption = "auto",
+    axis: AxisOption = None,
+    seed: SeedOption = 0,
+    centers: CentersOption = None,
+    rho: RhoOption = None,
+    block_s: BlockOption = 10.0,
+    average_s: AverageOption = 100.0,
+    channels: ChannelsOption = False,
+    applied: AppliedOption = None,
+    trust_units: TrustUnitsOption = False,
+    lot: LotOption = None,
+    prior: PriorOption = None,
+    ageing: AgeingOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
+
+    Example: gyrotc fit recordings --out result
+    """
+    from ..jobs.recalibration import with_prior
+    from ..recordings.load import load
+    from ..tables.applied import applied_of
+    from ..train.fitting import FitOptions, fit_dataset
+
+    shared = lot_in(lot)
+    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
+    known = applied_of(applied) if applied else None
+    with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
+        recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
+        stage.of(recordings.serial, recordings.axis)
+        options = with_prior(options, recordings, prior, ageing)
+        fitted = fit_dataset(recordings, options, progress=say)
+        fitted.model.save(stage.folder / "model.json")
+        write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
+    write_json(json_file, fitted.training.content())
+    for line in (
+        *span_lines(fitted.training),
+        *ladder_lines(fitted.training),
+        *channel_lines(fitted.training),
+        *lot_lines(fitted.training),
+    ):
+        tell(line)
+    for finding in fitted.training.findings:
+        tell(f"finding {finding.id}: {finding.text}")
+    tell(prediction_line(fitted.training))
+    tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
+
+
+@app.command()
+def emit(
+    model: Annotated[Path, typer.Argument(help="The model.json to emit.")],
+    out: OutOption,
+    numeric: NumericOption = None,
+    zero_at: Annotated[
+        float | None,
+        typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Write the C files of a model into DIR/c.
+
+    Example: gyrotc emit result/model.json --out result
+    """
+    from ..model import load_model
+    from ..results.emission import Emitted, EmittedTable
+    from ..tables.files import emit as run
+
+    loaded = load_model(model)
+    source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
+    apart = target.resolve() != source.resolve()
+    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")[: 1 + apart]) as stage:
+        stage.of(loaded.serial, loaded.axis)
+        if apart and target.is_file() and target.read_text("utf-8") != loaded.to_json():
+            stage.stale()  # evaluated, verified, drawn: all of another model
+        emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at, progress=say)
+        if apart:
+            loaded.save(stage.folder / "model.json")
+    result = Emitted(
+        gyrotc_version=__version__,
+        serial=loaded.serial,
+        axis=loaded.axis,
+        id=loaded.id,
+        tables=tuple(
+            EmittedTable(numeric=t.numeric, table_bytes=t.table_bytes, error_bound_dph=t.error_bound_dph)
+            for t in emission.tables.values()
+        ),
+        refused=emission.refused,
+    )
+    write_json(json_file, result.content())
+    for name, reason in emission.refused.items():
+        ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
+
+
+@app.command()
+def verify(  # long: the parts of a command in the order in which they are printed
+    folder: DirArg,
+    target: TargetOption = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", help="Replay these recordings on every target besides.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
+    ] = None,
+    exhaustive: Annotated[
+        bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
+    ] = False,
+    allow_edited: Annotated[
+        list[str] | None,
+        typer.Option("--allow-edited", help="main.c: the example is yours now and may differ."),
+    ] = None,
+    signature: Annotated[
+        Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
+    ] = None,
+    trust_code: TrustOption = False,
+    trust_units: TrustUnitsOption = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
+    for each target and run, every bit compared with the reference. main.c is an example: edit it, and say so.
+
+    Example: gyrotc verify result --target all
+    """
+    from ..jobs.axes import axes_in, verify_axes
+    from ..model import load_model
+    from ..recordings.load import load
+    from ..results.verification import JointVerification, Verification
+    from ..verify.job import verify as run
+
+    allowed = allow_edited or ()
+    axes = axes_in(folder)
+    if axes and log is not None:
+        raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
+    results = {}
+    with progress(VERIFY) as say:
+        for part in [folder / axis for axis in axes] or [folder]:
+            axis = load_model(part / "model.json").axis
+            recordings = load(dataset, axis=axis, trust_units=trust_units) if dataset else None
+            with result_folder(part, "verify", entries=("verify.json",)) as stage:
+                results[str(axis)] = run(
+                    part,
+                    targets=target or (),
+                    dataset=recordings,
+                    log=log,
+                    exhaustive=exhaustive,
+                    edited=allowed,
+                    signature=signature,
+                    trust_code=trust_code,
+                    progress=say,
+                )
+                write_atomically(stage.folder / "verify.json", json_text(results[str(axis)].content()))
+    result: Verification | JointVerification = next(iter(results.values()))
+    if axes:
+        with result_folder(folder, "verify", entries=("verify.json",)) as stage:
+            result = verify_axes(folder, results, allowed, signature)
+            write_atomically(stage.folder / "verify.json", json_text(result.content()))
+    write_json(json_file, result.content())
+    for one in results.values():
+        show(verify_table(one))
+        for line in verify_notes(one):
+            tell(line)
+    for line in file_notes(result) if axes else ():
+        tell(line)
+    if result.failed:
+        n_targets = sum(len(one.targets) for one in results.values())
+        raise CheckFailed(f"{result.failed} checks failed; {n_targets} targets")
+
+
+@app.command()
+def evaluate(
+    folder: DirArg,
+    dataset: DatasetArg,
+    numeric: NumericOption = None,
+    trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
+    average_s: Annotated[
+        float | None,
+        typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
+    ] = None,
+    applied: AppliedOption = None,
+    trust_code: TrustOption = False,
+    trust_units: TrustUnitsOption = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Replay recordings through the compiled C code, compare every step, measure.
+
+    Example: gyrotc evaluate result recordings --trace result/trace
+    """
+    from ..assess.evaluate import evaluate as run
+    from ..model import load_model
+    from ..recordings.load import load
+    from ..tables.applied import applied_of
+
+    axis = load_model(folder / "model.json").axis
+    subtracted = applied_of(applied) if applied else None
+    recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
+    with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
+        result = run(
+            folder,
+            recordings,
+            numeric=numeric,
+            average_s=average_s,
+            trace=traces,
+            trust_code=trust_code,
+            progress=say,
+        )
+        write_atomically(stage / "evaluate.json", json_text(result.content()))
+    write_json(json_file, result.content())
+    show(evaluation_table(result))
+    if result.mismatches:
+        raise CheckFailed(f"{result.mismatches} steps differ from the reference")
+
+
+@app.command()
+def report(folder: DirArg) -> None:
+    """Write DIR/report.html from what build, diagnose or plan left in DIR.
+
+    Example: gyrotc report result
+    """
+    from ..pages.diagnosis_page import is_diagnosis, write_diagnosis_page
+    from ..pages.plan_page import is_plan, write_plan_page
+    from ..pages.report import write_report
+
+    with progress() as say:
+        say("drawing")
+        if is_diagnosis(folder):
+            path = write_diagnosis_page(folder)
+        else:
+            path = write_plan_page(folder) if is_plan(folder) else write_report(folder)
+    tell(f"report: {path}")

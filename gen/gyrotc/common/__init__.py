@@ -1,0 +1,1 @@
+"""What every package may use: errors, texts, opening of input files, metrics and small statistics of arrays."""

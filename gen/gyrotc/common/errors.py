@@ -1,0 +1,43 @@
+"""Errors of gyrotc: what the user did or gave (exit 2), and what a check found (exit 1).
+
+Every module may import this one; it imports none of them.
+"""
+
+from __future__ import annotations
+
+__all__ = ["CheckFailed", "GyrotcError", "InputError"]
+
+
+class GyrotcError(Exception):
+    """Base of all errors that gyrotc raises on purpose. The command line turns it into one message.
+
+    `exit_status` is what the command ends with.
+    """
+
+    exit_status = 2
+
+
+class InputError(GyrotcError):
+    """Bad input: a file, a model, an argument. The message names place, what was found, what was expected.
+
+    Args:
+        where: File, option or field, e.g. ``run-01.csv, line 17, column rate_dph``.
+        found: What stands there.
+        expected: What should stand there; empty if `found` says it all.
+    """
+
+    def __init__(self, where: str, found: str, expected: str = "") -> None:
+        self.where = where
+        self.found = found
+        self.expected = expected
+        super().__init__(where, found, expected)
+
+    def __str__(self) -> str:
+        tail = f"; expected {self.expected}" if self.expected else ""
+        return f"{self.where}: {self.found}{tail}"
+
+
+class CheckFailed(GyrotcError):
+    """The job ran and a check failed (bits differ, a bound or limit is not met): exit status 1."""
+
+    exit_status = 1

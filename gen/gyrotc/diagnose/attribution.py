@@ -1,0 +1,286 @@
+"""Attribution: which causes, how sure, and is anything left?
+
+Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, further
+ones while the search finds something beside them. What the chosen causes leave is held against the whole
+dictionary (lack of fit).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..causes import CATALOGUE
+from .candidates import Candidate, searched
+from .contest import Contest, contest
+from .detection import Found, detect
+from .gains import Gains, Point
+from .joined import Held
+from .marginal_likelihood import MarginalLikelihood
+from .misfit import Misfit, explained, misfit
+from .pairs import best_of, clear_pair, makes_sense
+from .refine import Refined, model_columns, refine, sized
+from .rivals import Rival, near_of, odds_of, probabilities_of, ranked_rivals
+from .search import Search
+from .simulated_odds import calibrated
+from .wide_memory import WideMemory, outlasts, rate_independent
+
+__all__ = ["Attribution", "attribute", "choose"]
+
+Array = NDArray[np.float64]
+
+_LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
+_WELL = 0.08  # p-value of what is left that a pair must reach,
+_NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
+_MISFIT = 0.01  # p-value of what is left below which further causes are looked for: as for the first one
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What the search found, and how sure that is.
+
+    Attributes:
+        first: The search before any cause is taken, best first.
+        causes: The chosen causes, strongest first.
+        p_values: The p-value of each cause, adjusted for the whole search.
+        rivals: For each, other causes in its place that explain the recordings as well, nearest first.
+        probabilities: For each, of every cause in its place, itself first, by id.
+        gain: Twice the log-likelihood ratio of all causes together.
+        left: What all causes leave.
+        last: The search after the last cause.
+        other: The best shape that no cause has, and its lead over the causes.
+        wide: Hysteresis of any form, by which `left` is judged where one play leaves something; else None.
+    """
+
+    first: list[Found]
+    causes: tuple[Refined, ...]
+    p_values: tuple[float, ...]
+    rivals: tuple[tuple[Rival, ...], ...]
+    gain: float
+    left: Misfit
+    last: list[Found]
+    other: Contest
+    probabilities: tuple[dict[str, float], ...] = ()
+    wide: WideMemory | None = None
+
+    @property
+    def columns(self) -> Array:
+        """All columns that stand in the model when the causes are named, shape (N, k)."""
+        return _columns(self.causes, self.wide)
+
+    @property
+    def detected(self) -> bool:
+        return bool(self.first) and self.first[0].p_value <= _LEVEL
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A set of causes with everything that follows from it."""
+
+    chosen: tuple[Candidate, ...]
+    refined: tuple[Refined, ...]
+    found: list[Found]
+    gain: float
+    left: Misfit
+    wide: WideMemory | None = None
+
+    @property
+    def remains(self) -> bool:
+        return self.left.p_value < _MISFIT or self.found[0].p_value <= _LEVEL
+
+    @property
+    def well(self) -> bool:
+        """Whether the causes leave so little that a set of them is taken for the whole explanation."""
+        return self.left.p_value >= _WELL or (self.left.p_value >= _NEARLY and self.left.share >= _MOST)
+
+
+def attribute(search: Search) -> Attribution:
+    """Runs the search to its end."""
+    first = detect(search, "map and beside")
+    if first[0].p_value > _LEVEL:
+        return Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
+    gains = Gains(search)
+    singles = list(gains.single())
+    weigher = MarginalLikelihood(gains)
+    stage = _stage(search, gains, _single(gains, singles, weigher).members)
+    pairs: list[Point] = []
+    if stage.remains:
+        pairs = [p for p in gains.pairs() if makes_sense(p)]
+        pair = clear_pair(singles, weigher.preferred(pairs), gains.size)
+        if pair is not None:
+            stage = _beside(search, gains, stage, pair)
+    stage = _widened(search, gains, stage)
+    order = _by_strength(singles, stage.chosen)
+    refined = tuple(stage.refined[k] for k in order)
+    taken = tuple(stage.chosen[k] for k in order)
+    ranked, likely = _rivals(weigher, singles, pairs, taken, _ahead(gains, stage, singles))
+    return Attribution(
+        first=first,
+        causes=refined,
+        p_values=tuple(_p_value(first, r.candidate) for r in refined),
+        rivals=tuple(map(near_of, likely)),
+        gain=stage.gain,
+        left=stage.left,
+        last=stage.found,
+        other=_contest(gains, stage.wide, refined, tuple(map(near_of, ranked))),
+        probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
+        wide=stage.wide,
+    )
+
+
+def _single(gains: Gains, singles: list[Point], weigher: MarginalLikelihood) -> Point:
+    """The best single cause; whether a memory fades is asked with hypotheses that are equally wide."""
+    best = weigher.preferred(singles)
+    if CATALOGUE[best.members[0].id].family != "thermal_memory":
+        return best
+    near = ranked_rivals(singles, [], best.members, gains.size)[0]
+    behind = [r.distance for r in weigher.judged(singles, best.members, 0, near) if searched(r.id).loops]
+    rival = max(best.criterion(gains.size), weigher.criterion(best.members, np.zeros(gains.size, dtype=bool)))
+    if not behind or not outlasts(gains, behind[0], rival):
+        return best
+    return best_of([p for p in singles if searched(p.members[0].id).loops], gains.size)
+
+
+def _rivals(
+    weigher: MarginalLikelihood,
+    singles: list[Point],
+    pairs: list[Point],
+    taken: tuple[Candidate, ...],
+    ahead: float,
+) -> tuple[list[tuple[Rival, ...]], list[tuple[Rival, ...]]]:
+    """Of each cause, nearest first; and with odds that simulation bears out, likeliest first.
+
+    Args:
+        ahead: By how much hysteresis in the form that it was found in is ahead of the play that stands for it.
+    """
+    gains = weigher.gains
+    pool = singles if len(taken) == 1 else pairs
+    ranked = []
+    for k, near in enumerate(ranked_rivals(singles, pairs, taken, gains.size)):
+        more = ahead if searched(taken[k].id).loops else 0.0
+        judged = weigher.judged(pool, taken, k, near)
+        ranked.append(tuple(_behind(rival, more) for rival in judged))
+    return ranked, [calibrated(gains, pool, taken, k, rivals) for k, rivals in enumerate(ranked)]
+
+
+def _behind(rival: Rival, more: float) -> Rival:
+    """A rival that is not ahead, and farther behind by some criterion."""
+    moved = replace(rival, distance=max(rival.distance, 0.0) + more, odds=None)
+    return moved if rival.odds is None else replace(moved, odds=odds_of(moved))
+
+
+def _ahead(gains: Gains, stage: _Stage, singles: list[Point]) -> float:
+    if stage.wide is None or len(stage.chosen) > 1:
+        return 0.0
+    play = best_of([p for p in singles if p.members == stage.chosen], gains.size)
+    return max(stage.wide.criterion(gains.size) - play.criterion(gains.size), 0.0)
+
+
+def _contest(
+    gains: Gains, wide: WideMemory | None, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]
+) -> Contest:
+    """The best shape that no cause has, against the causes or any other one that does as well in their place."""
+    others = [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(causes, rivals, strict=True)]
+    return contest(gains, causes, others, wide)
+
+
+def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
+    refined = refine(search, gains, chosen)
+    current, held = _with(search, refined)
+    gain = explained(current, current.likeliest, held)
+    return _Stage(chosen, refined, detect(current, held), gain, misfit(current, held, refined))
+
+
+def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
+    """With what a play leaves judged beside hysteresis of any form, where the recordings speak for such a memory.
+
+    The family is one name for every memory with loops that do not depend on the rate; a table's play is but one.
+    """
+    loops = [searched(c.id).loops for c in stage.chosen]
+    if (
+        stage.wide is not None
+        or stage.left.worst >= _WELL
+        or not any(loops)
+        or any(c.role == "input" for c in stage.chosen)
+    ):
+        return stage
+    beside = [c.columns for c, loop in zip(stage.refined, loops, strict=True) if not loop]
+    wide = rate_independent(gains, beside)
+    if wide is None:
+        return stage
+    current, held = _with(search, stage.refined, wide)
+    left = misfit(current, held, stage.refined, chance=wide.columns.shape[1])
+    return replace(stage, found=detect(current, held), left=left, wide=wide)
+
+
+def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:
+    """What a second cause makes of a first; not where that is hysteresis of a form that does as well as both."""
+    widened = _widened(search, gains, one)
+    if widened.wide is not None and widened.wide.criterion(gains.size) >= pair.criterion(gains.size):
+        return widened
+    return _deeper(search, gains, one, pair.members)
+
+
+def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
+    """The pair, or three causes, where these leave nothing; else the single cause with its remainder."""
+    two = _stage(search, gains, pair)
+    third = _third(two.found, pair) if two.remains else None
+    if third is not None:
+        three = _stage(search, gains, (*pair, third))
+        if three.left.p_value >= _WELL > two.left.p_value and _believed(gains, three.refined):
+            return three
+    return two if two.well else one
+
+
+def _believed(gains: Gains, causes: tuple[Refined, ...]) -> bool:
+    """Whether no cause is larger than is believed: the third one comes from the search, which asks for no size."""
+    return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate))
+
+
+def choose(search: Search, count: int) -> tuple[Refined, ...]:
+    """The best one or two causes without asking whether there is any: for runs left out of a choice made."""
+    gains = Gains(search)
+    points = list(gains.single())
+    weigher = MarginalLikelihood(gains)
+    best = weigher.preferred(points)
+    if count > 1:
+        pairs = [p for p in gains.pairs() if makes_sense(p)]
+        pair = weigher.preferred(pairs)
+        best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
+    chosen = sorted(
+        best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0)
+    )
+    return refine(search, gains, tuple(chosen)) if best.criterion(gains.size) > 0.0 else ()
+
+
+def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | None:
+    top = found[0]
+    present = {c.id for c in chosen}
+    if top.p_value > _LEVEL or top.candidate.role == "structure" or top.candidate.id in present:
+        return None
+    if top.candidate.role == "input":
+        return None
+    return top.candidate
+
+
+def _with(search: Search, causes: tuple[Refined, ...], wide: WideMemory | None = None) -> tuple[Search, Held]:
+    """The search with the causes' columns and tangents as part of every model, and what a model then holds."""
+    current = search.extended(_columns(causes, wide))
+    swapped = any(c.candidate.role == "input" for c in causes)  # the replaced map stands beside the plain one
+    return current, "beside" if swapped else "map and beside"
+
+
+def _columns(causes: tuple[Refined, ...], wide: WideMemory | None) -> Array:
+    return model_columns(causes) if wide is None else np.column_stack([model_columns(causes), wide.columns])
+
+
+def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[int]:
+    alone = [max((p.gain for p in singles if p.members[0].id == c.id), default=0.0) for c in chosen]
+    return sorted(range(len(chosen)), key=lambda k: -alone[k])
+
+
+def _p_value(found: list[Found], cause: Candidate) -> float:
+    same = (f.p_value for f in found if (f.candidate.id, f.candidate.channel) == (cause.id, cause.channel))
+    return min(same, default=1.0)

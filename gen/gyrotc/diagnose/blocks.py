@@ -1,0 +1,161 @@
+"""Recordings as diagnosis sees them: native rows for the operators, means over blocks for the statistics.
+
+Every feature is computed on the rows and averaged afterwards; nothing is filtered after averaging.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..causes.base import History
+from ..common.ceilings import need_memory
+
+__all__ = ["Record", "Records", "centred_slope", "singled_out"]
+
+Array = NDArray[np.float64]
+_BLOCK_BYTES = 8 * 64  # of the features of a block that are averaged together
+_SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could stand for
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One run.
+
+    Attributes:
+        name: Name of the run in messages and tables.
+        history: The whole record at its native rate.
+        rate_dph: Measured rate, deg/h, shape (n,).
+        usable: Rows in the run's span, outside its exclusions, with a finite rate, shape (n,).
+        environment: Environment as the data set names it.
+        channels: Auxiliary channels by name, shape (n,) each.
+    """
+
+    name: str
+    history: History
+    rate_dph: Array
+    usable: NDArray[np.bool_]
+    environment: str = ""
+    channels: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def row_s(self) -> float:
+        """Median row period, s."""
+        return float(np.median(np.diff(self.history.time_s)))
+
+
+@dataclass(frozen=True)
+class Records:
+    """All training runs, and the blocks over which they are averaged.
+
+    Attributes:
+        runs: The runs.
+        block_s: Length of a block, s.
+        index: Per run, the block of every row, shape (n,).
+        kept: Per run, numbers of the blocks that are used, ascending; a block is used when at least half
+            of its rows are usable.
+    """
+
+    runs: tuple[Record, ...]
+    block_s: float
+    index: tuple[NDArray[np.int64], ...] = field(init=False)
+    kept: tuple[NDArray[np.int64], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        index, kept = [], []
+        for run in self.runs:
+            time = run.history.time_s
+            number = np.floor((time - time[0]) / self.block_s + 1e-6).astype(np.int64)
+            need_memory(_BLOCK_BYTES * float(number[-1]), run.name, f"its blocks of {self.block_s:g} s")
+            nominal = max(round(self.block_s / run.row_s), 1)
+            count = np.bincount(number, weights=run.usable)
+            index.append(number)
+            kept.append(np.flatnonzero(2 * count >= nominal))
+        object.__setattr__(self, "index", tuple(index))
+        object.__setattr__(self, "kept", tuple(kept))
+
+    @property
+    def size(self) -> int:
+        """Number of blocks in all."""
+        return sum(k.size for k in self.kept)
+
+    def spans(self) -> list[slice]:
+        """Where each run's blocks lie in the joined arrays."""
+        ends = np.cumsum([k.size for k in self.kept])
+        return [slice(int(e - k.size), int(e)) for e, k in zip(ends, self.kept, strict=True)]
+
+    def average_run(self, number: int, rows: Array, weight: NDArray[np.bool_] | None = None) -> Array:
+        """Block means of one run's rows, shape (n,) or (n, k); `weight` leaves rows out (default: `usable`)."""
+        use = self.runs[number].usable if weight is None else weight
+        index, kept = self.index[number], self.kept[number]
+        starts = np.flatnonzero(np.diff(index, prepend=-1))
+        table = rows.reshape(len(rows), -1) * use[:, None]
+        sums = np.zeros((int(index[-1]) + 1, table.shape[1]))
+        sums[index[starts]] = np.add.reduceat(table, starts, axis=0)
+        count = np.bincount(index, weights=use)
+        means = sums[kept] / np.maximum(count[kept], 1.0)[:, None]
+        return means[:, 0] if rows.ndim == 1 else means
+
+    def average(self, rows: Sequence[Array]) -> Array:
+        """Block means of all runs, joined: shape (N,) or (N, k)."""
+        return np.concatenate([self.average_run(k, r) for k, r in enumerate(rows)])
+
+    def columns(self, feature: Callable[[History], Array]) -> Array:
+        """A feature of the histories as joined block means, shape (N, k)."""
+        return self.average([feature(run.history) for run in self.runs])
+
+    def target(self, masks: Sequence[NDArray[np.bool_]] | None = None) -> Array:
+        """Block means of the measured rate, deg/h, shape (N,); `masks` (per run) leave rows out."""
+        use = [r.usable for r in self.runs] if masks is None else masks
+        return np.concatenate(
+            [
+                self.average_run(k, np.where(u, r.rate_dph, 0.0), u)
+                for k, (r, u) in enumerate(zip(self.runs, use, strict=True))
+            ]
+        )
+
+    def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
+        """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
+        tried = Records(
+            tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s
+        )
+        left = [r for r, kept in zip(tried.runs, tried.kept, strict=True) if kept.size > 1]
+        runs = [replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left)]
+        return Records(tuple(runs), self.block_s)
+
+    def key(self) -> str:
+        """Hash of everything but the rates: what a bank of signatures depends on."""
+        digest = hashlib.sha256(repr(self.block_s).encode())
+        for run, kept in zip(self.runs, self.kept, strict=True):
+            h = run.history
+            for part in (h.time_s, h.temperature_c, h.on_s, kept):
+                digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
+            digest.update(repr((h.run, h.runs, h.day)).encode())
+        return digest.hexdigest()
+
+
+def singled_out(where: NDArray[np.bool_]) -> Array:
+    """One column for every block that is marked, 1 there and 0 elsewhere, shape (N, marked)."""
+    at = np.flatnonzero(where)
+    out = np.zeros((where.size, at.size))
+    out[at, np.arange(at.size)] = 1.0
+    return out
+
+
+def centred_slope(history: History) -> Array:
+    """dT/dt in C/min at every row: least-squares slope over ±100 s (at least ±2 rows), one-sided at the ends."""
+    time, value = history.time_s, history.temperature_c
+    half = max(_SLOPE_SPAN_S / 2, 2.0 * float(np.median(np.diff(time))))
+    low = np.searchsorted(time, time - half - 1e-9)
+    high = np.searchsorted(time, time + half + 1e-9)
+    t = time - time[0]
+    x = value - value.mean()
+    sums = [np.concatenate(([0.0], np.cumsum(v))) for v in (np.ones_like(t), t, x, t * t, t * x)]
+    n, st, sx, stt, stx = (s[high] - s[low] for s in sums)
+    spread = n * stt - st * st
+    slope = (n * stx - st * sx) / np.where(spread > 0.0, spread, 1.0)
+    return np.asarray(60.0 * slope)

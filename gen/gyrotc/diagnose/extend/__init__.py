@@ -1,1 +1,0 @@
-"""Stage 7: the map refitted beside the causes, and what that gains on runs it has not seen."""

@@ -1,0 +1,172 @@
+"""The gain of an extension on runs that its choice has not seen, with intervals.
+
+Share of removable excess: (before² − after²)/(before² − floor²), RMS of means over `average_s`. Intervals
+come from drawing half-hours (for the angle: hours) of the scored runs again, a paired bootstrap; where there
+are few half-hours, twelfths of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.metrics import MAD_TO_SIGMA, Averages, time_statistics
+from ..results.diagnosed import Estimate, GainOnUnseen
+
+__all__ = ["Gain", "floor_of", "gain_of"]
+
+Array = NDArray[np.float64]
+
+_PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
+_FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
+_HOUR_S = 3600.0  # the angle after one hour is a figure of merit
+_DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
+_FAR = 4.0  # robust standard deviations, beyond which a difference says nothing about the floor
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Before and after, deg/h and arcsec, on the same samples; pairs are 95 % intervals.
+
+    Attributes:
+        share, low, high: Share of the removable excess that is removed; None where the excess is too small.
+        difference_low: Lower 95 % limit of before² − after², (deg/h)².
+        rms_removed: Of before − after, deg/h.
+        angle_removed: The same of the angle after one hour, arcsec; None where no run lasts an hour.
+    """
+
+    rms_before: float
+    rms_after: float
+    share: float | None
+    low: float | None
+    high: float | None
+    difference_low: float
+    rms_removed: tuple[float, float]
+    angle_removed: tuple[float, float] | None
+    angle_before: float | None
+    angle_after: float | None
+    half_hour_before: float | None
+    half_hour_after: float | None
+
+    @property
+    def positive(self) -> bool:
+        """Whether the lower 95 % limit of before² − after² is above zero."""
+        return self.difference_low > 0.0
+
+    def result(self) -> GainOnUnseen:
+        """As `diagnose.json` has it."""
+        angle = None
+        if self.angle_before is not None and self.angle_after is not None and self.angle_removed is not None:
+            angle = _with_limits(self.angle_before - self.angle_after, self.angle_removed)
+        return GainOnUnseen(
+            exam_rms_before_dph=self.rms_before,
+            exam_rms_after_dph=self.rms_after,
+            share_of_excess_removed=self.share,
+            low=self.low,
+            high=self.high,
+            rms_removed_dph=_with_limits(self.rms_before - self.rms_after, self.rms_removed),
+            angle_1h_removed_arcsec=angle,
+            angle_1h_before_arcsec=self.angle_before,
+            angle_1h_after_arcsec=self.angle_after,
+            rms_30min_before_dph=self.half_hour_before,
+            rms_30min_after_dph=self.half_hour_after,
+        )
+
+
+def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
+    return Estimate(value=value, low=limits[0], high=limits[1])
+
+
+def floor_of(runs: Sequence[Averages]) -> float:
+    """Noise floor from first differences of the averaged residuals without the far ones, deg/h."""
+    steps = np.concatenate([np.diff(r.after_dph) for r in runs if r.after_dph.size > 1] or [np.zeros(1)])
+    steps = steps - np.median(steps)
+    near = np.abs(steps) <= _FAR * MAD_TO_SIGMA * np.median(np.abs(steps))
+    return float(np.sqrt(np.mean(steps[near] ** 2) / 2.0))
+
+
+def gain_of(
+    before: Sequence[Averages], after: Sequence[Averages], floor: float, average_s: float, seed: int = 1
+) -> Gain:
+    """Compares two sets of residuals on the same samples."""
+    b2, a2, weight = _pieces(before, after, average_s)
+    total = weight.sum()
+    rms_b, rms_a = float(np.sqrt(b2.sum() / total)), float(np.sqrt(a2.sum() / total))
+    rng = np.random.default_rng(seed)
+    drawn = rng.integers(0, weight.size, (_DRAWS, weight.size))
+    n = weight[drawn].sum(axis=1)
+    diff = (b2 - a2)[drawn].sum(axis=1) / n
+    removed = np.sqrt(b2[drawn].sum(axis=1) / n) - np.sqrt(a2[drawn].sum(axis=1) / n)
+    excess = rms_b**2 - floor**2
+    share = low = high = None
+    if excess > 0.02 * floor**2:
+        shares = diff / excess
+        share = (rms_b**2 - rms_a**2) / excess
+        low, high = _middle_95(shares)
+    return Gain(
+        rms_b,
+        rms_a,
+        share,
+        low,
+        high,
+        float(np.quantile(diff, 0.025)),
+        _middle_95(removed),
+        _angle_removed(before, after, average_s, rng),
+        _pooled(before, average_s, "angle_1h_arcsec"),
+        _pooled(after, average_s, "angle_1h_arcsec"),
+        _pooled(before, average_s, "rms_30min_dph"),
+        _pooled(after, average_s, "rms_30min_dph"),
+    )
+
+
+def _pieces(
+    before: Sequence[Averages], after: Sequence[Averages], average_s: float
+) -> tuple[Array, Array, Array]:
+    """Sums of squares before and after, and number of samples, of half-hour pieces."""
+    most = sum(x.after_dph.size for x in before) // _FEWEST_PIECES
+    size = max(min(round(_PIECE_S / average_s), most), 1)
+    b2, a2, weight = [], [], []
+    for x, y in zip(before, after, strict=True):
+        cuts = np.arange(0, x.after_dph.size, size)
+        b2.append(np.add.reduceat(x.after_dph**2, cuts))
+        a2.append(np.add.reduceat(y.after_dph**2, cuts))
+        weight.append(np.diff(np.append(cuts, x.after_dph.size)))
+    return np.concatenate(b2), np.concatenate(a2), np.concatenate(weight).astype(float)
+
+
+def _middle_95(draws: Array) -> tuple[float, float]:
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _angle_removed(
+    before: Sequence[Averages], after: Sequence[Averages], average_s: float, rng: np.random.Generator
+) -> tuple[float, float] | None:
+    """Limits of the difference of the RMS angles after one hour, arcsec (1 deg/h is 1 arcsec/s)."""
+    b, a = (np.concatenate([_hours(r, average_s) for r in runs]) for runs in (before, after))
+    if b.size < 2:
+        return None
+    drawn = rng.integers(0, b.size, (_DRAWS, b.size))
+    rms = [np.sqrt((x[drawn] ** 2).mean(axis=1)) for x in (b, a)]
+    low, high = _middle_95(rms[0] - rms[1])
+    return _HOUR_S * low, _HOUR_S * high
+
+
+def _hours(run: Averages, average_s: float) -> Array:
+    """Means over full hours of one run, deg/h."""
+    if run.time_s.size == 0:
+        return np.zeros(0)
+    number = np.floor((run.time_s - run.time_s[0]) / _HOUR_S + 1e-9).astype(np.int64)
+    count = np.bincount(number)
+    means = np.bincount(number, weights=run.after_dph) / np.maximum(count, 1)
+    return np.asarray(means[count >= 0.9 * _HOUR_S / average_s])
+
+
+def _pooled(runs: Sequence[Averages], average_s: float, name: str) -> float | None:
+    """RMS over the runs of one of their figures."""
+    values = [time_statistics(r, average_s)[name] for r in runs]
+    squares = [v**2 for v in values if v is not None]
+    return float(np.sqrt(np.mean(squares))) if squares else None

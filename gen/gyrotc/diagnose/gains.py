@@ -1,0 +1,231 @@
+"""How much better each cause, and each pair of causes, explains the data: profile likelihoods on the grid.
+
+All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
+change of the map's input the same number of map functions is fitted before and after (equal flexibility),
+on the blocks where the changed input is known. A cause that would have to be larger than is believed (`size_limit`)
+gains nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.orthonormal import orthonormal
+from .blocks import singled_out
+from .candidates import Candidate, searched
+from .scores import variance_ratio_of
+from .search import Search
+from .size_limit import SizeLimit
+from .whitener import Whitener
+
+__all__ = ["CauseSet", "Gains", "Point"]
+
+Array = NDArray[np.float64]
+
+_INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A model of one or two candidates and its gain."""
+
+    members: tuple[Candidate, ...]
+    gain: float
+
+    def criterion(self, size: int) -> float:
+        """Gain less the price of the parameters: half the difference of BIC, times two."""
+        return self.gain - sum(searched(m.id).price for m in self.members) * float(np.log(size))
+
+
+CauseSet = tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class _Base:
+    """What is left when a map (plain or of another input) is projected out.
+
+    `columns`: all bank columns and channel columns, whitened and projected, over the noise scale.
+    """
+
+    candidate: Candidate | None
+    gain: float
+    gram: Array
+    a: Array
+    taken: _Taken | None = None
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """Columns that a model holds beside its map.
+
+    Attributes:
+        weights: Theirs, shape (k,).
+        less: What each other column takes off these weights for a weight of 1, shape (k, K).
+        shares: Of the largest effect for a weight of 1, shape (k,).
+    """
+
+    weights: Array
+    less: Array
+    shares: Array
+
+    def allows(self, at: slice, weights: Array) -> bool:
+        """Whether they are still believed beside other columns with these weights."""
+        left = self.weights - self.less[:, at] @ weights
+        return float(((self.shares * left) ** 2).sum()) <= 1.0
+
+
+class Gains:
+    """Gains of all candidates and pairs for one search.
+
+    Attributes:
+        target: Whitened data over the noise scale, shape (N,).
+        map, beside: Whitened map functions, and columns that are in every model beside them.
+        whole: Whitened bank and channel columns, nothing projected out.
+        limit: How large a cause may be.
+        size: Number of blocks.
+    """
+
+    def __init__(self, search: Search) -> None:
+        self.search = search
+        view = search.likeliest
+        self.scale = view.scale
+        self.whiten = Whitener(view.colour, search.records.kept, search.records.block_s, search.sigma)
+        bank, joined = search.bank, search.joined
+        own = joined.channels.shape[1]
+        columns = np.column_stack([bank.signatures, joined.channels])
+        on_map = np.column_stack([bank.on_map, joined.on_map[:, :own]])
+        self._columns = self.whiten(columns)
+        self.whole = self._columns + self.whiten(bank.map) @ on_map
+        self.limit = SizeLimit(search)
+        self._shares = self.limit.shares(columns + bank.map @ on_map)
+        self.target = self.whiten(search.y) / self.scale
+        self.beside = self.whiten(joined.beside)
+        self.map = self.whiten(bank.map)
+        self.size = search.y.size
+        names: list[tuple[Candidate, slice]] = [(g.candidate, g.columns) for g in bank.groups]
+        k = bank.signatures.shape[1]
+        names += [(joined.added[i], slice(k + i, k + i + 1)) for i in range(own)]
+        self.plain = [(c, s) for c, s in names if c.role == "columns"]
+        self.random = [(c, s) for c, s in names if c.role == "variance"]
+        self.base = self._project(None, self.map, None)
+        self._bases: list[_Base] | None = None
+
+    @cached_property
+    def map_q(self) -> Array:
+        """Orthonormal columns of the whitened map."""
+        return orthonormal(self.map)
+
+    def plain_columns(self, at: slice) -> Array:
+        """Whitened bank columns with the map projected out."""
+        columns = self._columns[:, at]
+        return np.asarray(columns - self.map_q @ (self.map_q.T @ columns))
+
+    def rest_after(self, candidate: Candidate, white: Array) -> float:
+        """Energy of whitened data that the map of another input leaves on the blocks where it is known."""
+        i = self.search.bank.inputs.index(candidate)
+        known = self.search.bank.known[i]
+        design = self.whiten(self.search.bank.replaced[i])
+        q = orthonormal(design, *([] if known.all() else [self.whiten(singled_out(~known))]))
+        return float(white @ white - ((q.T @ white) ** 2).sum())
+
+    def bases(self) -> list[_Base]:
+        """The map of every changed input, projected out."""
+        if self._bases is None:
+            bank = self.search.bank
+            flat = bank.replaced.transpose(1, 0, 2).reshape(self.size, -1)
+            white = self.whiten(flat).reshape(self.size, len(bank.inputs), -1)
+            self._bases = [self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)]
+        return self._bases
+
+    def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
+        blocks = [self.beside]
+        if known is not None and not known.all():
+            blocks.append(self.whiten(singled_out(~known)))
+        q = orthonormal(*blocks, design)
+        columns = self._columns if candidate is None else self.whole
+        cross, c = q.T @ columns, q.T @ self.target
+        energy = float(c @ c)
+        gain = 0.0
+        if candidate is not None:
+            plain = orthonormal(*blocks, self.map)
+            gain = energy - float(((plain.T @ self.target) ** 2).sum())
+        gram = (self._gram if candidate is None else self._whole_gram) - cross.T @ cross
+        return _Base(candidate, gain, gram, columns.T @ self.target - cross.T @ c)
+
+    @cached_property
+    def _gram(self) -> Array:
+        return np.asarray(self._columns.T @ self._columns)
+
+    @cached_property
+    def _whole_gram(self) -> Array:
+        return np.asarray(self.whole.T @ self.whole)
+
+    def single(self) -> Iterator[Point]:
+        """All models of one candidate."""
+        yield from self.added()
+        for base in self.bases():
+            assert base.candidate is not None
+            yield Point((base.candidate,), base.gain)
+
+    def added(self) -> Iterator[Point]:
+        """Those models of one candidate that leave the map's input as it is."""
+        yield from self._on(self.base, ())
+
+    def pairs(self) -> Iterator[Point]:
+        """All models of two candidates of which at most one changes the input."""
+        for candidate, at in self.plain:
+            taken = _take(self.base, at, self._shares[at])
+            if taken is not None:
+                yield from self._on(taken, (candidate,))
+        for base in self.bases():
+            assert base.candidate is not None
+            yield from self._on(base, (base.candidate,))
+
+    def _gain(self, base: _Base, at: slice, before: Array) -> float:
+        """What one column or two add; 0 where they have nothing of their own, or no size that is believed."""
+        own, a = base.gram[at, at], base.a[at]
+        if a.size == 1:
+            if own[0, 0] <= _INDEPENDENT * before[0]:
+                return 0.0
+            weights = a / own[0, 0]
+        else:
+            det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
+            if det <= _INDEPENDENT * before[0] * before[1]:
+                return 0.0
+            weights = (
+                np.array([own[1, 1] * a[0] - own[0, 1] * a[1], own[0, 0] * a[1] - own[0, 1] * a[0]]) / det
+            )
+        if float(((self._shares[at] * weights) ** 2).sum()) > 1.0:
+            return 0.0
+        if base.taken is not None and not base.taken.allows(at, weights):
+            return 0.0
+        return float(a @ weights)
+
+    def _on(self, base: _Base, members: CauseSet) -> Iterator[Point]:
+        """Every candidate with columns of its own, added to what `base` holds already."""
+        before = np.diag(self._gram)
+        for candidate, at in self.plain:
+            gain = self._gain(base, at, before[at])
+            yield Point((*members, candidate), base.gain + gain)
+        for candidate, at in self.random:
+            gain = float(variance_ratio_of(base.gram[at, at], base.a[at], float(before[at].max()))[0])
+            yield Point((*members, candidate), base.gain + gain)
+
+
+def _take(base: _Base, at: slice, shares: Array) -> _Base | None:
+    """`base` with further columns projected out; None if they have nothing of their own."""
+    own = base.gram[at, at]
+    values, vectors = np.linalg.eigh(own)
+    if values[0] <= _INDEPENDENT * max(float(values[-1]), 1e-3):
+        return None
+    half = vectors / np.sqrt(values)
+    cross, c = half.T @ base.gram[at], half.T @ base.a[at]
+    taken = _Taken(half @ c, half @ cross, shares)
+    return _Base(
+        base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c, taken
+    )

@@ -1,1 +1,0 @@
-"""Stage 2: covariance of noise: its colours, what a unit declares, whitening."""

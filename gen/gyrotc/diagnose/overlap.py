@@ -1,0 +1,50 @@
+"""What mimics what: from which signal-to-noise ratio on a cause is told from its rivals."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.orthonormal import orthonormal
+from .gains import Gains
+from .refine import Refined
+
+__all__ = ["overlap"]
+
+Array = NDArray[np.float64]
+
+_TELLING = 10.0  # d² of the part that the rival cannot mimic: odds of about e^5 for the right one (docs/diagnosis.md)
+_LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
+
+
+def overlap(gains: Gains, cause: Refined, rivals: list[str]) -> dict[str, float]:
+    """d from which a cause can be told from each rival: √(10/(1 − R²)), R² what the rival can mimic of it."""
+    search = gains.search
+    total = gains.whiten(_fitted(gains, cause))
+    own = total - gains.map_q @ (gains.map_q.T @ total)
+    energy = float(own @ own)
+    out = {}
+    for rival in rivals:
+        best = 0.0
+        for candidate, at in (*gains.plain, *gains.random):
+            if candidate.id == rival:
+                best = max(best, _explained(gains.plain_columns(at), own))
+        for base in search.bank.inputs:
+            if base.id == rival:
+                best = max(best, 1.0 - gains.rest_after(base, total) / energy)
+        out[rival] = float(np.sqrt(_TELLING / max(1.0 - best, _LEAST)))
+    return out
+
+
+def _explained(columns: Array, target: Array) -> float:
+    """Share of the energy of `target`, shape (N,), that lies in the span of columns, shape (N, k)."""
+    return float(((orthonormal(columns).T @ target) ** 2).sum() / (target @ target))
+
+
+def _fitted(gains: Gains, cause: Refined) -> Array:
+    """Map and cause as fitted, without noise, deg/h."""
+    bank = gains.search.bank
+    if cause.candidate.role == "input":
+        return np.asarray(cause.columns @ np.linalg.lstsq(cause.columns, gains.search.y, rcond=1e-9)[0])
+    rest = gains.search.y - cause.contribution
+    return np.asarray(bank.map @ (bank.map.T @ rest) + cause.contribution)

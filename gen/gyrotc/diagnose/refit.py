@@ -1,0 +1,343 @@
+"""Runs as the target would see them, with the terms' corrections in force; fits and scores on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..causes import CATALOGUE
+from ..causes.base import Cause, Scene
+from ..common.metrics import Averages, average
+from ..recordings.records import Dataset, Run
+from ..target.recursion import Course, CourseChannel, TermOutcome
+from ..train.bumps import Bumps, find_bumps
+from ..train.channels import channel_shown
+from ..train.data import TrainingData, cleaned, joined, scaling_of
+from ..train.evidence import TrainingFailed, fit_process
+from ..train.fitting import FrontEnd, samples_of
+from ..train.methods import fit
+from ..train.result import Fit, predict
+from ..train.samples import blocks_since_power_on
+from ..train.simple import without_rate
+from .overtones import overtones_of
+from .refine import Refined
+
+__all__ = [
+    "MOST_TERMS",
+    "Effect",
+    "Played",
+    "added_range",
+    "completed",
+    "fit_extended",
+    "known",
+    "play_runs",
+    "samples",
+    "scored_means",
+    "terms_of",
+]
+
+Array = NDArray[np.float64]
+
+MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
+_LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
+_RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A cause with its fitted parameters, as the replay applies it; with a finer map's bumps, a wave's overtones."""
+
+    id: str
+    values: dict[str, float]
+    channel: str | None = None
+    bumps: Bumps | None = None
+    overtones: tuple[Effect, ...] = ()
+
+    @staticmethod
+    def of(cause: Refined) -> Effect:
+        """The effect with the middle of every interval."""
+        values = {name: interval.value for name, interval in cause.parameters.items()}
+        return Effect(cause.candidate.id, cause.candidate.values | values, cause.candidate.channel)
+
+    @property
+    def term(self) -> Cause:
+        """What the catalogue knows of the cause."""
+        return CATALOGUE[self.id]
+
+
+@dataclass(frozen=True)
+class Played:
+    """One run after the front end.
+
+    Attributes:
+        data: Training samples (used blocks only); inputs are those in force.
+        in_force: For each of them, the correction in force that the map made, shape (n,).
+        course: Every correction of the run as terms see it.
+        slope: C per block, of every correction.
+        begins_s: Where means of the run begin, s.
+        on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
+        day: Days since the first run, or None.
+        channels: The channels at every correction.
+        block_s: Length of a block, s.
+        environment: Environment as the data set names it.
+    """
+
+    data: TrainingData
+    in_force: NDArray[np.int64]
+    course: Course
+    slope: Array
+    begins_s: float | None
+    on_s: Array
+    day: float | None
+    channels: Mapping[str, CourseChannel]
+    block_s: float
+    environment: str
+    _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
+
+    def outcome(self, effect: Effect) -> TermOutcome:
+        """What a term makes of every correction; the last few are remembered."""
+        for known, outcome in self._outcomes:
+            if known == effect:
+                return outcome
+        table = effect.term.table
+        assert table is not None
+        x = self.course.temperature
+        made = TermOutcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
+        channel = None if effect.channel is None else self.channels[effect.channel]
+        table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
+        self._outcomes[:0] = [(effect, made)]
+        del self._outcomes[_REMEMBERED:]
+        return made
+
+
+_REMEMBERED = 8  # outcomes of terms for each run: those of two full tables
+
+
+def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
+    """Front end over all runs."""
+    first = min((r.started for r in dataset.runs if r.started is not None), default=None)
+    return [_played(dataset, run, k, front, first) for k, run in enumerate(runs)]
+
+
+def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
+    blocks, rows = front.blocks(run), run.rows()
+    data = samples_of(blocks, front.block_s, number)
+    before = blocks_since_power_on(rows, run, front.block_s)
+    course = blocks.stream.course(blocks.steps, blocks.settings.samples_per_block, before)
+    day = None
+    if run.started is not None and first is not None:
+        day = (run.started - first).total_seconds() / 86400.0
+    return Played(
+        data=data,
+        in_force=blocks.in_force[blocks.used],
+        course=replace(course, temperature=course.temperature.astype(np.float64)),
+        slope=blocks.steps.slope.astype(np.float64),
+        begins_s=blocks.begins_s,
+        on_s=data.time_s - (run.power_on_s or 0.0),
+        day=day,
+        channels={name: channel_shown(blocks, rows.channels[name]) for name in dataset.channels},
+        block_s=front.block_s,
+        environment=run.environment,
+    )
+
+
+def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
+    """Training samples with the inputs that the effects give and their additions taken off.
+
+    Where the input of a mended recording is not known (`known`) it is no number.
+    """
+    data, at = run.data, run.in_force
+    temperature, slope = data.temperature_c, data.slope_c_per_min
+    added = np.zeros(at.size)
+    for effect in terms_of(effects):
+        term = effect.term
+        if term.table is not None:
+            made = run.outcome(effect)
+            added = added + made.added[at]
+            if term.kind == "input":
+                temperature, slope = made.temperature[at], made.slope[at] * (60.0 / run.block_s)
+        elif term.mended is not None:
+            temperature, slope = term.mended(data.time_s, temperature, slope, effect.values)
+        elif term.kind == "add":
+            added = added + _simulated(run, effect)
+    for effect in effects:  # of the temperature that the map sees
+        if effect.bumps is not None:
+            added = added + effect.bumps(temperature)
+    return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
+
+
+def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
+    """Samples whose input is known beside the effects, shape (n,): a late record does not say how a run ends."""
+    if not any(effect.term.mended for effect in effects):
+        return np.ones(run.in_force.size, dtype=bool)
+    return np.isfinite(samples(run, effects).temperature_c)
+
+
+def _chosen(
+    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+) -> TrainingData:
+    """Samples of all runs beside the effects: those `kept` (default: all) whose input is known."""
+    masks = [known(run, effects) for run in runs]
+    if kept is not None:
+        masks = [mask & k for mask, k in zip(masks, kept, strict=True)]
+    return joined([samples(run, effects).select(m) for run, m in zip(runs, masks, strict=True) if m.any()])
+
+
+def completed(
+    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
+) -> list[Effect]:
+    """The effects, with the overtones of a wave and the bumps of a finer map as samples show them.
+
+    Each is found beside the other effects, bumps last, on the samples `kept` (default: all).
+    """
+    out = list(effects)
+    waves = [k for k, e in enumerate(out) if e.term.overtone is not None]
+    finer = [k for k, e in enumerate(out) if e.term.finer_map]
+    for k in [*waves, *finer]:
+        effect = out[k]
+        data = cleaned(_chosen(runs, [e for e in out if e is not effect], kept))
+        try:
+            if effect.term.finer_map:
+                out[k] = replace(effect, bumps=find_bumps(data, scaling_of(data)))
+            else:
+                found = overtones_of(data, effect.term, effect.values)
+                room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
+                out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
+        except TrainingFailed:
+            continue
+    return out
+
+
+def terms_of(effects: Sequence[Effect]) -> list[Effect]:
+    """The effects, each with its overtones behind it: what stands in a table."""
+    return [one for effect in effects for one in (effect, *effect.overtones)]
+
+
+def added_range(
+    runs: Sequence[Played], effects: Sequence[Effect], beside: Array | float = 0.0
+) -> list[float]:
+    """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h.
+
+    Args:
+        beside: What else was added at each sample of all runs, shape (n,).
+    """
+    held = [effect for effect in terms_of(effects) if effect.term.table is not None]
+    none = [np.zeros(run.in_force.size) for run in runs]
+    added = np.concatenate(
+        [
+            sum((run.outcome(e).added[run.in_force] for e in held), n)
+            for run, n in zip(runs, none, strict=True)
+        ]
+    )
+    both = np.append(added + beside, 0.0)
+    return [float(both.min()), float(both.max())]
+
+
+def _simulated(run: Played, effect: Effect) -> Array:
+    """What a cause that no table holds adds, as the simulation has it, deg/h."""
+    seen = run.data.temperature_c
+    scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
+    assert effect.term.bias is not None
+    return effect.term.bias(scene, effect.values, np.random.default_rng(0))
+
+
+def fit_extended(
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    arguments: dict[str, Any],
+    kept: Sequence[NDArray[np.bool_]] | None = None,
+    *,
+    rate: bool = True,
+) -> Fit:
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
+    data = _chosen(runs, effects, kept)
+    offsets = [e.values["std_dph"] for e in effects if e.term.kind == "random"]
+    if offsets:
+        data = levelled(data, max(offsets))
+    return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
+
+
+def levelled(data: TrainingData, std_dph: float) -> TrainingData:
+    """Samples without the offset of each run, as far as a map of the evidence process beside them says what it is.
+
+    Args:
+        data: Samples of one run or more.
+        std_dph: Standard deviation of the offsets, deg/h.
+    """
+    out = data
+    _, index = np.unique(data.run, return_inverse=True)
+    count = np.bincount(index)
+    for _ in range(_LEVELLINGS):
+        try:
+            samples = cleaned(out)
+            process = fit_process(samples, scaling_of(samples))
+        except TrainingFailed:
+            break
+        at = scaling_of(samples).normalise(data.temperature_c, data.slope_c_per_min)
+        left = data.bias_dph - process.mean_dph(*at)
+        share = std_dph**2 / (std_dph**2 + float(np.var(left)) / count)
+        offset = share * np.bincount(index, left) / count
+        out = replace(data, bias_dph=data.bias_dph - (offset - offset.mean())[index])
+    return out
+
+
+def _re_zeroed(rest: Array, time_s: Array, effects: Sequence[Effect]) -> Array:
+    """Residuals after a rest at their start: its mean counts as far as the offsets are larger than its noise."""
+    variance = max(e.values["std_dph"] for e in effects if e.term.kind == "random") ** 2
+    first = rest[time_s < time_s[0] + _RE_ZERO_S]
+    noise = float(np.mean(np.diff(rest) ** 2)) / 2.0 / len(first) if len(rest) > 1 else 0.0
+    return np.asarray(rest - first.mean() * variance / (variance + noise))
+
+
+def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
+    """A map of T alone, valid over the rates of the samples."""
+    slope = data.slope_c_per_min
+    fitted = fit(replace(data, slope_c_per_min=np.zeros_like(slope)), **arguments)
+    flat = [without_rate(one) for one in fitted.networks]
+    scaling = replace(
+        fitted.scaling,
+        half_range_c_per_min=max(float(np.abs(slope).max()), fitted.scaling.half_range_c_per_min),
+        slope_c_per_min=(float(slope.min()), float(slope.max())),
+    )
+    return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
+
+
+def scored_means(
+    fitted: Fit,
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    average_s: float,
+    scored: Sequence[NDArray[np.bool_]],
+) -> list[Averages]:
+    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out.
+
+    Samples whose input is not known beside the effects are not scored.
+    """
+    out = []
+    for run, asked in zip(runs, scored, strict=True):
+        seen = known(run, effects)
+        chosen = asked & seen
+        if not chosen.any():
+            continue
+        data, rest = samples(run, effects).select(seen), np.zeros(seen.size)
+        left = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
+        if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
+            left = _re_zeroed(left, data.time_s, effects)
+        rest[seen] = left
+        out.append(
+            average(
+                run.data.time_s,
+                run.data.temperature_c,
+                run.data.bias_dph,
+                rest,
+                scored=chosen,
+                average_s=max(average_s, run.block_s),
+                from_s=run.begins_s,
+            )
+        )
+    return out

@@ -1,0 +1,246 @@
+"""The bank: signatures of all candidates as block means, and their inner products under every noise colour.
+
+It depends on the temperature records alone, not on the rates, and is kept on disk by their hash.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..target.operators import first_order, play
+from .alternatives import shapes_of
+from .blocks import Records
+from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
+from .changed_input import changed_inputs
+from .colours import COLOURS
+from .static_map import LEVELS, MapBasis, fine_columns, make_basis
+from .whitener import Whitener
+
+__all__ = ["Alternative", "Signature", "SignatureBank", "build", "direction_of"]
+
+Array = NDArray[np.float64]
+
+_DICTIONARY_LAGS_S = (
+    150.0,
+    400.0,
+    1000.0,
+    2500.0,
+    6000.0,
+)  # a factor 2.5 apart, over what a day of recordings shows
+# Of the texture; of the play that tells the direction; of its memory.
+_TEXTURE_C, _DIRECTION_C, _MODULATING_S = 8.0, 3.0, 700.0
+_COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
+_SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A candidate and where its columns lie in `SignatureBank.signatures`."""
+
+    candidate: Candidate
+    columns: slice
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A shape that no cause has (`alternatives.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
+
+    name: str
+    parameters: int
+    common: bool
+    columns: slice
+
+
+@dataclass(frozen=True)
+class SignatureBank:
+    """Everything of the search that does not depend on the rates.
+
+    Attributes:
+        basis, map: The static map and its block means, shape (N, m), orthonormal.
+        signatures: Columns of all groups, map projected out, shape (N, K); single columns have norm 1.
+        scale: Norm that a column of `signatures` had before, shape (K,).
+        on_map: What was taken off the columns, in map functions and over `scale`, shape (m, K).
+        groups: Candidates with columns of their own.
+        inputs: Candidates that change the map's input.
+        replaced: Map of the changed inputs, shape (len(inputs), N, m).
+        known: Blocks where the changed inputs are known, shape (len(inputs), N).
+        common: From signatures to their principal directions, weighted by how much they share, shape (K, p).
+        grams: Inner products of (map, signatures) under each colour, shape (len(COLOURS), m + K, m + K).
+        log_dets: log det of each colour's covariance.
+        untestable: Why a cause cannot be tested, by id.
+        finer: Functions of the next finer map that this one lacks, shape (N, q).
+        alternatives, alternative_groups: Shapes that no cause has, shape (N, Q), columns of norm 1 or groups of
+            equal scale.
+    """
+
+    basis: MapBasis
+    map: Array
+    signatures: Array
+    scale: Array
+    on_map: Array
+    groups: tuple[Signature, ...]
+    inputs: tuple[Candidate, ...]
+    replaced: Array
+    known: NDArray[np.bool_]
+    common: Array
+    grams: Array
+    log_dets: Array
+    untestable: dict[str, str]
+    finer: Array
+    alternatives: Array
+    alternative_groups: tuple[Alternative, ...]
+
+    def weighted(self, records: Records, sigma: Array) -> SignatureBank:
+        """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
+        grams, log_dets = _grams(records, self.map, self.signatures, sigma)
+        return replace(self, grams=grams, log_dets=log_dets)
+
+
+def build(records: Records, level: int) -> SignatureBank:
+    """Computes the bank of the map of a level (`baseline.LEVELS`)."""
+    basis, static = make_basis(records, level)
+    groups, columns, untestable = _columns(records)
+    raw = np.column_stack(columns)
+    on_map = static.T @ raw
+    rest = raw - static @ on_map
+    scale = _scale(rest, raw, groups)
+    signatures = rest / scale
+    inputs, replaced, known = changed_inputs(records, basis)
+    grams, log_dets = _grams(records, static, signatures, None)
+    alternatives, alternative_groups = _alternatives(records)
+    return SignatureBank(
+        basis=basis,
+        map=static,
+        signatures=signatures,
+        scale=scale,
+        on_map=on_map / scale,
+        groups=tuple(groups),
+        inputs=tuple(inputs),
+        replaced=replaced,
+        known=known,
+        common=_common(signatures),
+        grams=grams,
+        log_dets=log_dets,
+        untestable=untestable,
+        finer=_finer(records, static, level),
+        alternatives=alternatives,
+        alternative_groups=alternative_groups,
+    )
+
+
+def _scale(rest: Array, raw: Array, groups: Sequence[Signature]) -> Array:
+    """Norm of every column beside the map; one for all columns of a group of random amounts."""
+    scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
+    for group in groups:
+        if group.candidate.role == "variance":
+            scale[group.columns] = scale[group.columns].max()
+    return np.asarray(scale)
+
+
+def _common(signatures: Array) -> Array:
+    """From signatures to their principal directions, shape (K, p)."""
+    _, size, right = np.linalg.svd(signatures, full_matrices=False)
+    return np.asarray(right[size > _COMMON * size[0]].T)
+
+
+def _alternatives(records: Records) -> tuple[Array, tuple[Alternative, ...]]:
+    """Shapes that no cause has, side by side."""
+    columns, groups = [], []
+    at = 0
+    for shape in shapes_of(records):
+        size = np.linalg.norm(shape.columns, axis=0)
+        if size.max() <= 0.0:
+            continue
+        columns.append(shape.columns / (size.max() if shape.common else np.maximum(size, 1e-300)))
+        end = at + columns[-1].shape[1]
+        groups.append(Alternative(shape.name, shape.parameters, shape.common, slice(at, end)))
+        at = end
+    return np.column_stack(columns), tuple(groups)
+
+
+def _grams(records: Records, static: Array, signatures: Array, sigma: Array | None) -> tuple[Array, Array]:
+    """Inner products and log determinants under every colour."""
+    both = np.column_stack([static, signatures])
+    grams, log_dets = [], []
+    for colour in COLOURS:
+        whiten = Whitener(colour, records.kept, records.block_s, sigma)
+        white = whiten(both)
+        grams.append(white.T @ white)
+        log_dets.append(whiten.log_det)
+    return np.array(grams), np.array(log_dets)
+
+
+def _finer(records: Records, static: Array, level: int) -> Array:
+    """Orthonormal functions of the next level that are not in the map."""
+    if level + 1 >= len(LEVELS):
+        return np.zeros((len(static), 0))
+    finer = make_basis(records, level + 1)[1]
+    left, size, _ = np.linalg.svd(finer - static @ (static.T @ finer), full_matrices=False)
+    return np.asarray(left[:, size > 0.1])
+
+
+def _columns(records: Records) -> tuple[list[Signature], list[Array], dict[str, str]]:
+    """Columns of every candidate that adds columns, and of the dictionary of the lack-of-fit test."""
+    reach = reach_of(records)
+    groups: list[Signature] = []
+    columns: list[Array] = []
+    untestable: dict[str, str] = {}
+    at = 0
+
+    def add(candidate: Candidate, block: Array) -> None:
+        nonlocal at
+        groups.append(Signature(candidate, slice(at, at + block.shape[1])))
+        columns.append(block)
+        at += block.shape[1]
+
+    for cause, term in diagnosed().items():
+        if term.kind == "input" or term.needs.channel:
+            continue
+        reason = testable(records, cause)
+        if reason:
+            untestable[cause] = reason
+            continue
+        for values in searched(cause).grid(reach):
+            if term.kind == "static":
+                add(Candidate(cause, {}, "variance"), fine_columns(records))
+            else:
+                role: Role = "variance" if term.kind == "random" else "columns"
+                add(Candidate(cause, dict(values), role), columns_of(records, cause, values))
+    add(Candidate("structure", {}, "structure"), _dictionary(records))
+    return groups, columns, untestable
+
+
+def _dictionary(records: Records) -> Array:
+    """Shapes that no cause has, for the lack-of-fit test.
+
+    Memories times T and rectified; texture over T that differs by direction, or that a memory modulates.
+    """
+    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    out = []
+    for tau in _DICTIONARY_LAGS_S:
+        late = _late(records, tau)[:, 0]
+        out += [late * (t - t.mean()), np.abs(late)]
+    nodes = np.arange(t.min(), t.max() + _TEXTURE_C, _TEXTURE_C)
+    texture = np.maximum(0.0, 1.0 - np.abs(t[:, None] - nodes) / _TEXTURE_C)
+    direction = direction_of(records, _DIRECTION_C)
+    memory = _late(records, _MODULATING_S)
+    out += list((texture * direction).T) + list((texture * memory).T)
+    if len(records.runs) < 3:
+        out += list(np.eye(len(records.runs)).repeat([k.size for k in records.kept], axis=1))
+    return np.column_stack(out)
+
+
+def _late(records: Records, tau_s: float) -> Array:
+    """How much a first-order memory of the temperature differs from it, C, shape (N, 1)."""
+    return records.columns(
+        lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None]
+    )
+
+
+def direction_of(records: Records, width_c: float) -> Array:
+    """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
+    return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])

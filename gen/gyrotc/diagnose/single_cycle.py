@@ -1,0 +1,285 @@
+"""One or two recordings: memory of the temperature from a single chamber cycle, beside a map of T alone.
+
+Where every temperature is visited only two or three times, each time at another rate, a map of (T, dT/dt)
+can imitate any memory in the runs that it is fitted to and fails on the next. So the map has no dT/dt here,
+and one or two states stand beside it, by an information criterion that counts independent blocks: first-order
+states, which every package has, unless plays are clearly better. What explains the recordings as well is told.
+
+A static dT/dt, f(T) + g(T) dT/dt and flows that saturate, is a rival like any other: memory is named only where it
+is clearly better than every one of them, and never where the temperature does not turn. States that are not named may
+still be a good correction: that is for the unseen stretches of history to say (`extend`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from .. import causes
+from ..common.quantiles import CHI2_95_ONE, NORMAL_95
+from ..train.spans import turning_points
+from .attribution import Attribution
+from .blocks import Record, Records
+from .candidates import Candidate, columns_of
+from .cycle_fits import RATES, CycleFits, memories
+from .intervals import Interval
+from .refine import Refined
+from .rivals import EQUIVALENT, Rival
+
+__all__ = ["Cycle", "Static", "Tried", "cycle_of", "is_single_cycle"]
+
+Array = NDArray[np.float64]
+
+_FEW_PASSES = 3  # of any temperature, in all runs together
+_UNCORRELATED = 0.05  # about what chance makes of a few hundred blocks
+_PRICE = 2  # parameters of a state: time constant (or width) and amplitude
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A set of states at its best values.
+
+    Attributes:
+        members: The states.
+        rms_dph: What map and states leave.
+        criterion: Information criterion less that of the map alone; smaller is better.
+        intervals: 95 % interval of every state's parameter.
+        resolved: Whether every interval ends inside what the recordings can show.
+    """
+
+    members: tuple[Candidate, ...]
+    rms_dph: float
+    criterion: float
+    intervals: tuple[Interval, ...]
+    resolved: bool
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        return tuple(m.id for m in self.members)
+
+
+@dataclass(frozen=True)
+class Static:
+    """A map of T with products of T and dT/dt beside it.
+
+    Attributes:
+        powers: Of T and dT/dt.
+        rms_dph: What it leaves.
+        criterion: As of `Tried`.
+    """
+
+    powers: tuple[tuple[int, int], ...]
+    rms_dph: float
+    criterion: float
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What a cycle tells.
+
+    Attributes:
+        tried: Every kind of one and of two states at its best, best first.
+        static: Every static dependence on dT/dt, best first.
+        turns: How often the temperature turns.
+        chosen: The best states; None where none is better than the map alone, or the temperature never turns.
+        states: What they add.
+        rivals: Causes that would explain the recordings as well.
+        rms_dph: What the map of T alone leaves.
+        p_value: The p-value of the chosen states together.
+        residual: What the map of T alone leaves, deg/h, shape (N,).
+        explained: The chosen states' part of it, shape (N,).
+    """
+
+    tried: tuple[Tried, ...]
+    static: tuple[Static, ...]
+    turns: int
+    chosen: Tried | None
+    states: tuple[Refined, ...]
+    rivals: tuple[Rival, ...]
+    rms_dph: float
+    p_value: float
+    residual: Array
+    explained: Array
+
+    @property
+    def causes(self) -> tuple[Refined, ...]:
+        """The states, where they are named: clearly better than the map of T and than any static dT/dt."""
+        return self.states if self.chosen is not None and self.lead >= EQUIVALENT else ()
+
+    @property
+    def lead(self) -> float:
+        """By how much the criterion of the chosen states is better than that of the best without memory."""
+        assert self.chosen is not None
+        return min(0.0, self.static[0].criterion) - self.chosen.criterion
+
+    @property
+    def not_testable(self) -> str:
+        """Why memory can be neither named nor ruled out here; empty where it can."""
+        if self.turns == 0:
+            return (
+                "the temperature never turns, so that a memory of it cannot be told from a map of T: "
+                "record the way back, too"
+            )
+        if self.chosen is None or self.causes:
+            return ""
+        return (
+            f"a static dependence on dT/dt explains this cycle as well (memory leads by {self.lead:.1f} in twice the "
+            f"log-likelihood, {EQUIVALENT:g} are needed): record the same cycle at another rate"
+        )
+
+    def attribution(self, before: Attribution) -> Attribution:
+        """The attribution with this cycle's causes in place of those of the search."""
+        if self.chosen is None or not self.causes:
+            return replace(before, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
+        share = 1.0 - (self.chosen.rms_dph / self.rms_dph) ** 2
+        count = len(self.causes)
+        return replace(
+            before,
+            causes=self.causes,
+            p_values=(self.p_value,) * count,
+            rivals=(self.rivals, *((),) * (count - 1)),
+            probabilities=(),
+            left=replace(before.left, share=share),
+            wide=None,
+        )
+
+
+def is_single_cycle(records: Records) -> bool:
+    """Whether no temperature is passed more than three times: memory and dT/dt are then one in a map of both."""
+    temperatures = [r.history.temperature_c[r.usable] for r in records.runs]
+    levels = np.quantile(np.concatenate(temperatures), [0.2, 0.35, 0.5, 0.65, 0.8])
+    passes = [sum(np.count_nonzero(np.diff(t > level)) for t in temperatures) for level in levels]
+    return len(records.runs) < _FEW_PASSES and bool(max(passes) <= _FEW_PASSES)
+
+
+def cycle_of(records: Records) -> Cycle:
+    """Looks for one or two states in a single cycle, and for a static dT/dt in their place."""
+    fits = CycleFits(records)
+    states = memories()
+    kinds = [(k,) for k in states] + list(itertools.combinations_with_replacement(states, 2))
+    best = [fits.polished(_members(fits, k)) for k in kinds]
+    left = [fits.left(members) for members in best] + [fits.without_rate(powers) for powers in RATES]
+    effective = _effective_size(records, min(left, key=lambda e: float(e @ e)))
+    tried = tuple(sorted((_tried(fits, m, effective) for m in best), key=lambda t: t.criterion))
+    static = tuple(sorted((_static(fits, p, effective) for p in RATES), key=lambda t: t.criterion))
+    turns = sum(len(_turns(run)) for run in records.runs)
+    rms = float(np.sqrt(np.mean(fits.rest**2)))
+    if tried[0].criterion >= 0.0 or turns == 0:
+        return Cycle(tried, static, turns, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
+    near = [t for t in tried if t.criterion - tried[0].criterion <= EQUIVALENT]
+    chosen = next((t for t in near if not _rare(t)), tried[0])
+    others = [t for t in near if t is not chosen and _rare(t) and not _rare(chosen)]
+    rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
+    chosen = _averaged(fits, chosen, effective) if chosen.resolved else chosen
+    ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
+    p_value = max(float(chdtrc(_PRICE * len(chosen.members), max(ratio, 0.0))), 1e-300)
+    refined = tuple(_refined(fits, chosen, effective))
+    explained = fits.rest - fits.left(chosen.members)
+    return Cycle(tried, static, turns, chosen, refined, rivals, rms, p_value, fits.rest, explained)
+
+
+def _turns(run: Record) -> list[float]:
+    """Times at which the temperature of the rows that count turns, s."""
+    return turning_points(run.history.time_s[run.usable], run.history.temperature_c[run.usable])
+
+
+def _static(fits: CycleFits, powers: tuple[tuple[int, int], ...], effective: float) -> Static:
+    left = float((fits.without_rate(powers) ** 2).sum())
+    total = float(fits.rest @ fits.rest)
+    criterion = effective * float(np.log(left / total)) + len(powers) * float(np.log(effective))
+    return Static(powers, float(np.sqrt(left / fits.rest.size)), criterion)
+
+
+def _rare(tried: Tried) -> list[str]:
+    """Kinds of a set that not every package has."""
+    states = memories()
+    return [kind for kind in tried.kinds if not states[kind].usual]
+
+
+def _members(fits: CycleFits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:
+    energy = fits.energies(kinds)
+    at = np.unravel_index(int(energy.argmax()), energy.shape)
+    return tuple(fits.grid[k][int(i)] for k, i in zip(kinds, at, strict=True))
+
+
+def _effective_size(records: Records, residual: Array) -> float:
+    """Number of independent blocks: n/(1 + 2 Σ ρ), over the correlations of blocks until they are noise.
+
+    So it hardly depends on how long a block is, as it would were the correlation of neighbours all that counted.
+    """
+    total, spans = float(residual @ residual), records.spans()
+    correlated = 1.0
+    for lag in range(1, max(s.stop - s.start for s in spans)):
+        rho = sum(float(residual[s][lag:] @ residual[s][:-lag]) for s in spans) / total
+        if rho <= _UNCORRELATED:
+            break
+        correlated += 2.0 * rho
+    return float(residual.size / correlated)
+
+
+def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) -> Tried:
+    kinds = tuple(m.id for m in members)
+    total = float(fits.rest @ fits.rest)
+    energy = fits.energies(kinds)
+    if len(kinds) == 2 and kinds[0] == kinds[1]:
+        energy = energy + energy.T
+    least = max(float((fits.left(members) ** 2).sum()), 1e-12 * total)
+    left = np.maximum(total - energy, least)
+    deviance = effective * np.log(left / least)
+    intervals, resolved = [], True
+    for axis, member in enumerate(members):
+        profile = deviance.min(axis=tuple(k for k in range(deviance.ndim) if k != axis))
+        inside = np.flatnonzero(profile <= max(CHI2_95_ONE, float(profile.min())))
+        resolved = resolved and bool(inside[0] > 0 and inside[-1] < profile.size - 1)
+        name = next(iter(member.values))
+        values = [c.values[name] for c in fits.grid[member.id]]
+        value = member.values[name]
+        intervals.append(Interval(value, min(values[inside[0]], value), max(values[inside[-1]], value)))
+    price = _PRICE * len(members) * float(np.log(effective))
+    criterion = effective * float(np.log(least / total)) + price
+    return Tried(members, float(np.sqrt(least / fits.rest.size)), criterion, tuple(intervals), resolved)
+
+
+def _averaged(fits: CycleFits, chosen: Tried, effective: float) -> Tried:
+    """The states at the mean of their parameters' logarithms over the likelihood, in place of its top.
+
+    The top wanders over what explains the cycle equally well. Where an interval reaches the end of what the recordings
+    can show, the mean hangs on that end, and the top stays.
+    """
+    energy = fits.energies(chosen.kinds)
+    left = np.maximum(float(fits.rest @ fits.rest) - energy, 1e-300)
+    weight = np.where(energy > 0.0, np.exp(-0.5 * effective * np.log(left / left.min())), 0.0)
+    members, intervals = [], []
+    for axis, (member, interval) in enumerate(zip(chosen.members, chosen.intervals, strict=True)):
+        name = next(iter(member.values))
+        over = weight.sum(axis=tuple(k for k in range(weight.ndim) if k != axis))
+        logs = np.log([c.values[name] for c in fits.grid[member.id]])
+        value = float(np.exp(over @ logs / over.sum()))
+        members.append(replace(member, values={name: value}))
+        intervals.append(Interval(value, min(interval.low, value), max(interval.high, value)))
+    rms = float(np.sqrt(np.mean(fits.left(tuple(members)) ** 2)))
+    return replace(chosen, members=tuple(members), intervals=tuple(intervals), rms_dph=rms)
+
+
+def _refined(fits: CycleFits, chosen: Tried, effective: float) -> Iterator[Refined]:
+    """The states with amplitudes, whose intervals hold at the states' best parameters."""
+    raw = [columns_of(fits.records, m.id, m.values) for m in chosen.members]
+    design = np.column_stack([fits.static, *raw])
+    size = np.linalg.norm(design, axis=0)
+    inverse = np.linalg.pinv(design / size)
+    weights = inverse @ fits.y / size
+    spread = np.sqrt((inverse**2).sum(axis=1) * fits.y.size / effective) * chosen.rms_dph / size
+    first = fits.static.shape[1]
+    for k, (member, interval) in enumerate(zip(chosen.members, chosen.intervals, strict=True)):
+        rule = causes.CATALOGUE[member.id].amplitudes
+        assert rule is not None
+        weight, half = float(weights[first + k]), NORMAL_95 * float(spread[first + k])
+        parameters = {next(iter(member.values)): interval}
+        for name, value in rule(np.array([weight])).items():
+            parameters[name] = Interval(value, value - half, value + half)
+        yield Refined(member, raw[k], None, parameters, raw[k][:, 0] * weight, None, None)

@@ -1,0 +1,109 @@
+"""The static map that diagnosis starts from: Gaussians over (T, dT/dt), and how fine they have to be.
+
+The basis is fixed before any memory is looked for, from where the recordings are in (T, dT/dt). A candidate
+that changes the map's input sees the same functions: equal flexibility for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .blocks import Records, centred_slope
+
+__all__ = ["LEVELS", "MapBasis", "fine_columns", "make_basis"]
+
+Array = NDArray[np.float64]
+
+LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3), (19, 8, 5), (28, 10, 5))
+"""Gaussians over T alone, and over T × dT/dt, from coarse to fine."""
+
+_KEEP = 3e-4  # singular values of the averaged basis below this share of the largest are dropped
+_FINE_C = 2.5  # spacing of the local functions that say whether the map is too coarse
+
+
+@dataclass(frozen=True)
+class MapBasis:
+    """Functions of (T, dT/dt), orthonormal over the recordings.
+
+    Attributes:
+        middle, half: Normalisation of T and dT/dt, C and C/min.
+        along: Centers over T, normalised, shape (a,), and their common width.
+        across: Centers over (T, dT/dt), shape (b, 2), and their widths.
+        mix: From raw functions to the basis, shape (3 + a + b, m).
+    """
+
+    middle: tuple[float, float]
+    half: tuple[float, float]
+    along: Array
+    along_width: float
+    across: Array
+    across_width: tuple[float, float]
+    mix: Array
+
+    def raw(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+        """Constant, linear and Gaussian functions, shape (n, 3 + a + b)."""
+        t = (temperature_c - self.middle[0]) / self.half[0]
+        r = (slope_c_per_min - self.middle[1]) / self.half[1]
+        along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
+        across = np.exp(
+            -(((t[:, None] - self.across[:, 0]) / self.across_width[0]) ** 2)
+            - ((r[:, None] - self.across[:, 1]) / self.across_width[1]) ** 2
+        )
+        return np.column_stack([np.ones_like(t), t, r, along, across])
+
+    def proportional(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+        """Functions of which dT/dt is a factor at most once, shape (n, 5 + a): no more of the rate than that."""
+        t = (temperature_c - self.middle[0]) / self.half[0]
+        r = (slope_c_per_min - self.middle[1]) / self.half[1]
+        along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
+        return np.column_stack([np.ones_like(t), t, r, t * r, t * t * r, along])
+
+    def __call__(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+        """The basis at rows, shape (n, m)."""
+        return np.asarray(self.raw(temperature_c, slope_c_per_min) @ self.mix)
+
+
+def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
+    """Basis of a level and its block means, shape (N, m) with orthonormal columns."""
+    n_t, n_a, n_r = LEVELS[level]
+    slopes = [centred_slope(run.history) for run in records.runs]
+    t = records.average([run.history.temperature_c for run in records.runs])
+    r = records.average(slopes)
+    middle, half = (
+        (0.5 * (t.min() + t.max()), 0.0),
+        (max(0.5 * float(np.ptp(t)), 1.0), max(float(abs(r).max()), 0.05)),
+    )
+    grid_t, grid_a, grid_r = np.linspace(-1, 1, n_t), np.linspace(-1, 1, n_a), np.linspace(-1, 1, n_r)
+    across = np.array([(a, b) for a in grid_a for b in grid_r])
+    raw = MapBasis(
+        middle=(float(middle[0]), 0.0),
+        half=half,
+        along=grid_t,
+        along_width=1.5 * 2.0 / (n_t - 1),
+        across=across,
+        across_width=(1.5 * 2.0 / (n_a - 1), 1.5 * 2.0 / (n_r - 1)),
+        mix=np.eye(3 + n_t + len(across)),
+    )
+    mean = records.average(
+        [raw(run.history.temperature_c, s) for run, s in zip(records.runs, slopes, strict=True)]
+    )
+    left, size, right = np.linalg.svd(mean, full_matrices=False)
+    keep = size > _KEEP * size[0]
+    mix = right[keep].T / size[keep]
+    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[
+        :, keep
+    ]
+
+
+def fine_columns(records: Records, spacing_c: float = _FINE_C) -> Array:
+    """Local functions of T over the recorded range, as block means, shape (N, k); none that is zero."""
+    low = min(float(r.history.temperature_c.min()) for r in records.runs)
+    high = max(float(r.history.temperature_c.max()) for r in records.runs)
+    nodes = np.arange(low, high + spacing_c, spacing_c)
+    columns = records.columns(
+        lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / spacing_c)
+    )
+    return columns[:, columns.max(axis=0) > 0.0]

@@ -1,0 +1,247 @@
+"""The catalogue of a fleet: every calibration of every gyro in SQLite, tables and models apart under their hashes.
+
+Calibrations are only ever added; a payload is written once and never changed. `docs/catalogue.md` documents the
+tables for other programs.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from .. import __version__
+from ..common.errors import GyrotcError, InputError
+from ..jobs.release import unit_of
+from ..model import Model, load_model
+from ..results.catalogue import CatalogueAnswer, Catalogued, CataloguedFile
+from ..results.fleet import FleetEntry
+from ..store.files import write_atomically
+from ..store.marker import sha256
+from ..store.opening import check_own, open_or_create
+from .entry import ENTRY
+
+__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter"]
+
+CATALOGUE = "catalogue"
+_FILE, _PAYLOADS = "catalogue.sqlite", "payloads"
+_EXPECTED = "a catalogue as gyrotc fleet wrote it"
+_APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
+_MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
+_BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
+_TOLD = 100  # calibrations of a whole catalogue: a screen or two
+
+SCHEMA = """
+CREATE TABLE calibration (
+  id            INTEGER PRIMARY KEY,
+  serial        TEXT NOT NULL,
+  axis          TEXT NOT NULL,            -- x, y, z; empty where the recordings have one rate
+  valid_from    TEXT,                     -- day of the calibration, ISO 8601; null: not stated
+  valid_until   TEXT,                     -- last day; null: until the next calibration
+  tag           TEXT NOT NULL DEFAULT '', -- withdrawn: may not be carried
+  status        TEXT NOT NULL,            -- done, failed
+  verdict       TEXT,                     -- PASS, CONDITIONAL PASS, FAIL; null without limits
+  model_hash    TEXT NOT NULL,
+  image_sha256  TEXT NOT NULL,            -- payload
+  model_sha256  TEXT NOT NULL,            -- payload
+  input_sha256  TEXT NOT NULL,            -- over recordings, options, limits and program
+  after_rms_dph REAL,
+  expanded_dph  REAL,                     -- U of the compensated bias
+  folder        TEXT NOT NULL,
+  UNIQUE (serial, axis, input_sha256)
+);
+CREATE TABLE recording (
+  calibration INTEGER NOT NULL REFERENCES calibration (id),
+  file        TEXT NOT NULL,
+  role        TEXT NOT NULL,
+  sha256      TEXT NOT NULL,
+  PRIMARY KEY (calibration, file, role, sha256)
+) WITHOUT ROWID;
+CREATE INDEX of_serial ON calibration (serial, axis, valid_from);
+"""
+
+_CARRIED = """
+SELECT * FROM calibration AS c
+WHERE serial = :serial AND valid_from <= :day AND (valid_until IS NULL OR valid_until >= :day)
+  AND status = 'done' AND coalesce(verdict, '') <> 'FAIL' AND tag <> 'withdrawn'
+  AND NOT EXISTS (
+    SELECT 1 FROM calibration AS later
+    WHERE later.serial = c.serial AND later.axis = c.axis AND later.valid_from <= :day AND later.tag <> 'withdrawn'
+      AND (later.valid_from, later.id) > (c.valid_from, c.id))
+ORDER BY axis
+"""
+
+
+def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
+    """Adds what a fleet has made and the catalogue does not have yet; returns how many calibrations that are.
+
+    Gyros under one serial are not told apart by it, so none of them is entered.
+
+    Args:
+        out: The fleet's folder; each entry's result lies in the folder of its name.
+        tag: Goes with each that is added.
+
+    Raises:
+        InputError: The file there is no catalogue, or is damaged.
+        GyrotcError: It cannot be written.
+    """
+    counts = Counter((entry.serial, entry.axis) for entry in entries)
+    made = [e for e in entries if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1]
+    place = out / CATALOGUE
+    if not made and not place.exists():
+        return 0
+    place.mkdir(exist_ok=True)
+    with _opened(place / _FILE) as base:
+        known = set(base.execute("SELECT serial, axis, input_sha256 FROM calibration"))
+        new = [e for e in made if (e.serial, e.axis or "", e.key) not in known]
+        with base:  # one transaction
+            return sum(_add(base, out, entry, tag) for entry in new)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+    _check_file(path)
+    try:
+        with closing(sqlite3.connect(path)) as base:
+            if base.execute("PRAGMA user_version").fetchone()[0] == 0:
+                with base:
+                    base.executescript(
+                        f"BEGIN; PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = 1; {SCHEMA}"
+                    )
+            yield base
+    except sqlite3.OperationalError as error:  # the disk, a lock
+        raise GyrotcError(f"{path}: {error}") from error
+    except sqlite3.DatabaseError as error:
+        raise InputError(
+            str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
+        ) from error
+
+
+def _check_file(path: Path) -> None:
+    """Refuses what is no catalogue of gyrotc before SQLite, which follows links, opens it; none yet is made empty.
+
+    So that SQLite takes a journal for what it is, that must be one, too: another file of that name would be deleted.
+    """
+    handle, _ = open_or_create(path)
+    try:
+        head = os.pread(handle, _HEAD_BYTES, 0)
+    finally:
+        os.close(handle)
+    wanted = _MAGIC, _APPLICATION.to_bytes(4, "big")
+    if head and (head[: len(_MAGIC)], head[_APPLICATION_AT : _APPLICATION_AT + 4]) != wanted:
+        raise InputError(str(path), "is no catalogue", "a catalogue as gyrotc fleet wrote it")
+    for end, magic in _BESIDE.items():
+        beside = path.with_name(path.name + end)
+        if beside.exists() or beside.is_symlink():
+            check_own(beside)
+            with beside.open("rb") as stream:
+                if stream.read(len(magic)) not in (b"", bytes(len(magic)), magic):
+                    raise InputError(
+                        str(beside), f"is none of SQLite's {end[1:]} files", "none; move it away"
+                    )
+
+
+def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> int:
+    """Enters one result: payloads first, so that no row names what is not there; 0 where its folder has gone."""
+    folder = out / entry.name
+    if not (
+        folder / ENTRY
+    ).is_file():  # a name with bytes that are no character: it is told, but lies elsewhere
+        return 0
+    unit = unit_of(folder)
+    model, budget = unit.model, unit.budget
+    if (unit.decision, model.hash) != (entry.verdict, entry.model_hash):
+        raise InputError(
+            str(folder / ENTRY), "is not what the other results give", "a result as fleet wrote it"
+        )
+    image, text = (_kept(out, path) for path in (_image(folder, model), folder / "model.json"))
+    row = base.execute(
+        "INSERT INTO calibration (serial, axis, valid_from, valid_until, tag, status, verdict, model_hash,"
+        " image_sha256, model_sha256, input_sha256, after_rms_dph, expanded_dph, folder)"
+        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        (
+            entry.serial, entry.axis or "", entry.date[:10] if entry.date else None,
+            budget.valid_until if budget else None, tag, entry.status, entry.verdict, model.hash, image, text,
+            entry.key, entry.after_rms_dph, budget.expanded_dph if budget else None, entry.name,
+        ),
+    )  # fmt: skip
+    files = {(row.lastrowid, d.file, d.role, d.sha256) for d in model.data}
+    base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", sorted(files))
+    return 1
+
+
+def _image(folder: Path, model: Model) -> Path:
+    return folder / "c" / f"gtc_{model.id}.bin"
+
+
+def _kept(out: Path, source: Path) -> str:
+    """Puts a file among the payloads under its hash, read-only, unless it is there; returns the hash."""
+    known = sha256(source)
+    place = out / CATALOGUE / _PAYLOADS / known[:2] / known
+    if place.exists() or place.is_symlink():
+        if not place.is_file() or sha256(place) != known:
+            raise InputError(str(place), "is not what its name says", _EXPECTED)
+    else:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(place, source.read_bytes())
+        place.chmod(0o444)
+    return known
+
+
+def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAnswer:
+    """What a gyro may carry on a day; without a serial the calibrations that were entered last.
+
+    Args:
+        place: A fleet's folder, or the catalogue's file.
+        day: ISO 8601.
+
+    Raises:
+        InputError: There is no catalogue, or it is damaged.
+    """
+    path = place if place.is_file() else place / CATALOGUE / _FILE
+    if not path.is_file():
+        raise InputError(str(place), "has no catalogue", "the --out of gyrotc fleet")
+    query = _CARRIED if serial else f"SELECT * FROM calibration ORDER BY id DESC LIMIT {_TOLD}"
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
+            base.row_factory = sqlite3.Row
+            rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
+            found = tuple(_told(base, row) for row in rows)
+            for one in found if serial else ():
+                _check_payloads(path.parent / _PAYLOADS, one)
+            total = base.execute("SELECT coalesce(max(id), 0) FROM calibration").fetchone()[0]
+    except sqlite3.DatabaseError as error:
+        raise InputError(
+            str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
+        ) from error
+    return CatalogueAnswer(
+        gyrotc_version=__version__, serial=serial, axis=None, day=day if serial else None, calibrations=total,
+        found=found,
+    )  # fmt: skip
+
+
+def _check_payloads(place: Path, one: Catalogued) -> None:
+    """What a gyro may carry is there, and is what its row says.
+
+    Raises:
+        InputError: It is not.
+    """
+    image, text = (place / known[:2] / known for known in (one.image_sha256, one.model_sha256))
+    for path in (image, text):
+        if not path.is_file() or sha256(path) != path.name:
+            raise InputError(str(path), "is missing or not what its name says", _EXPECTED)
+    model = load_model(text)
+    if (model.serial, model.axis, model.hash) != (one.serial, one.axis, one.model_hash):
+        raise InputError(str(text), f"is not the model that the catalogue names for {one.serial}", _EXPECTED)
+
+
+def _told(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:
+    names = [name for name in Catalogued.model_fields if name not in ("axis", "recordings")]
+    files = base.execute(
+        "SELECT file, role, sha256 FROM recording WHERE calibration = ? ORDER BY file", (row["id"],)
+    )
+    recordings = tuple(CataloguedFile(file=f["file"], role=f["role"], sha256=f["sha256"]) for f in files)
+    return Catalogued(**{name: row[name] for name in names}, axis=row["axis"] or None, recordings=recordings)

@@ -1,0 +1,224 @@
+"""The manifest of a fleet: which data sets, and the options that all of them are built with."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from ..assess.limits import Limits, load_limits
+from ..common.ceilings import refuse_above
+from ..common.errors import GyrotcError, InputError
+from ..common.inputs_texts import read_toml
+from ..recordings.load import axes_of
+from ..store.marker import KINDS, read_marker
+from ..train.fitting import FitOptions
+from ..train.methods import AUTO, NETWORK_METHODS
+
+__all__ = ["SUMMARY", "Fleet", "Unit", "load_manifest", "printable"]
+
+#: Files of a summary, beside the folders of the units.
+SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """One job: a data set, and the axis of three-axis recordings."""
+
+    dataset: Path
+    axis: str | None
+
+    @property
+    def folder(self) -> str:
+        """Name of its result folder: as the user calls the data set, also where that is a link."""
+        name = os.path.basename(os.path.abspath(self.dataset))  # noqa: PTH100, PTH119 (no links followed)
+        return name + (f"-{self.axis}" if self.axis else "")
+
+    @property
+    def name(self) -> str:
+        """Name of its result folder as it is shown."""
+        return printable(self.folder)
+
+    @property
+    def refused(self) -> str:
+        """Why no result folder may have this name; empty if it may."""
+        if self.folder.casefold() in (*SUMMARY, "catalogue", "shards"):
+            return "is the name of a file of the summary or a folder of the fleet; give the data set another name"
+        if not self.folder.strip("-xyz") or self.folder.startswith("."):
+            return "a name that is empty or begins with a dot is no name for a result"
+        return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """What is to be done, and how."""
+
+    units: tuple[Unit, ...]
+    options: FitOptions
+    numerics: tuple[str, ...] | None
+    limits: Limits | None
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+_Place = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00-\x1f]+$")]
+_Axis = Literal["x", "y", "z", "all"] | None
+
+
+class _UnitEntry(_Part):
+    dataset: _Place
+    axis: _Axis = None
+
+
+def _method(name: str) -> str:
+    if name not in (AUTO, *NETWORK_METHODS):
+        raise ValueError("one of " + ", ".join((AUTO, *NETWORK_METHODS)))
+    return name
+
+
+class _Options(_Part):
+    method: Annotated[str, AfterValidator(_method)] = AUTO
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    centers: Annotated[int, Field(ge=0, le=512)] | None = None
+    rho: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    block_s: Annotated[float, Field(ge=0.001, le=3600.0)] = 10.0
+    average_s: Annotated[float, Field(ge=0.001, le=1e6)] = 100.0
+
+
+class _Manifest(_Part):
+    schema_: Annotated[Literal[1], Field(alias="schema")]
+    datasets: list[_Place] = []  # patterns of folders
+    axis: _Axis = None  # of those
+    unit: list[_UnitEntry] = []
+    options: _Options = _Options()
+    numeric: Annotated[list[Literal["f32", "q31"]], Field(min_length=1)] | None = None
+    limits: _Place | None = None
+
+
+def load_manifest(path: Path) -> Fleet:
+    """Reads a manifest; a folder is one too: each of its folders with recordings is a data set.
+
+    Raises:
+        InputError: It cannot be read, a field is wrong, nothing is named, or two results would have one name.
+    """
+    if path.is_dir():
+        folders = [folder for folder in _listed(path) if _has_recordings(folder)]
+        return _distinct(
+            path, Fleet(tuple(Unit(folder, None) for folder in folders), FitOptions(), None, None)
+        )
+    manifest = _parsed(path)
+    named = (
+        *((folder, manifest.axis) for folder in _matching(path, manifest.datasets)),
+        *((path.parent / entry.dataset, entry.axis) for entry in manifest.unit),
+    )
+    units = tuple(unit for folder, axis in named for unit in _units(folder, axis))
+    limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
+    options = FitOptions(**manifest.options.model_dump())
+    numerics = tuple(manifest.numeric) if manifest.numeric else None
+    return _distinct(path, Fleet(units, options, numerics, limits))
+
+
+def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
+    """A unit for each axis that is asked for; where the recordings cannot tell their axes, the job will say why."""
+    axes: tuple[str | None, ...] = (axis,)
+    if axis == "all":
+        try:
+            axes = axes_of(folder) or (None,)
+        except (GyrotcError, OSError):
+            axes = (None,)
+    yield from (Unit(folder, name) for name in axes)
+
+
+def _parsed(path: Path) -> _Manifest:
+    content = read_toml(path, "a manifest or a folder")
+    try:
+        return _Manifest.model_validate(content)
+    except ValidationError as error:
+        raise _wrong_field(path, error) from error
+
+
+def _wrong_field(path: Path, error: ValidationError) -> InputError:
+    detail: Any = error.errors()[0]
+    where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
+    if detail["type"] == "extra_forbidden":
+        return InputError(where, "is not known", "a field named in docs/fleet.md")
+    if detail["type"] == "missing":
+        return InputError(where, "is missing", f"{detail['loc'][-1]} = ...")
+    return InputError(where, repr(detail["input"]), detail["msg"])
+
+
+def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
+    for pattern in patterns:
+        if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
+            raise InputError(
+                f"{path}, field datasets", repr(pattern), "a pattern below the manifest's folder"
+            )
+        try:
+            found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
+        except (IndexError, ValueError, OSError, RecursionError, NotImplementedError) as error:
+            # ".", "a**", a name that no folder can have
+            expected = "a pattern below the manifest's folder, e.g. 2026-*"
+            raise InputError(f"{path}, field datasets", repr(pattern)[:80], expected) from error
+        if not found:
+            raise InputError(f"{path}, field datasets", f"{pattern!r} matches no folder of recordings")
+        yield from found
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(
+            str(folder), f"cannot be read ({error.strerror})", "a folder of data sets"
+        ) from error
+
+
+def _has_recordings(folder: Path) -> bool:
+    """Whether a folder is a data set. One that cannot be read may be one: its job will say what is wrong."""
+    if folder.name.startswith("."):
+        return False
+    try:
+        if not folder.is_dir():
+            return False
+        if _is_result(folder):
+            return False
+        return (folder / "dataset.toml").is_file() or any(
+            file.suffix.lower() in (".csv", ".parquet") for file in folder.iterdir()
+        )
+    except OSError:
+        return True
+
+
+def _is_result(folder: Path) -> bool:
+    """Whether gyrotc made it of recordings: also a fleet's folder holds CSV files."""
+    try:
+        marker = read_marker(folder)
+    except InputError:
+        return False
+    return marker is not None and marker.kind != KINDS["simulate"]
+
+
+def printable(text: str) -> str:
+    r"""A name as it can be shown and written as UTF-8: bytes that are no character and controls as ``\x..``."""
+    known = os.fsencode(text).decode("utf-8", "backslashreplace")
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in known)
+
+
+def _distinct(path: Path, fleet: Fleet) -> Fleet:
+    if not fleet.units:
+        raise InputError(str(path), "names no data set", "one at least")
+    refuse_above("units", len(fleet.units), str(path), "data sets")
+    seen: dict[str, Path] = {}
+    for unit in fleet.units:
+        if unit.name in seen:
+            raise InputError(
+                str(path), f"{seen[unit.name]} and {unit.dataset} are both {unit.name}", "names that differ"
+            )
+        seen[unit.name] = unit.dataset
+    return fleet

@@ -1,0 +1,263 @@
+"""Why a gyro stands apart from its lot, in words: each axis is compared with its own kind (x with x).
+
+A lot of gyros that go through one programme of temperatures shows what is usual. A gyro is named where its distance
+from the median of its kind is beyond five robust standard deviations; the reason is what takes that distance away.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.metrics import MAD_TO_SIGMA
+from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
+from .facts import NOISY_RUN
+from .turned import turned
+
+__all__ = ["reasons", "with_reasons"]
+
+Array = NDArray[np.float64]
+
+_LEAST = 8  # gyros of a kind; fewer do not say what is usual
+_FAR = 5.0  # robust standard deviations beyond which one stands apart
+_NEAR = 3.0  # and within which a supposed fault must bring it back
+_LEAST_BINS = 4  # cells of 5 C: a shift of a shorter curve is not told from an offset
+_LEAST_SHIFT_C = 1.0  # thermometers of a kind agree to this
+_LEAST_SCALE = 1.5  # factor: less is the scatter of a lot
+_LEAST_NOISE = 1.5  # times the usual noise: less is the scatter of a lot
+_LEAST_STEP = 1.6  # times the usual score
+_FAR_LOG = 4.0  # for logarithms of scores and factors, beside a least ratio
+_LEAST_SPIKES = 5  # rows
+_MISMOUNTED = frozenset({"sign_reversed", "axes_exchanged"})
+_PER_H = 3600.0  # s in an hour
+
+
+class _Kind:
+    """Gyros of one axis, and what is usual among them."""
+
+    def __init__(self, known: Sequence[tuple[FleetEntry, Facts]]) -> None:
+        self.entries = entries = [entry for entry, _ in known]
+        self.facts = [facts for _, facts in known]
+        self.curves = np.array([_numbers(facts.curve) for facts in self.facts])
+        seen = np.isfinite(self.curves).sum(axis=0) >= max(_LEAST, len(entries) // 2)
+        self.seen = seen
+        with np.errstate(all="ignore"):
+            self.median = np.where(seen, _median(self.curves), np.nan)
+            self.shapes = self.curves - _row_means(np.where(seen, self.curves, np.nan))
+            self.shape = np.where(seen, _median(self.shapes), np.nan)
+        self.scatter = _scatter(self.curves, self.median)
+        self.shape_scatter = _scatter(self.shapes, self.shape)
+
+    def distance(self, curve: Array) -> float:
+        """How far a curve lies from the usual one, in robust standard deviations: as it is, or about its mean."""
+        both = np.isfinite(curve) & self.seen
+        if both.sum() < _LEAST_BINS:
+            return np.inf
+        level = (curve - self.median)[both] / self.scatter[both]
+        about = curve - curve[both].mean()
+        shape = (about - self.shape)[both] / self.shape_scatter[both]
+        return float(max(np.sqrt(np.mean(level**2)), np.sqrt(np.mean(shape**2))))
+
+    def factors(self) -> Array:
+        """Least-squares factor of each curve against the usual one; 0 where it cannot be told."""
+        both = np.isfinite(self.curves) & self.seen
+        usual = np.where(both, self.median, 0.0)
+        power = (usual**2).sum(axis=1)
+        product = (np.where(both, self.curves, 0.0) * usual).sum(axis=1)
+        return np.asarray(np.where(power > 0.0, product / np.where(power > 0.0, power, 1.0), 0.0))
+
+
+def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[Reason]:
+    """The likeliest reason of every gyro that stands apart, in the order of the entries."""
+    found: dict[str, Reason] = {}
+    by_name = {entry.name: entry for entry in entries}
+    axis = {entry.name: entry.axis for entry in entries}
+    for copy in sorted(copied, key=lambda c: axis.get(c.name) != axis.get(c.other)):  # x with x first
+        for name, other in ((copy.name, copy.other), (copy.other, copy.name)):
+            text = f"copy of another unit: it has about {100.0 * copy.share:.0f} % of its rows in common with {other}"
+            if name in by_name:
+                found.setdefault(name, _reason(by_name[name], "copy_of_other", text))
+    kinds = _kinds(entries)
+    mirrored = set(turned(entries))
+    for reason in (*_exchanged(kinds), *(r for kind in kinds.values() for r in _of_kind(kind))):
+        found.setdefault(reason.name, reason)
+    for entry in entries:
+        known = found.get(entry.name)
+        if entry.name in mirrored and (known is None or known.id == "bias_apart"):
+            text = "sign reversed: its bias over temperature has the shape of that of its kind turned over"
+            found[entry.name] = _reason(entry, "sign_reversed", text)
+    return [found[e.name] for e in entries if e.name in found]
+
+
+def _reason(
+    entry: FleetEntry, id_: str, text: str, file: str | None = None, time_s: float | None = None
+) -> Reason:
+    return Reason(name=entry.name, id=id_, text=text, file=file, time_s=time_s)
+
+
+def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:
+    """The entries with their reasons' words; what is mounting or wiring is a finding too."""
+    told = {reason.name: reason for reason in named}
+    return [_with_reason(entry, told[entry.name]) if entry.name in told else entry for entry in entries]
+
+
+def _with_reason(entry: FleetEntry, reason: Reason) -> FleetEntry:
+    more = _MISMOUNTED & {reason.id} - set(entry.findings)
+    return entry.model_copy(update={"apart": reason.text, "findings": (*entry.findings, *more)})
+
+
+def _kinds(entries: Sequence[FleetEntry]) -> dict[str | None, _Kind]:
+    by_axis: dict[str | None, list[tuple[FleetEntry, Facts]]] = defaultdict(list)
+    for entry in entries:
+        if entry.facts is not None:
+            by_axis[entry.axis].append((entry, entry.facts))
+    return {axis: _Kind(found) for axis, found in by_axis.items() if len(found) >= _LEAST}
+
+
+def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
+    """Two axes of a unit that show each what the other's kind shows."""
+    units: dict[str, dict[str, tuple[FleetEntry, Array]]] = defaultdict(dict)
+    for axis, kind in kinds.items():
+        for entry, curve in zip(kind.entries, kind.curves, strict=True):
+            if axis is not None and entry.dataset is not None:
+                units[entry.dataset][axis] = (entry, curve)
+    for axes in units.values():
+        for a in axes:
+            for b in axes:
+                one, other = axes[a][1], axes[b][1]
+                if a == b or kinds[a].distance(one) <= _FAR:
+                    continue
+                if kinds[b].distance(one) < _NEAR and kinds[a].distance(other) < _NEAR:
+                    text = f"axes exchanged: {a} shows what {b} axes show, and {b} what {a} axes show"
+                    yield _reason(axes[a][0], "axes_exchanged", text)
+
+
+def _of_kind(kind: _Kind) -> Iterator[Reason]:
+    """In the order of what explains most: a later reason of the same gyro follows from an earlier one."""
+    yield from _thermometers(kind)
+    yield from _mirrored_or_scaled(kind)
+    yield from _spikes(kind)
+    yield from _steps(kind)
+    yield from _noise(kind)
+    yield from _bias_apart(kind)
+
+
+def _thermometers(kind: _Kind) -> Iterator[Reason]:
+    """The programme is the same for all: mean temperatures of the runs say which thermometer is apart."""
+    temperatures = _run_figures(kind.facts, lambda run: run.mean_c)
+    shifts = np.nanmedian(temperatures - np.nanmedian(temperatures, axis=0), axis=1)
+    _, scatter = _usual(shifts)
+    for entry, shift in zip(kind.entries, shifts, strict=True):
+        if abs(shift) > max(_FAR * scatter, _LEAST_SHIFT_C):
+            more = "more" if shift > 0.0 else "less"
+            text = (
+                f"thermometer apart: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
+            )
+            yield _reason(entry, "thermometer_apart", text)
+
+
+def _steps(kind: _Kind) -> Iterator[Reason]:
+    scores = _run_figures(kind.facts, lambda run: run.step.score)
+    best = np.log(np.maximum(np.nanmax(scores, axis=1), 1e-9))
+    usual, scatter = _usual(best)
+    for k, entry in enumerate(kind.entries):
+        if best[k] > usual + max(_FAR_LOG * scatter, np.log(_LEAST_STEP)):
+            run = kind.facts[k].runs[int(np.nanargmax(scores[k]))]
+            hours = run.step.time_s / _PER_H
+            text = (
+                f"step in {run.file} at {hours:.1f} h: the residual moved by {run.step.size_dph:+.2g} deg/h"
+            )
+            yield _reason(entry, "step", text, run.file, run.step.time_s)
+
+
+def _spikes(kind: _Kind) -> Iterator[Reason]:
+    rows = np.array([float(entry.rows_left_out or 0) for entry in kind.entries])
+    usual, scatter = _usual(rows)
+    for entry, count in zip(kind.entries, rows, strict=True):
+        if count >= max(_LEAST_SPIKES, usual + _FAR * scatter):
+            text = f"spikes or bursts: {count:.0f} rows of training were outliers"
+            yield _reason(entry, "outliers", text)
+
+
+def _noise(kind: _Kind) -> Iterator[Reason]:
+    noise = _run_figures(kind.facts, lambda run: run.noise_dph)
+    ratios = noise / np.maximum(np.nanmedian(noise, axis=0), 1e-300)  # to the same run of the others
+    levels = np.log(np.maximum(np.nanmedian(ratios, axis=1), 1e-9))
+    usual, scatter = _usual(levels)
+    for entry, facts, level, of_runs in zip(kind.entries, kind.facts, levels, ratios, strict=True):
+        file = facts.runs[int(np.nanargmax(of_runs))].file
+        if level - usual > max(_FAR * scatter, np.log(_LEAST_NOISE)):
+            where = "every run" if np.nanmin(of_runs) > _LEAST_NOISE else "most runs"
+            shown = facts.series.file if facts.series else file
+            text = f"noise: {np.exp(level - usual):.1f} times that of the others in {where}, such as {shown}"
+            yield _reason(entry, "noise", text, shown)
+        elif np.nanmax(of_runs) > NOISY_RUN:
+            text = f"noise: in {file} {np.nanmax(of_runs):.1f} times that of the others"
+            yield _reason(entry, "noise", text, file)
+
+
+def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
+    """Curves that a turn or a factor brings back to those of their kind."""
+    factors = kind.factors()
+    logs = np.log(np.maximum(factors, 1e-9))
+    usual, scatter = _usual(logs)
+    for entry, curve, factor, log in zip(kind.entries, kind.curves, factors, logs, strict=True):
+        far, kin = kind.distance(curve), _kin(entry)
+        scaled = abs(log - usual) > max(_FAR_LOG * scatter, np.log(_LEAST_SCALE))
+        if _FAR < far < np.inf and kind.distance(-curve) < min(_NEAR, far / 2.0):
+            text = f"sign reversed: its bias over temperature is the mirror image of that of {kin}"
+            yield _reason(entry, "sign_reversed", text)
+        elif factor > 0.0 and scaled and kind.distance(curve / factor) < _NEAR:
+            text = f"scale: its rates are {factor:.3g} times those of {kin}"
+            yield _reason(entry, "scale", text)
+
+
+def _bias_apart(kind: _Kind) -> Iterator[Reason]:
+    """What nothing known brings back."""
+    for entry, curve in zip(kind.entries, kind.curves, strict=True):
+        far = kind.distance(curve)
+        if _FAR < far < np.inf:
+            text = f"bias over temperature apart from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
+            yield _reason(entry, "bias_apart", text)
+
+
+def _kin(entry: FleetEntry) -> str:
+    return f"the other {entry.axis} axes" if entry.axis else "the others"
+
+
+def _run_figures(facts: Sequence[Facts], figure: Callable[[ComparedRun], float]) -> Array:
+    """A figure of every run by its place, NaN where a gyro has fewer runs than others."""
+    most = max(len(of_one.runs) for of_one in facts)
+    rows = [[figure(run) for run in of_one.runs] for of_one in facts]
+    return np.array([row + [np.nan] * (max(most, 1) - len(row)) for row in rows], dtype=np.float64)
+
+
+def _usual(values: Array) -> tuple[float, float]:
+    """Median and robust standard deviation."""
+    center = float(np.nanmedian(values))
+    return center, MAD_TO_SIGMA * float(np.nanmedian(np.abs(values - center)))
+
+
+def _numbers(values: Sequence[float | None]) -> Array:
+    return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+
+def _median(rows: Array) -> Array:
+    """Median of each column, NaN for one without a number."""
+    empty = ~np.isfinite(rows).any(axis=0)
+    return np.asarray(np.where(empty, np.nan, np.nanmedian(np.where(empty, 0.0, rows), axis=0)))
+
+
+def _row_means(rows: Array) -> Array:
+    count = np.maximum(np.isfinite(rows).sum(axis=1), 1)
+    return np.asarray(np.nansum(rows, axis=1) / count)[:, None]
+
+
+def _scatter(rows: Array, center: Array) -> Array:
+    """Robust standard deviation of each column; at least a tenth of the largest, for few gyros may agree by chance."""
+    found = MAD_TO_SIGMA * _median(np.abs(rows - center))
+    largest = float(np.nanmax(found)) if np.isfinite(found).any() else 0.0
+    return np.asarray(np.where(np.isfinite(found), np.maximum(found, 0.1 * largest + 1e-300), np.inf))

@@ -1,0 +1,206 @@
+"""One serial of a fleet: read, fit, emit, check against the reference, judge; or a whole `build`."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from ..assess.conformity import coverage_factor
+from ..common.errors import GyrotcError, InputError
+from ..common.metrics import Averages
+from ..jobs.build import Built, build_into
+from ..model import Model
+from ..recordings.load import load
+from ..recordings.records import Dataset
+from ..results.evaluation import Evaluation
+from ..results.fleet import FleetEntry
+from ..store.fingerprint import inputs_of, program_of
+from ..store.folder import result_folder
+from ..store.jsontext import digest_of
+from ..store.marker import KINDS
+from .aside import set_aside
+from .entry import kept_entry, write_entry
+from .facts import facts_of
+from .manifest import Fleet, Unit, printable
+
+__all__ = ["Task", "do_unit", "done_before", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A unit with all that its job needs; goes to another process, maybe on another machine, as it is.
+
+    Attributes:
+        unit: Its recordings by an absolute path: a worker may run in another folder.
+        shown: The path as the user has typed it.
+        fleet: The options; without the other units.
+        out: Where the result goes, absolute.
+        full: As of `run_fleet`.
+        program: Hash of the program that asks for it.
+        key: Hash of what it is to be made of, as the one who asks has found it; empty: that could not be read.
+    """
+
+    unit: Unit
+    shown: str
+    fleet: Fleet
+    out: Path
+    full: bool
+    program: str
+    key: str = ""
+
+    def keyed(self) -> Task:
+        """The same with its key."""
+        try:
+            return replace(self, key=self.found())
+        except OSError:
+            return self
+
+    def found(self) -> str:
+        """The key as it is here and now: it changes with the contents of the recordings, the options, the limits and
+        the program.
+        """
+        limits = self.fleet.limits.sha256 if self.fleet.limits else None
+        prior = self.fleet.options.prior
+        plain = asdict(replace(self.fleet.options, prior=None)) | {"prior": prior.key if prior else None}
+        options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
+        return digest_of([self.program, options, inputs_of(self.unit.dataset)])
+
+
+def done_before(task: Task) -> FleetEntry | None:
+    """The entry of an earlier call that still holds; None if the job must be done, or the task has no key.
+
+    It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
+    """
+    try:
+        entry = kept_entry(task.out, task.key) if task.key and not task.unit.refused else None
+    except OSError:
+        return None
+    now = {"name": task.unit.name, "dataset": task.shown, "axis": task.unit.axis}
+    return entry and entry.model_copy(update=now)
+
+
+def do_unit(task: Task) -> FleetEntry:
+    """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
+    try:
+        if task.unit.refused:
+            raise InputError(task.unit.name, task.unit.refused)
+        if task.program != program_of():
+            found = f"is not the one that asks (program {program_of()[:16]}, not {task.program[:16]})"
+            raise InputError(f"the gyrotc of worker {_worker()}", found, "the same gyrotc everywhere")
+        return _built(task)
+    except GyrotcError as error:
+        return failed(task, str(error))
+    except OSError as error:
+        return failed(task, f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except Exception as error:  # a fault of the program itself must not stop the other serials either
+        return failed(task, f"{type(error).__name__}: {error}")
+
+
+def _worker() -> str:
+    """Name of this process: as Dask calls it where it is a worker."""
+    distributed = sys.modules.get("distributed")
+    if distributed is not None:
+        with suppress(ValueError):  # no worker, though Dask is there
+            return str(distributed.get_worker().name)
+    return f"{socket.gethostname()}, process {os.getpid()}"
+
+
+def failed(task: Task, reason: str) -> FleetEntry:
+    """The entry of a job that came to nothing; an earlier result of the gyro stays as it was."""
+    try:
+        stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
+    except OSError:
+        stays = ""
+    return FleetEntry(
+        name=task.unit.name,
+        dataset=task.shown,
+        axis=task.unit.axis,
+        status="failed",
+        reason=printable(reason) + stays,
+    )
+
+
+def _built(task: Task) -> FleetEntry:
+    """The result with its entry, in its place as a whole; of recordings that stayed the same meanwhile."""
+    key = task.found()
+    if task.key not in ("", key):
+        found = f"is {key[:16]} on worker {_worker()}, and {task.key[:16]} where the fleet was started"
+        raise InputError(
+            f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere"
+        )
+    dataset = load(task.unit.dataset, axis=task.unit.axis)
+    aside = set_aside(task.out)
+    runs: list[tuple[str, Averages]] = []
+    with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        fleet = task.fleet
+        built = build_into(
+            stage.folder,
+            dataset,
+            fleet.options,
+            numerics=fleet.numerics,
+            limits=fleet.limits,
+            compiled=task.full,
+            watch=lambda run, averages: runs.append((run.file, averages)),
+        )
+        if task.found() != key:
+            raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
+        entry = _entry_of(task, key, dataset, built, runs)
+        write_entry(stage.folder, entry)
+    return entry.model_copy(update={"aside": aside}) if aside else entry
+
+
+def _entry_of(  # long: a field a line
+    task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]
+) -> FleetEntry:
+    """What the summary says of the gyro, and what it is compared with others by."""
+    role, judged = built.evaluation.judged() or (None, None)
+    floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None
+    held = built.limits
+    entry = FleetEntry(
+        name=task.unit.name,
+        dataset=task.shown,
+        axis=task.unit.axis,
+        status="failed" if built.failures else "done",
+        serial=dataset.serial,
+        judged_on=role,
+        before_rms_dph=judged.before.rms_dph if judged else None,
+        after_rms_dph=after,
+        after_mean_dph=judged.after.mean_dph if judged else None,
+        rms_over_floor=after / floor if floor and after is not None else None,
+        noise_floor_dph=floor,
+        bias_dph=built.model.fallback_dph,
+        centers=built.model.n_centers,
+        table_bytes=built.evaluation.model.table_bytes,
+        sum_abs_weights_dph=built.evaluation.model.sum_abs_weights_dph,
+        error_bound_dph=built.verification.error_bound_dph,
+        findings=tuple(finding.id for finding in built.evaluation.findings),
+        model_hash=built.model.hash,
+        verdict=held.decision if held else None,
+        limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
+        limits_held=len(held.limits) if held and held.limits else None,
+        expanded_uncertainty_dph=_expanded(built.evaluation),
+        date=_date_of(built.model, dataset),
+        rows_left_out=built.evaluation.rows_left_out,
+        facts=facts_of(runs),
+        sketch="".join(f"{word:016x}" for word in dataset.sketch),
+        key=key,
+    )
+    return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry
+
+
+def _expanded(evaluation: Evaluation) -> float | None:
+    """Uncertainty of the RMS as the page of the unit states it, deg/h."""
+    known = (evaluation.uncertainty or {}).get("rms_dph")
+    return coverage_factor(known.freedom) * known.standard if known else None
+
+
+def _date_of(model: Model, dataset: Dataset) -> str | None:
+    stated = model.meta.get("calibrated_on")
+    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
+    return str(stated) if stated is not None else max(days, default=None)

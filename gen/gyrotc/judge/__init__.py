@@ -1,1 +1,0 @@
-"""What is said of a result: figures, findings, limits, changes, and doubts about recordings."""

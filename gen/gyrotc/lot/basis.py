@@ -1,0 +1,145 @@
+"""The functions that maps of a lot are written in, and how large a smooth process makes each of them.
+
+The same Hilbert-space process as in training (`gen/core/evidence.cpp`, docs/training.md, section 1): a constant, sines
+of T for a short and a long scale, and products of sines for what couples T and dT/dt. Inputs are normalised to the
+lot's envelope, so that units with other programmes share one set of functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..results.lot import LotFunctions
+
+__all__ = ["CONSTANT", "PARAMETERS", "PRIOR_LOG", "LotBasis", "fitted_parameters"]
+
+Floats = NDArray[np.float64]
+
+PARAMETERS = (
+    "constant",
+    "short",
+    "short_scale",
+    "long",
+    "long_scale",
+    "coupled",
+    "coupled_scale_t",
+    "coupled_scale_r",
+)
+"""Standard deviations in units of the lot and scales in half ranges; a process is given by their logarithms."""
+PRIOR_LOG = np.log([1.0, 0.3, 0.15, 1.0, 0.7, 0.3, 0.8, 0.8])  # as kPriorMean of gen/core/evidence.cpp
+_PRIOR_SD = np.array([3.0, 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5])  # as kPriorSd there
+CONSTANT = np.log(10.0)  # of the mean of a lot: as kConstVariance there, nothing is known of it
+_OF_T, _COUPLED = 40, (10, 8)  # as there: 121 functions
+_REACH = 1.4  # as kReach there: the functions vanish at the edge of the domain
+_FLOOR = 1e-10  # as kVarianceFloor there
+_STEPS = 15  # of a search that goes on in the next round
+_BOUND = 5.0  # prior standard deviations: no parameter of use lies beyond
+
+
+@dataclass(frozen=True, slots=True)
+class LotBasis:
+    """Functions of T and dT/dt.
+
+    Attributes:
+        center_c, half_range_c, half_range_c_per_min: Normalisation of the inputs.
+        kept: Which of the 121 functions are used, shape (n,).
+    """
+
+    center_c: float
+    half_range_c: float
+    half_range_c_per_min: float
+    kept: NDArray[np.int64]
+
+    def values(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+        """The functions at inputs in C and C/min, shape (points, n)."""
+        t = (np.asarray(temperature_c) - self.center_c) / self.half_range_c
+        r = np.asarray(slope_c_per_min) / self.half_range_c_per_min
+        limit = 0.999 * _REACH  # beyond its domain a sine comes back: the value at the edge stands
+        of_t = _sines(np.clip(t, -limit, limit), _OF_T)
+        of_r = _sines(np.clip(r, -limit, limit), _COUPLED[1])
+        coupled = (of_t[:, : _COUPLED[0], None] * of_r[:, None, :]).reshape(len(t), -1)
+        return np.concatenate([np.ones((len(t), 1)), of_t, coupled], axis=1)[:, self.kept]
+
+    def variance(self, log_parameters: Floats) -> Floats:
+        """Variance of each coefficient under a smooth process, shape (n,)."""
+        return np.asarray(_variance(log_parameters)[self.kept])
+
+    @staticmethod
+    def over(temperature_c: tuple[float, float], slope_c_per_min: tuple[float, float]) -> LotBasis:
+        """All functions over an envelope."""
+        low, high = temperature_c
+        largest = max(-slope_c_per_min[0], slope_c_per_min[1], 0.05)  # C/min: as the floor of a model's scale
+        every = np.arange(1 + _OF_T + _COUPLED[0] * _COUPLED[1])
+        return LotBasis(0.5 * (low + high), max(0.5 * (high - low), 1.0), largest, every)
+
+    @staticmethod
+    def read(functions: LotFunctions) -> LotBasis:
+        """The functions that a file tells."""
+        kept = np.array(functions.kept, dtype=np.int64)
+        return LotBasis(functions.center_c, functions.half_range_c, functions.half_range_c_per_min, kept)
+
+    def told(self) -> LotFunctions:
+        """The functions as a file tells them."""
+        return LotFunctions(
+            center_c=self.center_c,
+            half_range_c=self.half_range_c,
+            half_range_c_per_min=self.half_range_c_per_min,
+            kept=tuple(int(k) for k in self.kept),
+        )
+
+    def only(self, used: NDArray[np.bool_]) -> LotBasis:
+        """Some of these functions."""
+        return LotBasis(self.center_c, self.half_range_c, self.half_range_c_per_min, self.kept[used])
+
+
+def fitted_parameters(
+    basis: LotBasis, squares: Floats, units: float, start: Floats, *, free: bool = True
+) -> Floats:
+    """Log parameters of the process whose coefficients have given mean squares.
+
+    Args:
+        squares: Mean square of each coefficient, shape (n,).
+        units: How many squares are behind each mean.
+        start: Where the search begins.
+        free: Whether the constant's is sought, too; else it stays.
+    """
+    from scipy.optimize import minimize  # 0.1 s: who only uses a lot needs none
+
+    seen = np.maximum(squares, 1e-14)
+
+    def cost(x: Floats) -> float:
+        variance = basis.variance(x)
+        fit = 0.5 * units * float(np.sum(np.log(variance) + seen / variance))
+        return fit + 0.5 * float(np.sum(((x - PRIOR_LOG) / _PRIOR_SD) ** 2))
+
+    bounds = [(m - _BOUND * s, m + _BOUND * s) for m, s in zip(PRIOR_LOG, _PRIOR_SD, strict=True)]
+    if not free:
+        bounds[0] = (start[0], start[0])
+    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
+    return np.asarray(found.x)
+
+
+def _frequencies(n: int) -> Floats:
+    return np.asarray(np.pi * (np.arange(n) + 1.0) / (2.0 * _REACH))
+
+
+def _sines(x: Floats, n: int) -> Floats:
+    return np.asarray(np.sin(np.outer(x + _REACH, _frequencies(n))) / np.sqrt(_REACH))
+
+
+def _density(size: float, scale: float, w: Floats) -> Floats:
+    """Spectral density of a squared-exponential process."""
+    return np.asarray(size**2 * np.sqrt(2.0 * np.pi) * scale * np.exp(-0.5 * (scale * w) ** 2))
+
+
+def _variance(log_parameters: Floats) -> Floats:
+    constant, short, short_scale, long, long_scale, size, scale_t, scale_r = np.exp(log_parameters)
+    of_t = _frequencies(_OF_T)
+    alone = _density(short, short_scale, of_t) + _density(long, long_scale, of_t)
+    coupled = np.outer(
+        _density(size, scale_t, of_t[: _COUPLED[0]]), _density(1.0, scale_r, _frequencies(_COUPLED[1]))
+    )
+    return np.concatenate([[constant**2], alone, coupled.ravel()]) + _FLOOR

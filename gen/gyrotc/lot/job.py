@@ -1,0 +1,251 @@
+"""`gyrotc lot`: from the folder of a fleet to what its units share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..common.errors import InputError
+from ..model import Model, load_model
+from ..results.base import read_result
+from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
+from ..results.training import Training
+from ..store.jsontext import digest_of
+from ..store.marker import check_intact
+from ..train.evidence import MEAN_S
+from ..train.means import UnitMeans, means_of
+from .learn import LEAST_UNITS, Envelope, Learned, folds_of, learn
+from .model import LotState
+from .prior import process_told, rounded
+from .use import prior_of
+
+__all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+_CELLS = (
+    33,
+    13,
+)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
+_CURVE = 21  # points of the lot to be read
+
+
+@dataclass(frozen=True, slots=True)
+class _Calibrated:
+    """A fully calibrated unit of a fleet."""
+
+    model: Model
+    training: Training
+    means: UnitMeans
+
+
+def load_lot(path: Path) -> Lot:
+    """Reads a lot and holds it against its checksum.
+
+    Raises:
+        InputError: It is no lot, or was changed since gyrotc wrote it.
+    """
+    lot = read_result(path, Lot)
+    if lot.checksum != checksum_of(lot):
+        found = "is not that of the other fields: the file was changed or damaged"
+        raise InputError(f"{path}, field checksum", found, "the file as gyrotc wrote it")
+    prior_of(lot, str(path))
+    return lot
+
+
+def checksum_of(lot: Lot) -> str:
+    """SHA-256 of the canonical form without its checksum."""
+    content = {key: value for key, value in lot.content().items() if key != "checksum"}
+    return digest_of(content)
+
+
+def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = None) -> Lot:
+    """Learns a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
+
+    Args:
+        axis: Axis of three-axis gyros: each axis is a lot of its own.
+
+    Raises:
+        InputError: Fewer than three units, or units of several axes and none is named.
+    """
+    say = progress or (lambda _: None)
+    units = _units(fleet, axis)
+    means, envelope = [u.means for u in units], _envelope([u.model for u in units])
+    found = learn(means, envelope, say)
+    kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
+    names = [(u.model.serial, u.model.hash) for u in units]
+    return lot_from(
+        names,
+        means,
+        found,
+        envelope,
+        axis=units[0].model.axis,
+        mean_s=float(np.median([u.training.means.mean_s for u in kept if u.training.means])),
+        between_dph=float(np.sqrt(np.mean([u.model.between_dph**2 for u in kept]))),
+    )
+
+
+def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
+    """Units of one axis, in the order of their folders; one under two names counts once."""
+    if not fleet.is_dir():
+        raise InputError(str(fleet), "is no folder", "what gyrotc fleet wrote")
+    places = sorted(p.parent for p in fleet.glob("*/training.json"))
+    units = [_unit(place) for place in places]
+    axes = sorted({str(u.model.axis) for u in units if u.model.axis})
+    if axis is None and axes:
+        raise InputError(
+            "--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own"
+        )
+    chosen = [
+        u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None
+    ]
+    distinct = {u.model.serial: u for u in chosen}
+    if len(distinct) < LEAST_UNITS:
+        others = (
+            f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
+            if units
+            else ""
+        )
+        raise InputError(str(fleet), f"{len(distinct)} calibrated units{others}", f"{LEAST_UNITS} at least")
+    return [*distinct.values()]
+
+
+def _unit(place: Path) -> _Calibrated:
+    check_intact(place, ("training.json", "model.json"), needed=False)
+    training = read_result(place / "training.json", Training)
+    model = load_model(place / "model.json")
+    return _Calibrated(model, training, means_of(training.means, place / "training.json"))
+
+
+def _envelope(models: Sequence[Model]) -> Envelope:
+    """Of all units."""
+    t = np.array([m.envelope.temperature_c for m in models])
+    r = np.array([m.envelope.slope_c_per_min for m in models])
+    return (float(t.min()), float(t.max())), (float(r.min()), float(r.max()))
+
+
+def lot_from(  # long: one line for each field of lot.json
+    names: Sequence[tuple[str, str]],
+    units: Sequence[UnitMeans],
+    found: Learned,
+    envelope: Envelope,
+    *,
+    axis: str | None = None,
+    mean_s: float = MEAN_S,
+    between_dph: float = 0.0,
+) -> Lot:
+    """The file of a lot that was learnt.
+
+    Args:
+        names: Serial and hash of the model of each unit.
+        units: What it was learnt from.
+        found: What was learnt.
+        envelope: Ranges of T (C) and dT/dt (C/min).
+        axis: Of the gyros.
+        mean_s: Length of the means behind `units`, s.
+        between_dph: Standard deviation of the constant from power-on to power-on, deg/h.
+    """
+    state = found.state
+    inside = [u for u, kept in zip(units, found.inside, strict=True) if kept]
+    lot = Lot(
+        gyrotc_version=__version__,
+        axis=axis,
+        units=_named(names, found),
+        told=_told(names, found),
+        temperature_c=envelope[0],
+        slope_c_per_min=envelope[1],
+        occupancy=tuple(rounded(row) for row in _occupancy(inside, envelope)),
+        center_dph=found.center_dph,
+        unit_dph=found.unit_dph,
+        functions=state.basis.told(),
+        clusters=_clusters(state),
+        directions=tuple(rounded(d) for d in state.directions.T),
+        rest=process_told(state.rest),
+        of_mean=process_told(state.of_mean),
+        noise_dph=float(np.median([u.sigma_dph for u in inside])),
+        mean_s=mean_s,
+        between_dph=between_dph,
+        cross_validation=CrossValidation(
+            folds=folds_of(len(inside)),
+            spread_scale=found.scale,
+            left_rms_dph=found.left_out_dph[0],
+            constant_rms_dph=found.left_out_dph[1],
+        ),
+        at_rest=AtRest(temperature_c=(), mean_dph=(), spread_dph=()),
+        checksum="",
+    )
+    lot = lot.model_copy(update={"at_rest": _at_rest(lot)})
+    return lot.model_copy(update={"checksum": checksum_of(lot)})
+
+
+def _clusters(state: LotState) -> tuple[LotCluster, ...]:
+    return tuple(
+        LotCluster(
+            units=int(n),
+            mean=rounded(m),
+            covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(c)),
+        )
+        for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
+    )
+
+
+def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, ...]:
+    clusters = iter(found.state.cluster.tolist())
+    return tuple(
+        LotUnit(
+            serial=serial,
+            model_hash=model_hash,
+            cluster=next(clusters) if kept else None,
+            p_value=float(p),
+        )
+        for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
+    )
+
+
+def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> Floats:
+    """Share of time in cells of the envelope; every unit counts the same."""
+    edges = [
+        np.linspace(low, max(high, low + 1e-9), n + 1)
+        for (low, high), n in zip(envelope, _CELLS, strict=True)
+    ]
+    total = np.zeros(_CELLS)
+    for u in units:
+        at = [
+            np.clip(x, e[0], e[-1]) for x, e in zip((u.temperature_c, u.slope_c_per_min), edges, strict=True)
+        ]
+        total += np.histogram2d(at[0], at[1], bins=edges, weights=u.count / u.count.sum())[0]
+    return np.asarray(total.T / len(units))
+
+
+def _at_rest(lot: Lot) -> AtRest:
+    """The first cluster where temperature stands still, and how far a new unit may be from it."""
+    prior = prior_of(lot)
+    t = np.linspace(*lot.temperature_c, _CURVE)
+    values = prior.basis.values(t, np.zeros(_CURVE))
+    spread = np.sqrt(np.sum((values @ prior.covariances[0]) * values, axis=1))
+    return AtRest(
+        temperature_c=rounded(t),
+        mean_dph=rounded(lot.center_dph + lot.unit_dph * (values @ prior.means[0])),
+        spread_dph=rounded(lot.unit_dph * spread),
+    )
+
+
+def _told(names: Sequence[tuple[str, str]], found: Learned) -> str:
+    """What was found, in words."""
+    left, alone = found.left_out_dph
+    size = np.bincount(found.state.cluster)
+    if alone > 0.0 and left < alone:
+        shared = f"the mean map explains {1.0 - (left / alone) ** 2:.0%} of what a unit's own mean leaves"
+    else:
+        shared = "no family: the mean map explains nothing that a unit's own mean does not"
+    text = f"{int(found.inside.sum())} units, {found.state.rank} directions; {shared}"
+    if len(size) > 1:
+        text += f"; {len(size)} clusters of {', '.join(map(str, size))} units"
+    apart = [name for (name, _), kept in zip(names, found.inside, strict=True) if not kept]
+    return text + (f"; set aside, for they stand apart: {', '.join(apart)}" if apart else "")

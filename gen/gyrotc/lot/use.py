@@ -1,0 +1,350 @@
+"""A unit's fit with its lot: the posterior over the lot's envelope in the place of the evidence process.
+
+The network that a table holds follows the posterior as it follows the process of a unit alone: same compression, same
+proofs. What the posterior may be wrong by becomes the table's sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import InputError
+from ..results.lot import KnownMap, Lot, LotUse, UnitCurve
+from ..train.data import Bins, Scaling, TrainingData, average
+from ..train.evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
+from ..train.guard import objection
+from ..train.means import UnitMeans, unit_means
+from ..train.mrbf import fit_mrbf
+from ..train.prior import Given
+from ..train.result import Outcome
+from .basis import LotBasis
+from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
+from .surprise import FALSE_ALARM, freedom_of, of_few
+
+__all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
+
+Floats = NDArray[np.float64]
+_CURVE = 41  # points of the picture
+_KEPT_DIGITS = 6  # of its numbers
+
+
+@dataclass(frozen=True, slots=True)
+class _PosteriorMap:
+    """A posterior in standardised units of a fit; what the compression and the table's sigma ask of a process."""
+
+    posterior: MapPosterior
+    scaling: Scaling
+    center: float
+    spread: float
+    sigma: float
+    freedom: float
+    value: float = 0.0
+    evaluations: int = 0
+
+    @property
+    def log_parameters(self) -> Floats:
+        """As of the evidence model: what a unit differs by has the scales of the lot's rest."""
+        _, short, short_scale, long, long_scale, coupled, scale_t, scale_r = np.exp(self.posterior.prior.rest)
+        basis = self.posterior.prior.basis
+        of_t = basis.half_range_c / self.scaling.half_range_c
+        of_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
+        of_both = coupled, scale_t * of_t, scale_r * of_r
+        return np.log([short, short_scale * of_t, long, long_scale * of_t, *of_both, self.sigma])
+
+    def mean(self, t: Floats, r: Floats) -> Floats:
+        return (self.posterior.mean_dph(*self._physical(t, r)) - self.center) / self.spread
+
+    def variance(self, t: Floats, r: Floats) -> Floats:
+        return self.posterior.variance_dph2(*self._physical(t, r)) / self.spread**2
+
+    def _physical(self, t: Floats, r: Floats) -> tuple[Floats, Floats]:
+        s = self.scaling
+        return s.center_c + s.half_range_c * np.asarray(t), s.half_range_c_per_min * np.asarray(r)
+
+
+@dataclass(frozen=True, slots=True)
+class LotPrior(MapPrior):
+    """What a lot says of a unit that was not seen.
+
+    Attributes:
+        lot: The file.
+    """
+
+    lot: Lot
+
+    @property
+    def key(self) -> str:
+        return self.lot.checksum
+
+    def check_axis(self, axis: str | None) -> None:
+        """Refuses the recordings of another axis.
+
+        Raises:
+            InputError: They are of another.
+        """
+        if self.lot.axis != axis:
+            raise InputError("--lot", f"of axis {self.lot.axis}", f"a lot of axis {axis}, as the recordings")
+
+    def with_samples(
+        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
+    ) -> Given:
+        """Tests whether a unit fits its lot, and fits it with the lot if it does.
+
+        Args:
+            samples: Cleaned samples of the unit.
+            own: Their scaling.
+            serial: The unit's serial: one of the lot is told.
+            seed: Of the Kohonen network.
+            average_s: Averaging of RMS figures, s.
+        """
+        alone, unit = seen_alone(samples, own)
+        posterior = self.with_runs(unit)
+        if posterior.p_value < FALSE_ALARM:
+            use = _use(self, posterior, serial, accepted=False, scaling=own)
+            return Given(None, [_stranger(use)], lot=use)
+        found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        if isinstance(found, str):
+            use = _use(self, posterior, serial, accepted=False, scaling=own)
+            text = f"The lot is not used: a map with it is refused: {found}."
+            return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}], lot=use)
+        use = _use(self, posterior, serial, accepted=True, scaling=found[1])
+        known = known_map(posterior)
+        return Given(found, [], "the unit fits its lot", lot=use, known=known)
+
+
+def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
+    """The prior that a file holds.
+
+    Raises:
+        InputError: The file contradicts itself: lengths that differ, a covariance that is none.
+    """
+    basis = LotBasis.read(lot.functions)
+    kept = basis.kept
+    directions = (
+        np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
+    )
+    rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
+    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
+    scale = lot.cross_validation.spread_scale * of_few(freedom)
+    means, covariances = _of_clusters(lot, scale, rest, where)
+    sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
+    if not (sizes > 0.0).all():
+        raise InputError(f"{where}, clusters", "one without units", "units in each")
+    shares = sizes / sizes.sum()
+    return LotPrior(
+        basis=basis,
+        center_dph=lot.center_dph,
+        unit_dph=lot.unit_dph,
+        temperature_c=lot.temperature_c,
+        slope_c_per_min=lot.slope_c_per_min,
+        means=means,
+        covariances=covariances,
+        share=shares,
+        rest=processed(lot.rest),
+        asked=_asked(lot, where),
+        freedom=freedom,
+        lot=lot,
+    )
+
+
+def _of_clusters(lot: Lot, scale: float, rest: Floats, where: str) -> tuple[Floats, Floats]:
+    """Means and covariances of a new unit's coefficients, one for each cluster."""
+    n = len(lot.functions.kept)
+    means, covariances = [], []
+    for number, cluster in enumerate(lot.clusters):
+        at = f"{where}, clusters, {number}"
+        lower = triangle(cluster.covariance, n, at)
+        if len(cluster.mean) != n:
+            raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{n}, one a function")
+        covariance = scale * (rest + lower + np.tril(lower, -1).T)
+        check_positive(covariance, at)
+        means.append(np.array(cluster.mean))
+        covariances.append(covariance)
+    return np.array(means), np.array(covariances)
+
+
+def _asked(lot: Lot, where: str) -> Asked:
+    """Centers of the cells in which units were."""
+    rows = {len(row) for row in lot.occupancy}
+    shares = np.array(lot.occupancy, dtype=np.float64) if len(rows) == 1 else np.zeros((0, 0))
+    if shares.size == 0 or shares.min() < 0.0 or not shares.sum() > 0.0:
+        raise InputError(f"{where}, occupancy", "rows that differ in length, or no shares", "shares of time")
+    n_r, n_t = shares.shape
+    t, r = np.meshgrid(_centers(lot.temperature_c, n_t), _centers(lot.slope_c_per_min, n_r))
+    there = shares > 0.0
+    return Asked(t[there], r[there], shares[there] / shares.sum(), lot.between_dph)
+
+
+def _centers(span: tuple[float, float], n: int) -> Floats:
+    return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
+
+
+def followed(
+    samples: TrainingData,
+    own: Scaling,
+    alone: Process | None,
+    unit: UnitMeans,
+    posterior: MapPosterior,
+    *,
+    seed: int,
+    average_s: float,
+) -> tuple[Outcome, Scaling] | str:
+    """The network that follows a posterior over the envelopes of prior and unit, or why it must not be used.
+
+    Args:
+        samples: Cleaned samples of the unit.
+        own: Their scaling.
+        alone: The process of the unit alone, for its outliers.
+        unit: The unit's means.
+        posterior: What prior and means say together.
+        seed, average_s: As for `fit`.
+    """
+    scaling = _over_both(own, posterior.prior)
+    process = _process(samples, scaling, alone, unit, posterior)
+    try:
+        outcome = fit_mrbf(samples, scaling, seed=seed, centers=None, average_s=average_s, process=process)
+        against = objection(outcome, samples, scaling, average_s)
+    except TrainingFailed as failure:
+        return str(failure)
+    return against or (outcome, scaling)
+
+
+def seen_alone(samples: TrainingData, own: Scaling) -> tuple[Process | None, UnitMeans]:
+    """The process of a unit alone, None where it cannot be solved, and the unit's means."""
+    try:
+        alone = fit_process(samples, own)
+    except TrainingFailed:
+        alone = None
+    return alone, unit_means(samples, own, alone)[0]
+
+
+def _over_both(own: Scaling, prior: MapPrior) -> Scaling:
+    """Scaling over the envelope of the prior and of the unit's own samples."""
+    (a, b), (c, d) = own.temperature_c, prior.temperature_c
+    t0, t1 = min(a, c), max(b, d)
+    (a, b), (c, d) = own.slope_c_per_min, prior.slope_c_per_min
+    r0, r1 = min(a, c), max(b, d)
+    half_c, half_r = max(0.5 * (t1 - t0), own.half_range_c), max(-r0, r1, own.half_range_c_per_min)
+    return Scaling(0.5 * (t0 + t1), half_c, half_r, (t0, t1), (r0, r1))
+
+
+def _process(
+    samples: TrainingData, scaling: Scaling, alone: Process | None, unit: UnitMeans, posterior: MapPosterior
+) -> Process:
+    """The posterior in the form of a process that has seen the unit's means, asked where the lot's units were."""
+    means = average(samples, MEAN_S)
+    weight = means.weight / np.median(means.weight)
+    center = float(np.average(means.bias_dph, weights=weight))
+    asked = posterior.prior.asked
+    variance = posterior.variance_dph2(asked.temperature_c, asked.slope_c_per_min)
+    whole = posterior.mean_dph(asked.temperature_c, asked.slope_c_per_min)
+    spread = float(np.sqrt(np.average((whole - center) ** 2, weights=asked.share))) or 1.0
+    sigma = unit.sigma_dph / spread
+    freedom = len(means) * float(np.average(variance, weights=asked.share)) / unit.sigma_dph**2
+    model = _PosteriorMap(posterior, scaling, center, spread, sigma, freedom)
+    t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
+    at = scaling.normalise(asked.temperature_c, asked.slope_c_per_min)
+    kept = (
+        alone.kept if alone is not None and len(alone.kept) == len(means) else np.ones(len(means), dtype=bool)
+    )
+    return Process(
+        model=model,
+        bins=Bins(*at, len(means) * asked.share, model.mean(*at), 0.0, float(len(means))),
+        t=t,
+        r=r,
+        y=(means.bias_dph - center) / spread,
+        weight=weight,
+        run=means.run,
+        kept=kept,
+        center=center,
+        spread=spread,
+        seconds=float(np.median(means.duration_s)),
+        asked=asked,
+    )
+
+
+def _use(
+    prior: LotPrior, posterior: MapPosterior, serial: str, *, accepted: bool, scaling: Scaling
+) -> LotUse:
+    lot, alone = prior.lot, prior.alone()
+    before, after = alone.rms_sigma_dph(), posterior.rms_sigma_dph()
+    share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+    use = LotUse(
+        checksum=lot.checksum,
+        units=sum(c.units for c in lot.clusters),
+        member=any(unit.serial == serial for unit in lot.units),
+        cluster=posterior.cluster,
+        p_value=posterior.p_value,
+        accepted=accepted,
+        false_alarm=FALSE_ALARM,
+        text="",
+        own_share=share if accepted else None,
+        prior_sigma_dph=before,
+        sigma_dph=after,
+        curve=curve_of(alone, posterior, scaling) if accepted else None,
+    )
+    return use.model_copy(update={"text": _text(use, len(lot.clusters))})
+
+
+def _text(use: LotUse, clusters: int) -> str:
+    of = f"a lot of {use.units} units" + (
+        f" (cluster {use.cluster + 1} of {clusters})" if clusters > 1 else ""
+    )
+    if not use.accepted:
+        return f"not used: these runs lie farther from {of} than {1.0 - use.p_value:.1%} of its units do"
+    seen = "; this unit is one of them" if use.member else ""
+    return (
+        f"{of} leaves {use.prior_sigma_dph:.2g} deg/h (1 sigma over the envelope), with this unit's own runs "
+        f"{use.sigma_dph:.2g}: they removed {use.own_share or 0.0:.0%} of its variance{seen}"
+    )
+
+
+def curve_of(alone: MapPosterior, posterior: MapPosterior, scaling: Scaling) -> UnitCurve:
+    """Prior and posterior where temperature stands still, for the picture."""
+    t = np.linspace(*scaling.temperature_c, _CURVE)
+    still = np.zeros(_CURVE)
+
+    def rounded(values: Floats) -> tuple[float, ...]:
+        return tuple(float(f"{v:.{_KEPT_DIGITS}g}") for v in values)
+
+    return UnitCurve(
+        temperature_c=rounded(t),
+        prior_dph=rounded(alone.mean_dph(t, still)),
+        prior_sigma_dph=rounded(np.sqrt(alone.variance_dph2(t, still))),
+        posterior_dph=rounded(posterior.mean_dph(t, still)),
+        posterior_sigma_dph=rounded(np.sqrt(posterior.variance_dph2(t, still))),
+    )
+
+
+def _stranger(use: LotUse) -> dict[str, Any]:
+    return {
+        "id": "not_of_its_lot",
+        "text": f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
+        "units is refused), so it was calibrated without it, from its own runs alone. Look for what sets it apart: "
+        "another design, another batch of mirrors, the wrong lot, a fault.",
+        "evidence": {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum},
+    }
+
+
+def known_map(posterior: MapPosterior) -> KnownMap:
+    """A posterior as `training.json` holds it."""
+    prior = posterior.prior
+    basis, asked = prior.basis, prior.asked
+    return KnownMap(
+        temperature_c=prior.temperature_c,
+        slope_c_per_min=prior.slope_c_per_min,
+        center_dph=prior.center_dph,
+        unit_dph=prior.unit_dph,
+        functions=basis.told(),
+        mean=rounded(posterior.mean),
+        covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
+        rest=process_told(prior.rest),
+        asked_temperature_c=rounded(asked.temperature_c),
+        asked_slope_c_per_min=rounded(asked.slope_c_per_min),
+        asked_share=rounded(asked.share),
+        between_dph=asked.between_dph,
+    )

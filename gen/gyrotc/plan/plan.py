@@ -1,0 +1,194 @@
+"""`gyrotc plan`: what a programmed profile will be able to tell, before the chamber is booked.
+
+The temperatures come from the simulation of chamber and gyro, the rest from the search that `diagnose` would
+make on them: detection limits, separability, how well the map will be known after how many hours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..causes import CATALOGUE, separate_by
+from ..diagnose.blocks import Record
+from ..diagnose.candidates import searched
+from ..diagnose.detection_limits import CauseLimit
+from ..results.planned import (
+    Accuracy,
+    Additions,
+    AssumedNoise,
+    DetectionLimit,
+    Hard,
+    Plan,
+    PlanLimit,
+    PlannedRun,
+    Separability,
+    Shortest,
+    Temperature,
+    ThermometerPlace,
+    TriedRun,
+)
+from ..simulate.campaign import Noise
+from .programme import Programme, programme_of
+from .sensitivity import Sensitivity
+from .separate import Row, additions, separability
+from .shortest import shortest
+from .thermometers import places
+
+__all__ = ["plan"]
+
+_AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
+_PICTURE_POINTS = 200  # of a run: as many as a picture a few centimetres wide shows
+_HARD = 10.0  # d above which two causes count as hard to tell apart
+
+
+def plan(  # long: one line for each field of the result
+    scenario: str | Path,
+    *,
+    noise: Noise = "paper",
+    seed: int = 1,
+    required: Mapping[str, float] | None = None,
+    pair: tuple[str, str] | None = None,
+    add_thermometer: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """What `plan.json` holds.
+
+    Args:
+        scenario: Profiles: a scenario that comes with gyrotc, or a TOML file.
+        noise: Levels where the scenario gives none.
+        seed: Draws the simulated gyro, on whose bias the limits of `cavity_lag` and `time_misalignment` depend.
+        required: Detection limits to reach, by cause, for the shortest profile.
+        pair: Two causes; further runs are ranked by how they part them.
+        add_thermometer: Say where a further thermometer would tell most.
+        progress: Called with what is being done.
+
+    Raises:
+        InputError: A scenario, profile or cause that cannot be.
+    """
+    say = progress or (lambda _: None)
+    say("simulating the profile")
+    programme = programme_of(scenario, noise=noise, seed=seed)
+    say("computing signatures")
+    sensitivity = Sensitivity(programme)
+    say("comparing causes")
+    rows = separability(sensitivity)
+    shown = [Separability(id=r.id, parameter=r.parameter, value=r.value, d=r.d) for r in rows]
+    result = Plan(
+        gyrotc_version=__version__,
+        serial=None,
+        axis=None,
+        scenario=programme.name,
+        hours=sum(programme.hours),
+        noise=_noise(programme),
+        bias_range_dph=programme.bias_range_dph,
+        runs=tuple(
+            PlannedRun(profile=run.name, hours=h, temperature=_temperature(run))
+            for run, h in zip(programme.records.runs, programme.hours, strict=True)
+        ),
+        limits=_limits(sensitivity),
+        not_testable=dict(sensitivity.bank.untestable),
+        separability=tuple(shown),
+        hard_to_separate=_hard(rows),
+        accuracy=tuple(_accuracy(sensitivity)),
+        shortest=_shortest(sensitivity, required, say) if required else None,
+        additions=_additions(scenario, pair, noise, seed, say) if pair else None,
+    )
+    if not add_thermometer:
+        return result
+    found = _places(scenario, sensitivity, noise, seed, say)
+    return result.model_copy(update={"thermometers": found})
+
+
+def _places(
+    scenario: str | Path, sensitivity: Sensitivity, noise: Noise, seed: int, say: Callable[[str], None]
+) -> tuple[ThermometerPlace, ...]:
+    say("trying further thermometers")
+    found = places(scenario, sensitivity, noise=noise, seed=seed)
+    return tuple(ThermometerPlace(**asdict(place)) for place in found)
+
+
+def _shortest(
+    sensitivity: Sensitivity, required: Mapping[str, float], say: Callable[[str], None]
+) -> Shortest:
+    say("looking for the shortest profile")
+    found = shortest(sensitivity, required)
+    return Shortest(required=dict(required), runs=found.runs, hours=found.hours, reached=found.reached)
+
+
+def _additions(
+    scenario: str | Path, pair: tuple[str, str], noise: Noise, seed: int, say: Callable[[str], None]
+) -> Additions:
+    say("trying further runs")
+    ranked = additions(scenario, pair, noise=noise, seed=seed)
+    return Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=hours, d=d) for n, hours, d in ranked))
+
+
+def _noise(programme: Programme) -> AssumedNoise:
+    noise = programme.declared
+    return AssumedNoise(
+        arw_deg_per_sqrt_h=noise.arw_deg_per_sqrt_h,
+        bias_instability_dph=noise.bias_instability_dph,
+        rate_random_walk_dph_per_sqrt_h=noise.rate_random_walk_dph_per_sqrt_h,
+        quantum_arcsec=noise.quantum_arcsec,
+    )
+
+
+def _temperature(run: Record) -> Temperature:
+    """The run's temperature for a picture."""
+    step = max(run.history.time_s.size // _PICTURE_POINTS, 1)
+    return Temperature(
+        time_h=tuple(round(float(t) / 3600.0, 4) for t in run.history.time_s[::step]),
+        value_c=tuple(round(float(c), 2) for c in run.history.temperature_c[::step]),
+    )
+
+
+def _limits(sensitivity: Sensitivity) -> tuple[PlanLimit, ...]:
+    def shown(limit: CauseLimit) -> DetectionLimit:
+        return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
+
+    found = sensitivity.limits()
+    return tuple(
+        PlanLimit(id=id, family=CATALOGUE[id].family, detection_limit=shown(limit))
+        for id, limit in found.items()
+    )
+
+
+def _hard(rows: list[Row]) -> tuple[Hard, ...]:
+    """Pairs that need more than d = 10 in either direction, the hardest first, and what would part them."""
+    worst: dict[frozenset[str], tuple[float, str, str]] = {}
+    for row in rows:
+        for other, d in row.d.items():
+            key = frozenset({row.id, other})
+            planned = searched(other).planned
+            if planned and d > _HARD and d > worst.get(key, (0.0, "", ""))[0]:
+                worst[key] = (d, row.id, other)
+    ranked = sorted(worst.values(), reverse=True)
+    return tuple(Hard(pair=(a, b), d=d, add=separate_by(a, b)) for d, a, b in ranked)
+
+
+def _accuracy(sensitivity: Sensitivity) -> list[Accuracy]:
+    """Predicted accuracy after each run: error of the map over the whole programme, RMS of means over 100 s."""
+    programme = sensitivity.programme
+    floor = float(
+        np.sqrt(programme.declared.colour(_AVERAGE_S).matrix(np.zeros(1, dtype=np.int64), _AVERAGE_S)[0, 0])
+    )
+    out = []
+    hours = np.cumsum(programme.hours)
+    for count in range(1, len(hours) + 1):
+        error = sensitivity.map_error(range(count))
+        rms = float(np.hypot(floor, error))
+        out.append(
+            Accuracy(
+                hours=float(hours[count - 1]),
+                runs=count,
+                map_error_dph=error,
+                rms_dph=rms,
+                rms_over_floor=rms / floor,
+            )
+        )
+    return out

@@ -1,0 +1,1 @@
+"""Whether recordings are sound: facts of runs, findings, events, and the report of `gyrotc check`."""

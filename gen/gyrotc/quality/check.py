@@ -1,0 +1,213 @@
+"""`gyrotc check`: everything that is wrong with recordings, and everything that is doubtful, at once.
+
+A problem is what `fit` refuses. A doubt is what it takes and a person should look at. A recording that still grows
+can be checked: its unfinished last line is left out, and that is a doubt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..common.errors import InputError
+from ..model import Model
+from ..recordings.load import axes_of, survey
+from ..recordings.problems import Problems
+from ..recordings.records import Applied, Dataset, Mark
+from ..results.check import Checked, CheckedRun, Doubted, MarkedRows, Problem
+from .doubts import Doubt, Envelope, doubts_of_data_set, looked_at, where_of
+from .facts import RunFacts
+
+__all__ = ["CheckResult", "Doubt", "Envelope", "check", "envelope_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """What `check` found.
+
+    Attributes:
+        serial: The stated one; None if that could not be read.
+        axis: The one that was asked for.
+        problems: What `fit` refuses.
+        doubts: What a person should look at.
+        facts: Axis and facts of every run that could be read.
+        marks: Rows that a problem is about, by its text.
+        datasets: Axis and data set of the runs that could be read.
+    """
+
+    serial: str | None
+    axis: str | None
+    problems: tuple[InputError, ...]
+    doubts: tuple[Doubt, ...]
+    facts: tuple[tuple[str | None, RunFacts], ...]
+    marks: Mapping[str, tuple[Mark, ...]]
+    datasets: tuple[tuple[str | None, Dataset], ...]
+
+    def lines(self) -> Iterator[str]:
+        """For a person: a line for each problem, doubt (and what to do next) and run, and one that sums up."""
+        for problem in self.problems:
+            yield f"problem: {problem}"
+        for doubt in self.doubts:
+            yield f"doubt: {doubt}"
+            if doubt.advice:
+                yield f"  next: {doubt.advice}"
+        for axis, f in self.facts:
+            yield _run_line(axis, f)
+        verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
+        yield f"{_counted(self.problems, 'problem')}, {_counted(self.doubts, 'doubt')}: {verdict}"
+
+    def result(self) -> Checked:
+        """What `gyrotc check --json` writes."""
+        return Checked(
+            gyrotc_version=__version__,
+            serial=self.serial,
+            axis=self.axis,
+            problems=tuple(
+                Problem(
+                    where=p.where, found=p.found, expected=p.expected, rows=_rows(self.marks.get(str(p), ()))
+                )
+                for p in self.problems
+            ),
+            doubts=tuple(
+                Doubted(id=d.id, where=d.where, text=d.text, next=d.advice, rows=_rows(d.marks))
+                for d in self.doubts
+            ),
+            runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
+        )
+
+
+def envelope_of(text: str) -> Envelope:
+    """`-40:60,-5:5`: lowest and highest temperature, C, and rate, C/min.
+
+    Raises:
+        InputError: It is not of that form.
+    """
+    try:
+        (t0, t1), (r0, r1) = (tuple(float(v) for v in part.split(":")) for part in text.split(","))
+    except ValueError:
+        t0 = t1 = r0 = r1 = np.nan
+    if not (-np.inf < t0 < t1 < np.inf and -np.inf < r0 < r1 < np.inf):
+        raise InputError("envelope", repr(text), "T0:T1,R0:R1 in C and C/min, such as -40:60,-5:5")
+    return (t0, t1), (r0, r1)
+
+
+def check(
+    folder: Path,
+    *,
+    axis: str | None = None,
+    envelope: Envelope | None = None,
+    applied: Applied | None = None,
+    trust_units: bool = False,
+    earlier: Mapping[str, Model] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CheckResult:
+    """Checks a data set as `fit` would read it, and looks for what is doubtful.
+
+    Args:
+        folder: The data set.
+        axis: Axis of three-axis recordings, or "all".
+        envelope: Temperatures and rates that the training runs should cover.
+        applied: Model that was subtracted while recording, if the data set says that there was one.
+        trust_units: Values that contradict their units are a doubt, not a problem.
+        earlier: Models of an earlier calibration of this gyro, by axis ("" where the recordings have one rate).
+
+    Raises:
+        InputError: The earlier calibration is of another gyro.
+    """
+    problems: dict[str, InputError] = {}
+    marks: dict[str, tuple[Mark, ...]] = {}
+    doubts: dict[Doubt, list[str | None]] = {}
+    facts: list[tuple[str | None, RunFacts]] = []
+    datasets: list[tuple[str | None, Dataset]] = []
+    axes = _axes(folder, axis)
+    for one in axes:
+        told = Problems(collect=True)
+        progress("reading")
+        dataset = survey(folder, told, axis=one, applied=applied, trust_units=trust_units)
+        problems |= {str(problem): problem for problem in told.found}
+        marks |= told.marks
+        if dataset is not None:
+            _refuse_another(earlier or {}, dataset)
+            datasets.append((one, dataset))
+            looked = []
+            for k, run in enumerate(dataset.runs, 1):
+                progress(f"{run.file}, {k} of {len(dataset.runs)}")
+                looked.append(looked_at(run))
+            of_axis = [f for f, _ in looked]
+            together = doubts_of_data_set(dataset, of_axis, envelope, earlier)
+            for doubt in (*together, *(doubt for _, of_run in looked for doubt in of_run)):
+                doubts.setdefault(doubt, []).append(one)
+            facts += [(one, f) for f in of_axis]
+    named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in doubts.items())
+    serial = datasets[-1][1].serial if datasets else None
+    return CheckResult(
+        serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets)
+    )
+
+
+def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:
+    return tuple(MarkedRows(file=m.file, rows=m.rows, span_s=m.span_s) for m in marks)
+
+
+def _of_axes(doubt: Doubt, seen: Sequence[str | None], axes: int) -> Doubt:
+    """Says for which axes a doubt holds, where that is not for all."""
+    if len(seen) == axes:
+        return replace(doubt, axes=tuple(seen))
+    return replace(doubt, where=f"{doubt.where}, axis {', '.join(map(str, seen))}", axes=tuple(seen))
+
+
+def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
+    """The axes to look at; where they cannot be read the problem comes up again with its place."""
+    if axis != "all":
+        return (axis,)
+    try:
+        return axes_of(folder) or ("all",)
+    except InputError:
+        return (None,)
+
+
+def _run_line(axis: str | None, f: RunFacts) -> str:
+    earth = f", Earth's rate {f.earth.rate_dph:.4f} +- {f.earth.sigma_dph:.4f} deg/h off" if f.earth else ""
+    return (
+        f"{where_of(f.file, f.from_s)}{f', axis {axis}' if axis else ''} ({f.role}): {f.rows} rows of "
+        f"{f.row_period_s:.4g} s, {f.temperature_c[0]:.4g} ... {f.temperature_c[1]:.4g} C, "
+        f"mean {f.mean_dph:.4g} deg/h, noise {f.noise_dph:.2g} deg/h a row{earth}"
+    )
+
+
+def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
+    return CheckedRun(
+        axis=axis,
+        file=f.file,
+        from_s=f.from_s,
+        role=f.role,
+        environment=f.environment,
+        rows=f.rows,
+        first_s=f.first_s,
+        last_s=f.last_s,
+        row_period_s=f.row_period_s,
+        gaps=f.gaps,
+        missing_rows=f.missing_rows,
+        temperature_c=f.temperature_c,
+        mean_dph=f.mean_dph,
+        noise_dph=f.noise_dph,
+        hold_share=f.hold_share,
+        earth_rate_dph=f.earth.rate_dph if f.earth else None,
+        earth_rate_sigma_dph=f.earth.sigma_dph if f.earth else None,
+    )
+
+
+def _counted(things: Sequence[object], word: str) -> str:
+    return f"{len(things)} {word}" + "s" * (len(things) != 1)
+
+
+def _refuse_another(models: Mapping[str, Model], dataset: Dataset) -> None:
+    """Refuses models of an earlier calibration that are of another gyro."""
+    for model in models.values():
+        if model.serial != dataset.serial:
+            axis = f", axis {model.axis}" if model.axis else ""
+            raise InputError("--previous", f"is of gyro {model.serial}{axis}", f"gyro {dataset.serial}{axis}")

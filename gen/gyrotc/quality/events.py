@@ -1,0 +1,256 @@
+"""Events: what happened to a recording at a time, told before any cause is looked for.
+
+Each has its run, its time and size with 95 % limits where they can be known, what it means, and the `exclude` line that
+leaves it out. A step or a burst that is left in looks like several causes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.records import Dataset, Exclusion, Rows, Run
+from ..results.diagnosed import Estimate, EventSize, FoundEvent
+from ..target.follow import samples_per_block
+from .drifts import Drift, drifts_of
+from .facts import facts_of
+from .lasting_steps import Step, steps_of
+from .screen import departing_rows
+
+__all__ = ["Event", "accepted", "events_of"]
+
+Floats = NDArray[np.float64]
+Limits = tuple[float, float, float]
+
+_BURST_ROWS = 10  # fewer are outliers
+_JOINED = 1.5  # row periods between rows of one burst
+_LOST_S = 60.0  # a thermometer that stands still, or no rows, for longer
+_STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
+_ONE_PLACE_S = 3600.0  # half of the longest window in which a drift is looked for
+_BLOCK_S = 10.0  # over which the level around a burst is taken
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event.
+
+    Attributes:
+        id: step, step_and_recover, ramp, restart, gain_changed, burst, dropout, thermometer_jump,
+            thermometer_lost, or of a run as a whole sign_reversed, axes_exchanged, gain_changed.
+        run: Number of its run among the training runs.
+        file: Of that run.
+        time_s: Value, and the limits between which it lies, s on the file's clock.
+        size: Value and limits; `unit` is theirs.
+        text: What it is.
+        leave_out: What to leave out, from and to, s; None: nothing has to be, the front end sees to it.
+        whole_run: Whether it is about a run as a whole, which then is left out as such.
+    """
+
+    id: str
+    run: int
+    file: str
+    time_s: Limits
+    size: Limits
+    unit: str
+    text: str
+    leave_out: tuple[float, float] | None
+    whole_run: bool = False
+
+    def result(self) -> FoundEvent:
+        """For the result."""
+        out = None if self.whole_run else self.leave_out
+        line = (
+            f'exclude = [{{from_s = {out[0]!r}, to_s = {out[1]!r}, reason = "{self.id}"}}]' if out else None
+        )
+        time, size = (dict(zip(("value", "low", "high"), x, strict=True)) for x in (self.time_s, self.size))
+        return FoundEvent(
+            id=self.id,
+            file=self.file,
+            time_s=Estimate(**time),
+            size=EventSize(**size, unit=self.unit),
+            text=self.text,
+            exclude=line,
+        )
+
+
+def events_of(dataset: Dataset) -> list[Event]:
+    """Events of the training runs, by run in order of time."""
+    runs = [run for run in dataset.runs if run.role == "train"]
+    found: list[Event] = []
+    series = []
+    for number, run in enumerate(runs):
+        rows = run.rows()
+        good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
+        wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
+        found += _bursts(number, run, rows, wild)
+        found += _thermometer(number, run, rows)
+        found += _dropouts(number, run, rows)
+        good[wild] = False
+        series.append((rows.time_s[good], rows.temperature_c[good], rows.rate_dph[good]))
+    judged = [part if len(part[0]) > 1 else (np.zeros(2),) * 3 for part in series]
+    steps, drifts = _told_once(steps_of(judged), drifts_of(judged))
+    for number, run in enumerate(runs):
+        found += [_drift(run, drift, float(series[number][0][-1])) for drift in drifts if drift.run == number]
+        of_run = [step for step in steps if step.run == number]
+        if of_run:
+            found += _steps(run, of_run, float(series[number][0][0]), float(series[number][0][-1]))
+    again = {(e.run, e.time_s[1]) for e in found if e.id == "restart"}
+    found = [e for e in found if e.id != "dropout" or (e.run, e.time_s[0]) not in again]
+    return sorted(found, key=lambda event: (event.run, event.time_s[0]))
+
+
+def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:
+    """The data set without what the events say to leave out."""
+    training = [run for run in dataset.runs if run.role == "train"]
+    whole = {event.file for event in events if event.whole_run}
+    kept = [run for run in dataset.runs if run.role != "train" or run.file not in whole]
+
+    def without(run: Run) -> Run:
+        of_run = [e for e in events if e.leave_out is not None and not e.whole_run and training[e.run] is run]
+        gaps = tuple(Exclusion(*e.leave_out, e.id) for e in of_run if e.leave_out is not None)
+        return replace(run, exclude=(*run.exclude, *gaps))
+
+    return replace(dataset, runs=tuple(map(without, kept)))
+
+
+def _told_once(steps: Sequence[Step], drifts: Sequence[Drift]) -> tuple[list[Step], list[Drift]]:
+    """Of a step and a drift that are found at about one place, the clearer one."""
+
+    def near(one: Step | Drift, other: Step | Drift) -> bool:
+        return one.run == other.run and abs(one.time_s[0] - other.time_s[0]) < _ONE_PLACE_S
+
+    return (
+        [s for s in steps if all(s.sigmas >= d.sigmas for d in drifts if near(s, d))],
+        [d for d in drifts if all(d.sigmas > s.sigmas for s in steps if near(d, s))],
+    )
+
+
+def _drift(run: Run, drift: Drift, last_s: float) -> Event:
+    out = (drift.time_s[1], last_s + run.row_period_s)
+    text = (
+        f"The rate of {run.file} begins to drift by {drift.slope_dph_per_h[0]:+.3g} deg/h each hour at "
+        f"{drift.time_s[0]:g} s ({drift.sigmas:.1f} times what noise makes there) while the temperature stands still: "
+        f"leave out {_hours(*out)}, and find out what began then."
+    )
+    return Event("ramp", drift.run, run.file, drift.time_s, drift.slope_dph_per_h, "deg/h/h", text, out)
+
+
+def _steps(run: Run, steps: Sequence[Step], first_s: float, last_s: float) -> Iterator[Event]:
+    """Steps that come back, as pairs, and those that last: of these the shorter side is to be left out."""
+    k = 0
+    while k < len(steps):
+        one = steps[k]
+        if one.over_gap and not any(
+            gap.from_s <= one.time_s[1] + run.row_period_s and gap.to_s >= one.time_s[2]
+            for gap in run.exclude
+        ):
+            yield _restart(run, one, first_s, last_s)
+            k += 1
+            continue
+        back = steps[k + 1] if k + 1 < len(steps) else None
+        if back is not None and _undoes(one, back):
+            out = (one.time_s[1], back.time_s[2] + run.row_period_s)
+            text = (
+                f"The rate of {run.file} steps by {one.size_dph[0]:+.3g} deg/h at {one.time_s[0]:g} s and comes back "
+                f"at {back.time_s[0]:g} s, whatever the temperature is: leave out {_hours(*out)}, and find out what "
+                "happened then."
+            )
+            yield Event("step_and_recover", one.run, run.file, one.time_s, one.size_dph, "deg/h", text, out)
+            k += 2
+            continue
+        before = one.time_s[0] - first_s < last_s - one.time_s[0]
+        out = (first_s, one.time_s[2]) if before else (one.time_s[1], last_s + run.row_period_s)
+        text = (
+            f"The rate of {run.file} steps by {one.size_dph[0]:+.3g} deg/h at {one.time_s[0]:g} s "
+            f"({one.sigmas:.1f} times what noise makes there) and stays: leave out {_hours(*out)}, or start a new run "
+            "there."
+        )
+        yield Event("step", one.run, run.file, one.time_s, one.size_dph, "deg/h", text, out)
+        k += 1
+
+
+def _restart(run: Run, step: Step, first_s: float, last_s: float) -> Event:
+    """Rows that stop and go on at another level."""
+    time, back = step.time_s[1:]
+    out = (
+        (first_s, time + run.row_period_s)
+        if back - first_s < last_s - back
+        else (back, last_s + run.row_period_s)
+    )
+    text = (
+        f"{run.file} has no rows for {back - time:g} s from {time:g} s on, and goes on {step.size_dph[0]:+.3g} deg/h "
+        f"away ({step.sigmas:.1f} times what noise makes there), as after a power-on: make the rows behind it a run of "
+        f"their own (from_s = {back!r}, with its power_on_s), or leave out {_hours(*out)}."
+    )
+    return Event("restart", step.run, run.file, (back, time, back), step.size_dph, "deg/h", text, out)
+
+
+def _undoes(one: Step, back: Step) -> bool:
+    """Whether the second step takes the first one back, by their intervals."""
+    low, high = sorted((-back.size_dph[1], -back.size_dph[2]))
+    own_low, own_high = sorted(one.size_dph[1:])
+    return one.size_dph[0] * back.size_dph[0] < 0.0 and low <= own_high and own_low <= high
+
+
+def _hours(from_s: float, to_s: float) -> str:
+    return f"{from_s / 3600.0:.2f}-{to_s / 3600.0:.2f} h"
+
+
+def _bursts(number: int, run: Run, rows: Rows, wild: NDArray[np.int64]) -> Iterator[Event]:
+    """Stretches of rows that no noise of the gyro makes."""
+    if len(wild) < _BURST_ROWS:
+        return
+    times = rows.time_s[wild]
+    first = np.flatnonzero(np.diff(times, prepend=-np.inf) > _JOINED * run.row_period_s)
+    for a, b in zip(first, np.r_[first[1:], len(wild)], strict=True):
+        if b - a < _BURST_ROWS:
+            continue
+        part = rows.rate_dph[wild[a:b]]
+        near = rows.rate_dph[max(wild[a] - (b - a), 0) : wild[b - 1] + (b - a)]
+        size = float(np.max(np.abs(part - np.nanmedian(near))))
+        start, end = float(times[a]), float(times[b - 1]) + run.row_period_s
+        text = f"{b - a} rows of {run.file} from {start:g} s on depart by up to {size:.3g} deg/h: they are left out."
+        yield Event(
+            "burst", number, run.file, (start, start, start), (size, size, size), "deg/h", text, (start, end)
+        )
+
+
+def _thermometer(number: int, run: Run, rows: Rows) -> Iterator[Event]:
+    """Jumps of the temperature, and stretches in which it stands still."""
+    for jump in facts_of(run, rows).jumps:
+        size = jump.to_c - jump.from_c
+        text = (
+            f"The temperature of {run.file} jumps from {jump.from_c:.2f} to {jump.to_c:.2f} C at {jump.time_s:g} s, "
+            "faster than a gyro can: look at the sensor's contact."
+        )
+        at = jump.time_s
+        yield Event("thermometer_jump", number, run.file, (at, at, at), (size, size, size), "C", text, None)
+    inside = run.in_span(rows.time_s)
+    time, temperature = rows.time_s[inside], rows.temperature_c[inside]
+    starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
+    lengths = np.diff(np.r_[starts, len(temperature)])
+    if len(starts) < 0.5 * len(temperature):
+        return  # a coarse thermometer repeats itself
+    for k in np.flatnonzero((lengths >= _STUCK_ROWS) & (lengths * run.row_period_s > _LOST_S)):
+        start = float(time[starts[k]])
+        end = float(time[starts[k] + lengths[k] - 1]) + run.row_period_s
+        text = (
+            f"The temperature of {run.file} stands still to the last digit for {end - start:g} s from {start:g} s on: "
+            "the thermometer was lost, or its record."
+        )
+        begin, lost = (start, start, start), (end - start, end - start, end - start)
+        yield Event("thermometer_lost", number, run.file, begin, lost, "s", text, (start, end))
+
+
+def _dropouts(number: int, run: Run, rows: Rows) -> Iterator[Event]:
+    """Times without rows."""
+    time = rows.time_s[run.in_span(rows.time_s)]
+    for k in np.flatnonzero(np.diff(time) > max(_LOST_S, 10.0 * run.row_period_s)):
+        start, length = float(time[k]), float(time[k + 1] - time[k])
+        if any(gap.from_s <= start + run.row_period_s and gap.to_s >= start + length for gap in run.exclude):
+            continue
+        text = f"{run.file} has no rows for {length:g} s from {start:g} s on."
+        yield Event("dropout", number, run.file, (start, start, start), (length,) * 3, "s", text, None)

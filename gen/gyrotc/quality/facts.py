@@ -1,0 +1,296 @@
+"""Plain facts about one run, computed from its rows: ranges, steps, jumps, holds, gaps, noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
+from ..recordings.records import EarthRate, Floats, Rows, Run
+
+__all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
+
+_GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
+_CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
+_CELL_ROWS = 5  # fewer do not average the resolution of a thermometer
+_HOLD_C_PER_MIN = 0.1  # slower than this a chamber holds, or settles
+_JUMP_SIGMAS = 10.0  # no normal deviation reaches it
+_WAVERING = 0.9  # of departures: more are no jumps
+_WAVERING_SIGMAS = NormalDist().inv_cdf(0.5 + _WAVERING / 2.0)
+_JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
+_HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
+_MAX_JUMPS = 20  # that are listed: enough to see a pattern
+_OUTLIER_SIGMAS = 8.0  # a normal row lies beyond it once in 8e14
+_OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
+# Widths of counters in the processors and FPGAs that read gyros out
+_COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
+_PART = 2**16  # rows that are looked at together
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """A change of temperature between two rows that its surroundings do not explain."""
+
+    time_s: float
+    from_c: float
+    to_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """The largest of the outliers of a run: its first row and by how much it departs from the row before."""
+
+    time_s: float
+    rate_dph: float
+    departure_dph: float
+
+
+@dataclass(frozen=True, slots=True)
+class RunFacts:
+    """Facts about the rows of one run; temperatures in C, rates in deg/h, times in s on the file's clock.
+
+    Attributes:
+        file: Its file.
+        from_s: Start of its span, None for the whole file.
+        role: What it is for.
+        environment: Free text of the description.
+        sha256: Of the file.
+        started: Whether the start of the recording is stated.
+        rows: Number of its rows.
+        first_s: Time of its first row.
+        last_s: Time of its last row.
+        row_period_s: Median row period of the file.
+        gaps: Number of steps longer than 1.5 row periods.
+        missing_rows: Rows that these gaps would have held.
+        temperature_c: Lowest and highest temperature.
+        temperature_step_c: Smallest difference between two temperatures that occur; 0 if there is one only.
+        jumps: Jumps of temperature, the first ones.
+        slopes_c_per_min: Rates of temperature of cells of a minute (at least five rows).
+        temperatures_c: Mean temperatures of these cells, same shape.
+        rates_dph: Mean rates of these cells, same shape.
+        hold_share: Share of these cells that change by less than 0.1 C/min.
+        mean_dph: Mean rate.
+        largest_dph: Largest magnitude of a rate.
+        noise_dph: Scatter from row to row, robust.
+        outliers: Rows whose rate departs from those before and after by more than 8 times that, to the same side; up to
+            ten in a row.
+        outlier: The largest of them.
+        wrapped: Where a counter of pulses passed its end: time of the first place, bits of the counter, places.
+        stuck_s: Longest stretch of one identical rate.
+        constant: Columns that hold one value only.
+        earth: Earth's rate that was taken off, None where there was nothing to take off.
+    """
+
+    file: str
+    from_s: float | None
+    role: str
+    environment: str
+    sha256: str
+    started: bool
+    rows: int
+    first_s: float
+    last_s: float
+    row_period_s: float
+    gaps: int
+    missing_rows: int
+    temperature_c: tuple[float, float]
+    temperature_step_c: float
+    jumps: tuple[Jump, ...]
+    slopes_c_per_min: Floats
+    temperatures_c: Floats
+    rates_dph: Floats
+    hold_share: float
+    mean_dph: float
+    largest_dph: float
+    noise_dph: float
+    outliers: int
+    outlier: Outlier | None
+    wrapped: tuple[float, int, int] | None
+    stuck_s: float
+    constant: tuple[str, ...]
+    earth: EarthRate | None
+
+
+def facts_of(run: Run, rows: Rows) -> RunFacts:  # long: one line for each fact
+    """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
+    inside = run.in_span(rows.time_s)
+    time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
+    finite = inside & np.isfinite(rows.rate_dph)
+    rate = _those(rows.rate_dph, finite)
+    step = np.diff(time)
+    gaps = step > _GAP_PERIODS * run.row_period_s
+    if not inside.all():
+        gaps &= np.diff(np.flatnonzero(inside)) == 1  # what was excluded is no gap
+    levels = np.unique(temperature[_changes(temperature)])
+    resolution = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
+    measured = np.where(np.isfinite(rows.rate_dph), rows.rate_dph, rate.mean() if len(rate) else 0.0)
+    cells_t, slopes, cells_rate = _cells(time, temperature, _those(measured, inside), run.row_period_s)
+    count, outlier = _outliers(_those(rows.time_s, finite), rate)
+    noise = _robust_sigma(np.diff(rate)) / np.sqrt(2.0)
+    return RunFacts(
+        file=run.file,
+        from_s=run.from_s,
+        role=run.role,
+        environment=run.environment,
+        sha256=run.sha256,
+        started=run.started is not None,
+        rows=len(time),
+        first_s=float(time[0]),
+        last_s=float(time[-1]),
+        row_period_s=run.row_period_s,
+        gaps=int(gaps.sum()),
+        missing_rows=int(np.sum(np.round(step[gaps] / run.row_period_s) - 1.0)),
+        temperature_c=(float(levels[0]), float(levels[-1])),
+        temperature_step_c=resolution,
+        jumps=_jumps(time, temperature, resolution),
+        slopes_c_per_min=slopes,
+        temperatures_c=cells_t,
+        rates_dph=cells_rate,
+        hold_share=float(np.mean(np.abs(slopes) < _HOLD_C_PER_MIN)) if len(slopes) else 1.0,
+        mean_dph=float(rate.mean()) if len(rate) else 0.0,
+        largest_dph=float(max(rate.max(), -rate.min())) if len(rate) else 0.0,
+        noise_dph=float(noise),
+        outliers=count,
+        outlier=outlier,
+        wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
+        stuck_s=_longest_stretch(rate) * run.row_period_s,
+        constant=_constant(rows, inside, rate),
+        earth=run.earth,
+    )
+
+
+def _those(values: Floats, chosen: Mask) -> Floats:
+    """The chosen values; the same array where that is all of them."""
+    return values if chosen.all() else values[chosen]
+
+
+def _changes(values: Floats) -> NDArray[np.int64]:
+    """Rows that differ from the one before, and the first row."""
+    return np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+
+
+def _robust_sigma(values: Floats) -> float:
+    """Standard deviation about 0 from the median magnitude, or the RMS where more than half are 0.
+
+    `values` are lost: they make room for the magnitudes.
+    """
+    if len(values) == 0:
+        return 0.0
+    sigma = MAD_TO_SIGMA * median(np.abs(values, out=values), overwrite_input=True)
+    return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
+
+
+def _cells(time: Floats, temperature: Floats, rate: Floats, period_s: float) -> tuple[Floats, Floats, Floats]:
+    """Mean temperature of cells, its rate (C/min) by central differences, mean rate; empty for fewer than three."""
+    length = max(_CELL_S, _CELL_ROWS * period_s)
+    number = (time - time[0]) / length
+    starts = _changes(np.floor(number, out=number))
+    count = np.diff(np.r_[starts, len(time)])
+    full = count * period_s >= 0.5 * length
+    mean_t = (np.add.reduceat(temperature, starts) / count)[full]
+    mean_s = (np.add.reduceat(time, starts) / count)[full]
+    if len(mean_t) < 3:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    mean_rate = (np.add.reduceat(rate, starts) / count)[full]
+    return mean_t, np.gradient(mean_t, mean_s) * 60.0, mean_rate
+
+
+def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, ...]:
+    """Steps that stand out from the steps around them, by noise, by resolution and by rate.
+
+    A thermometer that is slower than the rows holds its value; its step has had that time to grow.
+    """
+    if len(temperature) < 7:
+        return ()
+    departure = _departures(np.diff(temperature))
+    noise = MAD_TO_SIGMA * median(departure)
+    if noise == 0.0:  # a coarse thermometer stays where it is most times; its larger steps tell how it wavers
+        noise = float(np.quantile(departure, _WAVERING)) / _WAVERING_SIGMAS
+    found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
+    changes = _changes(temperature)
+    last = changes[np.searchsorted(changes, found, side="right") - 1]
+    taken = np.maximum(time[found + 1] - time[found], np.minimum(time[found + 1] - time[last], _HOLD_S))
+    jumps = found[departure[found] > _JUMP_C_PER_MIN / 60.0 * taken]
+    return tuple(
+        Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS]
+    )
+
+
+def _departures(step: Floats) -> Floats:
+    """Magnitudes of the differences from the median of the two before, the value itself, and the two after."""
+    padded = np.pad(step, 2, mode="reflect")
+    result = np.empty_like(step)
+    for start in range(0, len(step), _PART):
+        around = sliding_window_view(padded[start : start + _PART + 4], 5)
+        part = slice(start, start + len(around))
+        result[part] = np.abs(step[part] - middle_of_five(*around.T))
+    return result
+
+
+def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
+    """Rows between two steps of opposite sign, each beyond 8 times the noise, and the largest of them.
+
+    At the ends of the record the two next rows stand for the missing neighbour. Where most rows repeat the one before,
+    the noise is that of those that do not.
+    """
+    if len(rate) < 3:
+        return 0, None
+    step = np.diff(np.r_[rate[2], rate, rate[-3]])
+    moved = np.abs(step[step != 0.0])
+    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * median(moved) / np.sqrt(2.0) if len(moved) else np.inf
+    large = np.flatnonzero(np.abs(step) > limit)
+    first, last = large[:-1], large[1:]
+    pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
+    pair[1:] &= ~_follows(pair)[1:]
+    first, last = first[pair], last[pair]
+    if len(first) == 0:
+        return 0, None
+    k = first[np.argmax(np.abs(step[first]))]
+    return int(np.sum(last - first)), Outlier(float(time[k]), float(rate[k]), float(step[k]))
+
+
+def _follows(pair: Mask) -> Mask:
+    """Pairs that share their first step with the pair before: every other one of a chain."""
+    chain = np.zeros(len(pair), dtype=bool)
+    for k in np.flatnonzero(pair):
+        chain[k] = k > 0 and pair[k - 1] and not chain[k - 1]
+    return chain
+
+
+def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[float, int, int] | None:
+    """Places where counted pulses step by a whole range of a counter (2^8 ... 2^32) and hardly by anything else."""
+    if weight_arcsec is None or len(rows) < 4:
+        return None
+    counts = np.rint(rows.rate_dph[1:] * np.diff(rows.time_s) / weight_arcsec)
+    use, time = finite[1:], rows.time_s[1:]
+    step = np.diff(counts[use])
+    for bits in _COUNTER_BITS:
+        size = 2.0**bits
+        if len(step) == 0 or np.abs(step).max() > 1.5 * size:
+            continue
+        rest = np.abs(step - size * np.rint(step / size))
+        wraps = np.flatnonzero((np.abs(step) > 0.5 * size) & (rest < size / 8.0))
+        usual = MAD_TO_SIGMA * median(rest)
+        wraps = wraps[rest[wraps] <= _OUTLIER_SIGMAS * usual + 4.0]
+        if len(wraps) and usual < size / 32.0:
+            return float(time[use][wraps[0] + 1]), bits, len(wraps)
+    return None
+
+
+def _longest_stretch(values: Floats) -> int:
+    """Number of rows in the longest stretch of one identical value."""
+    if len(values) == 0:
+        return 0
+    return int(np.diff(np.r_[_changes(values), len(values)]).max())
+
+
+def _constant(rows: Rows, inside: Mask, rate: Floats) -> tuple[str, ...]:
+    columns = {"temperature": _those(rows.temperature_c, inside), "rate": rate}
+    columns |= {f"channel {name}": _those(values, inside) for name, values in rows.channels.items()}
+    return tuple(name for name, values in columns.items() if len(values) and np.ptp(values) == 0.0)

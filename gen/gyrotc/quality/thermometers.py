@@ -1,0 +1,130 @@
+"""Further thermometers that are not in a run what they are in the others: they disagree, lag, or lost contact.
+
+In every run a thermometer follows the gyro's own: u − T = offset + share (T − mean) − lag dT/dt. What the other runs
+agree on is held against the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.records import Dataset, Rows, Run
+from ..recordings.units import channel_kind
+
+__all__ = ["thermometer_findings"]
+
+Floats = NDArray[np.float64]
+
+_LEAST_RUNS = 3  # of two runs nobody knows which one is odd
+_CELL_S = 60.0  # of a mean: below it the lags of thermometers themselves show
+_SETTLED_S = 3600.0  # self-heating has set in by then; a third of a shorter run
+_LEAST_CELLS = 20  # for three numbers
+_LEAST_RANGE_C = 5.0  # over less neither share nor lag of a run is known
+_SIGMAS = 5.0  # of what the other runs differ by among themselves
+_LEAST_C = 0.3  # class B thermometers may differ by so much (IEC 60751)
+_LEAST_S = 60.0  # a cell
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """One run: means, and what it says alone; lag None where its temperature hardly changes."""
+
+    run: Run
+    own_c: Floats
+    rate: Floats  # C/s
+    apart_c: Floats
+    lag_s: float | None
+
+
+def thermometer_findings(dataset: Dataset) -> Iterator[dict[str, Any]]:
+    """A finding for each thermometer and run that stand apart; none of fewer than three runs."""
+    names = [n for n in dataset.channels if channel_kind(n, dataset.units) == "temperature"]
+    if not names or len(dataset.runs) < _LEAST_RUNS:
+        return
+    followed: dict[str, list[_Followed]] = {name: [] for name in names}
+    for run in dataset.runs:
+        rows = run.rows()
+        for name in names:
+            one = _followed(run, rows, name)
+            if one is not None:
+                followed[name].append(one)
+    for name, runs in followed.items():
+        if len(runs) >= _LEAST_RUNS:
+            yield from _odd_ones(name, runs)
+
+
+def _followed(run: Run, rows: Rows, name: str) -> _Followed | None:
+    inside = run.in_span(rows.time_s) & np.isfinite(rows.channels[name]) & np.isfinite(rows.temperature_c)
+    time = rows.time_s[inside]
+    if time.size == 0:
+        return None
+    cell = np.floor((time - time[0]) / _CELL_S).astype(np.int64)
+    kept, index = np.unique(cell, return_inverse=True)
+    count = np.bincount(index)
+    own = np.bincount(index, rows.temperature_c[inside]) / count
+    other = np.bincount(index, rows.channels[name][inside]) / count
+    settled = kept * _CELL_S >= min(_SETTLED_S, (time[-1] - time[0]) / 3.0)
+    if settled.sum() < _LEAST_CELLS:
+        return None
+    rate = np.gradient(own, kept * _CELL_S)[settled]
+    own, apart = own[settled], (other - own)[settled]
+    lag = -float(_fit(own, rate, apart)[2]) if np.ptp(own) >= _LEAST_RANGE_C else None
+    return _Followed(run, own, rate, apart, lag)
+
+
+def _columns(own: Floats, rate: Floats, center: float) -> Floats:
+    return np.stack([np.ones(len(own)), own - center, rate], axis=1)
+
+
+def _fit(own: Floats, rate: Floats, apart: Floats) -> Floats:
+    """Offset at the mean temperature, share, and less the lag."""
+    return np.asarray(np.linalg.lstsq(_columns(own, rate, float(own.mean())), apart, rcond=None)[0])
+
+
+def _odd_ones(name: str, runs: list[_Followed]) -> Iterator[dict[str, Any]]:
+    lags = np.array([np.nan if one.lag_s is None else one.lag_s for one in runs])
+    for k, one in enumerate(runs):
+        others = [other for j, other in enumerate(runs) if j != k]
+        own, rate, apart = (
+            np.concatenate([getattr(o, part) for o in others]) for part in ("own_c", "rate", "apart_c")
+        )
+        center = float(own.mean())
+        found = np.linalg.lstsq(_columns(own, rate, center), apart, rcond=None)[0]
+
+        def mean_left(o: _Followed, found: Floats = found, center: float = center) -> float:
+            return float(np.mean(o.apart_c - _columns(o.own_c, o.rate, center) @ found))
+
+        shift = mean_left(one)
+        usual = float(np.sqrt(np.mean([mean_left(o) ** 2 for o in others])))
+        told = []
+        if abs(shift) > max(_SIGMAS * usual, _LEAST_C):
+            told.append(f"shows {abs(shift):.2g} C {'more' if shift > 0.0 else 'less'}")
+        rest = np.delete(lags, k)
+        rest = rest[np.isfinite(rest)]
+        if np.isfinite(lags[k]) and len(rest) >= _LEAST_RUNS - 1:
+            late = float(lags[k] - np.median(rest))
+            if abs(late) > max(_SIGMAS * float(rest.std()), _LEAST_S):
+                told.append(f"answers {abs(late):.0f} s {'later' if late > 0.0 else 'sooner'}")
+        if told:
+            yield _finding(name, one, " and ".join(told), shift, usual)
+
+
+def _finding(name: str, one: _Followed, what: str, shift: float, usual: float) -> dict[str, Any]:
+    return {
+        "id": "thermometer_changed",
+        "text": f"In {one.run.file} the thermometer {name} {what} beside the gyro's own than in the other runs: its "
+        "contact is lost or was moved, or it is another one. Look at it, and leave the run out where it was so.",
+        "evidence": {
+            "file": one.run.file,
+            "from_s": one.run.from_s,
+            "channel": name,
+            "shift_c": shift,
+            "usual_c": usual,
+            "lag_s": one.lag_s,
+        },
+    }

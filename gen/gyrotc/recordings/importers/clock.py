@@ -1,0 +1,210 @@
+"""Times of a table in seconds: stamps, counters that may wrap, or rows at a fixed rate; chunk after chunk."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import datetime, timedelta, timezone
+from typing import Any
+
+import numpy as np
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from ...common.errors import InputError
+from ..units import Conversion, conversion
+from .clockparts import form_of_parts, text_of
+from .forms import forms_of
+from .mapping import TimeMap
+from .stamps import Stamps
+from .tables import Chunk, Column, LoggerTable
+
+__all__ = ["Clock"]
+
+Floats = NDArray[np.float64]
+_EPOCH_S = (
+    1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
+)
+_NAT = np.iinfo(np.int64).min
+_WRAPS = (2**16, 2**24, 2**32)  # counters of 16, 24 and 32 bits
+_PERIODS_S = (86_400.0, 604_800.0)  # seconds of the day, time of the GPS week
+_NEAR_STEPS = 20.0  # usual steps that may be lost while a counter passes its end
+_ZONE = re.compile(r"\b(?:GMT|UTC) ?([+-]\d{2}:?\d{2})")
+
+
+class Clock:
+    """Gives the time of every row, s.
+
+    Stamps and counters of an epoch count from the first row; other counters are taken as they are.
+
+    Args:
+        file: Name for messages.
+        table: The table.
+        columns: Columns of time: none where rows are counted, one, or a date and a time of day.
+        unit: Unit of a counter.
+        rate_hz: Rows per second where rows are counted.
+        stated: `[time]` of the map.
+
+    Attributes:
+        form: Form of the stamps; empty for other clocks.
+        wraps: How often a counter started again.
+        origin: What counts as 0: nanoseconds since 1970 for stamps, else a value of the counter.
+    """
+
+    def __init__(
+        self,
+        file: str,
+        table: LoggerTable,
+        columns: Sequence[Column],
+        unit: str | None,
+        rate_hz: float | None,
+        stated: TimeMap,
+    ) -> None:
+        self.form = ""
+        self.wraps = 0
+        self.origin: int | float | None = None
+        self._file, self._table, self._columns, self._rate_hz = file, table, columns, rate_hz
+        self._unit: Conversion | None = conversion(unit, "time") if unit else None
+        self._stamps: Stamps | None = None
+        self._last: float | None = None
+        self._added = 0
+        if columns and (columns[0].kind != "number" or len(columns) > 1) and columns[0].sample:
+            self.form = stated.format or _form(file, columns)
+            in_name = _ZONE.search(columns[0].name)
+            self._stamps = Stamps(self.form, stated.zone or (in_name[1] if in_name else None))
+        elif columns and columns[0].kind == "number" and self._unit is None:
+            raise InputError(file, "a counter without a unit", "--time-unit")
+        self._known_zone = bool(columns) and (
+            self._stamps.known_zone
+            if self._stamps
+            else columns[0].kind == "stamp" and columns[0].unit == "UTC"
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """Columns that it reads."""
+        return [column.name for column in self._columns]
+
+    @property
+    def started(self) -> datetime | None:
+        """Time of 0 where it is known, in UTC."""
+        if self._table.started is not None and not (self._columns and self._columns[0].kind == "stamp"):
+            return self._table.started if self.origin in (None, 0) else None
+        if self._known_zone and self.origin is not None and (self._stamps is None or self._stamps.dated):
+            return datetime(1970, 1, 1, tzinfo=timezone.utc) + timedelta(
+                microseconds=int(self.origin) // 1000
+            )
+        return None
+
+    @property
+    def needs_zone(self) -> bool:
+        """Whether stamps with a date lack a zone."""
+        dated = self._stamps is not None and self._stamps.dated
+        return bool(self._columns) and not self._known_zone and dated
+
+    def __call__(self, chunk: Chunk) -> Floats:
+        """Times of the rows of a chunk, s; NaN where there is none.
+
+        Raises:
+            InputError: A text that is no stamp of the form, with its place.
+        """
+        if not self._columns:
+            assert self._rate_hz is not None
+            return np.arange(chunk.first, chunk.first + len(chunk)) / self._rate_hz
+        values = chunk.columns[self._columns[0].name]
+        if self._stamps is not None:
+            return self._since(*self._parsed(chunk))
+        if self._columns[0].kind == "stamp":
+            ns = np.asarray(values).astype("datetime64[ns]").astype(np.int64)
+            return self._since(ns, ns != _NAT)
+        return self._counted(np.asarray(values))
+
+    def _parsed(self, chunk: Chunk) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        assert self._stamps is not None
+        texts = chunk.columns[self._columns[0].name]
+        if len(self._columns) > 1:
+            parts = [text_of(column, chunk.columns[column.name]) for column in self._columns]
+            texts = pc.binary_join_element_wise(*parts, " ")
+        ns, good = self._stamps.parse(texts)
+        held = np.asarray(
+            pc.not_equal(pc.fill_null(texts, ""), "").to_numpy(zero_copy_only=False), dtype=bool
+        )
+        if np.any(held & ~good):
+            row = int(np.argmax(held & ~good))
+            where = f"{self._file}, {self._table.place(chunk.first + row)}, column {self._columns[0].name}"
+            hint = f"a stamp of the form {self.form}; --time-format names another"
+            raise InputError(where, repr(texts[row].as_py()), hint)
+        return ns, good
+
+    def _since(self, ns: NDArray[np.int64], good: NDArray[np.bool_]) -> Floats:
+        if self.origin is None and good.any():
+            self.origin = int(ns[np.argmax(good)])
+        result = (ns - int(self.origin or 0)) / 1e9
+        result[~good] = np.nan
+        return result
+
+    def _counted(self, raw: NDArray[Any]) -> Floats:
+        assert self._unit is not None
+        raw = self._unwrapped(raw)
+        factor = self._unit.factor
+        finite = np.isfinite(raw)
+        if self.origin is None and finite.any():
+            first = raw[np.argmax(finite)].item()
+            self.origin = first if abs(first * factor) > _EPOCH_S else 0
+        origin = self.origin or 0
+        since: Floats = (raw - raw.dtype.type(origin)).astype(np.float64)
+        whole = round(1.0 / factor) if factor < 1.0 else 0
+        return since / whole if whole and abs(whole * factor - 1.0) < 1e-12 else since * factor
+
+    def _unwrapped(self, raw: NDArray[Any]) -> NDArray[Any]:
+        """A counter that starts again at 2^16, 2^24 or 2^32, or with the day or the week, goes on."""
+        if len(raw) == 0:
+            return raw
+        if raw.dtype.kind in "ui":
+            raw = raw.astype(np.int64)
+        step = np.diff(raw.astype(np.float64), prepend=np.nan if self._last is None else self._last)
+        self._last = float(raw[-1])
+        raw = raw + self._added
+        falls = np.flatnonzero(step < 0.0)
+        wraps = (*_WRAPS, *(round(s / self._unit.factor) for s in _PERIODS_S if self._unit))
+        usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+        for at in falls[:1000]:
+            wrap = next((w for w in wraps if abs(step[at] + w) <= _NEAR_STEPS * usual), None)
+            if wrap is not None and step[at] < -0.5 * wrap:
+                raw[at:] += wrap
+                self._added += wrap
+                self.wraps += 1
+        return raw
+
+
+def _form(file: str, columns: Sequence[Column]) -> str:
+    """The form of the stamps of a sample.
+
+    Raises:
+        InputError: There is none, or day and month could be either.
+    """
+    if columns[0].kind == "number":
+        form = form_of_parts(columns)
+        if not form:
+            raise InputError(
+                file, f"parts of a time in {', '.join(c.name for c in columns)}", "--time-format"
+            )
+        return form
+    if columns[-1].kind == "number":
+        return f"{_form(file, columns[:-1])} %f"
+    pairs = list(zip(*(c.sample for c in columns), strict=True))
+    texts = [" ".join(part.strip() for part in pair) for pair in pairs if all(pair)]
+    forms = forms_of(texts)
+    where = f"{file}, column {' and '.join(c.name for c in columns)}"
+    if not forms:
+        expected = '--time-format such as "%Y-%m-%d %H:%M:%S.%f"'
+        raise InputError(
+            where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected
+        )
+    if forms == ["%H:%M"]:
+        found = f"{texts[0]!r}: hours and minutes, or minutes and seconds"
+        raise InputError(where, found, '--time-format "%H:%M" or --time-format "%M:%S"')
+    if len(forms) > 1:
+        choices = " or ".join(f'--time-format "{form}"' for form in forms[:3])
+        raise InputError(where, f"{texts[0]!r}: day and month cannot be told apart", choices)
+    return forms[0]

@@ -1,0 +1,297 @@
+"""A map for a file that has none, or what a map leaves open: which column is what, in which unit, and why.
+
+Names and units decide, never values. Where two columns are as likely, or a unit stands nowhere, nothing is guessed:
+the refusal names the choices and the option that makes one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ...common.errors import InputError
+from ..units import UnitError, channel_unit, conversion
+from .clockparts import fraction_of, parts_of
+from .hints import in_text, increments, listed, name_it, nameless
+from .mapping import Map
+from .names import Meaning, meaning, split_unit, words
+from .plan import Choice, ImportPlan
+from .tables import Column, LoggerFile, LoggerTable
+from .unitchoice import Ask, Units, asked, said
+
+__all__ = ["propose"]
+
+
+_CHANNELS = {
+    "supply": "V", "voltage": "V", "vbat": "V", "vcc": "V", "vdd": "V", "pressure": "hPa", "humidity": "%",
+    "current": "A", "magnetic": "uT", "mag": "uT", "temperature": "degC", "temp": "degC", "laser": "", "heater": "",
+    "fan": "",
+}  # fmt: skip
+_MOST_CHANNELS = 12  # that are proposed: a person has to read the list
+
+
+def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
+    """What is read of a file under a map, the open choices made from names.
+
+    Args:
+        chosen: What is stated already, by a map and options.
+        ask: Asks for a unit that stands nowhere.
+
+    Raises:
+        InputError: A column that is not there, two that are as likely, a unit that stands nowhere.
+    """
+    tables = _tables(file, chosen)
+    values = _values(file, tables, chosen)
+    _check_weight(file, values[0], chosen)
+    main = values[0][1]
+    time, rate_hz, why_rate = _time(file, main, chosen)
+    temperature = _temperature(file, tables, main, chosen)
+    missing: list[str] = []
+    unit = Units(file.path.name, chosen.units, ask, missing)
+    picked_values = tuple(
+        Choice(role, table, column, None if role == "pulses" else unit.of("rate", column, table), why)
+        for role, table, column, why in values
+    )
+    picked_temperature = Choice(
+        "temperature",
+        temperature[0],
+        temperature[1],
+        unit.of("temperature", temperature[1], temperature[0]),
+        temperature[2],
+    )
+    picked_time = tuple(_times(time, main, unit))
+    if missing:
+        raise InputError(file.path.name, "; ".join(said(missing)), " ".join(dict.fromkeys(asked(missing))))
+    taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
+    channels = tuple(_channels(file, main, chosen, taken))
+    taken |= {c.column.name for c in channels}
+    left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
+    return ImportPlan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
+
+
+def _times(time: Sequence[tuple[Column, str]], main: LoggerTable, unit: Units) -> Iterator[Choice]:
+    """The columns of time; a counter, which is one of numbers alone, has a unit."""
+    for column, why in time:
+        counter = column.kind == "number" and len(time) == 1
+        yield Choice("time", main, column, unit.of("time", column, main) if counter else None, why)
+
+
+def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
+    if chosen.table is None:
+        return list(file.tables)
+    found = [t for t in file.tables if t.name == chosen.table]
+    if not found:
+        names = ", ".join(t.name for t in file.tables)
+        raise InputError(file.path.name, f"no table {chosen.table!r}", f"--table with one of: {names}")
+    return found
+
+
+def _find(file: LoggerFile, name: str, near: LoggerTable | None = None) -> tuple[LoggerTable, Column]:
+    """The column that a map names, in any table of the file.
+
+    Raises:
+        InputError: There is none.
+    """
+    tables = sorted(file.tables, key=lambda t: t is not near)
+    for table in tables:
+        for column in table.columns:
+            if name in (column.name, f"{table.name}/{column.name}", split_unit(column.name)[0]):
+                return table, column
+    every = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
+    raise InputError(file.path.name, f"no column {name!r}", f"one of: {', '.join(every[:40])}")
+
+
+def _values(
+    file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map
+) -> list[tuple[str, LoggerTable, Column, str]]:
+    """Roles, tables, columns and reasons of what is measured; all of one table."""
+    stated = chosen.columns.values()
+    if stated:
+        found = [(role, *_find(file, name), "named by the map") for role, name in stated.items()]
+        if len({id(table) for _, table, _, _ in found}) > 1:
+            raise InputError(file.path.name, "rates of several tables", "rates of one table under [columns]")
+        return found
+    likely = [(table, *_rates(table, file.path)) for table in tables]
+    likely = [one for one in likely if one[1]]
+    best = max((one[2] for one in likely), default=0)
+    top = [one for one in likely if one[2] == best]
+    if not top:
+        unseen = f"no column that a rate is told from among {listed(file)}"
+        if made := nameless(file):
+            raise InputError(file.path.name, f"{unseen}: nothing stands above its rows", made)
+        raise InputError(file.path.name, unseen, increments(file) or name_it("rate") + in_text(file, "rate"))
+    if len(top) > 1:
+        names = ", ".join(repr(table.name) for table, _, _ in top)
+        raise InputError(
+            file.path.name, f"rates in {names}", f"--table with one of them, e.g. --table {top[0][0].name!r}"
+        )
+    table, columns, _ = top[0]
+    return [(role, table, column, why) for role, column, why in columns]
+
+
+def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str], chosen: Map) -> None:
+    """Pulses have an angle.
+
+    Raises:
+        InputError: It stands nowhere.
+    """
+    if value[0] == "pulses" and chosen.pulse_weight_arcsec is None:
+        found = f"column {value[2].name} counts pulses, and the angle of one stands nowhere"
+        raise InputError(file.path.name, found, "--pulse-weight-arcsec W")
+
+
+def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
+    """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
+    pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
+    if pulses:
+        return [("pulses", pulses[0], "its name")], 5
+    found = [(c, meaning(c.name, c.unit, table.name)) for c in table.columns if c.kind == "number"]
+    rates = [(c, m) for c, m in found if m.kind == "rate"]
+    if not rates:
+        rates = [
+            (c, m)
+            for c, m in found
+            if c.name in ("x", "y", "z") and "gyro" in words((table.name or file.stem).replace("_", " "))
+        ]
+    if not rates:
+        return [], 0
+    axes: dict[str, list[tuple[Column, Meaning]]] = {}
+    for column, one in rates:
+        axes.setdefault(one.axis, []).append((column, one))
+    best = max(one.score for _, one in rates)
+    triad = [sorted(axes.get(axis, []), key=lambda cm: -cm[1].score) for axis in "xyz"]
+    if all(triad) and all(len(t) == 1 or t[0][1].score > t[1][1].score for t in triad):
+        return [
+            (f"rate_{a}", t[0][0], f"its name, axis {a}") for a, t in zip("xyz", triad, strict=True)
+        ], best + 1
+    top = [(column, one) for column, one in rates if one.score == best]
+    if len(top) > 1:
+        raise InputError(
+            f"{file.name}, table {table.name}" if table.name else file.name,
+            f"{', '.join(repr(c.name) for c, _ in top)} could be the rate",
+            f'--column rate="{top[0][0].name}" (or another of them)',
+        )
+    return [("rate", top[0][0], "its name")], best
+
+
+def _temperature(
+    file: LoggerFile, tables: Sequence[LoggerTable], main: LoggerTable, chosen: Map
+) -> tuple[LoggerTable, Column, str]:
+    if chosen.columns.temperature:
+        return (*_find(file, chosen.columns.temperature, main), "named by the map")
+    number = _instance(main.name)
+    likely: list[tuple[int, LoggerTable, Column]] = []
+    for table in file.tables:
+        for column in table.columns:
+            one = meaning(column.name, column.unit, table.name)
+            if column.kind == "number" and one.kind == "temperature":
+                near = 8 * (table is main) + 2 * (bool(number) and _instance(table.name) == number)
+                likely.append((one.score + near, table, column))
+    best = max((score for score, _, _ in likely), default=0)
+    top = [(table, column) for score, table, column in likely if score == best]
+    if not top:
+        raise InputError(
+            file.path.name,
+            f"no column that a temperature is told from among {listed(file)}",
+            name_it("temperature") + in_text(file, "temperature"),
+        )
+    if len(top) > 1:
+        names = [f"{t.name}/{c.name}" if t.name else c.name for t, c in top]
+        raise InputError(
+            file.path.name,
+            f"{', '.join(map(repr, names))} could be the temperature of the gyro",
+            f'--column temperature="{names[0]}" (or another of them)',
+        )
+    where = "its name" if top[0][0] is main else "its name; the last reading holds until the next"
+    return (*top[0], where)
+
+
+def _instance(name: str) -> str:
+    return "".join(mark for mark in name if mark.isdigit())
+
+
+def _time(
+    file: LoggerFile, main: LoggerTable, chosen: Map
+) -> tuple[list[tuple[Column, str]], float | None, str]:
+    """Columns of time with reasons; or rows per second with the reason."""
+    if chosen.time.rate_hz is not None:
+        return [], chosen.time.rate_hz, "rows are counted, as stated"
+    if chosen.columns.time:
+        return [(_find(file, name, main)[1], "named by the map") for name in chosen.columns.time], None, ""
+    stamps = [c for c in main.columns if c.kind == "stamp"]
+    if stamps:
+        whole = _stamps(file, stamps)
+        fraction = fraction_of(main.columns, whole[-1][0])
+        return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
+    if parts := parts_of(main.columns):
+        return [(column, "parts of the time, by their names") for column in parts], None, ""
+    stated = {*chosen.columns.values().values(), chosen.columns.temperature}
+    free = [c for c in main.columns if c.kind == "number" and c.name not in stated]
+    found = [(c, meaning(c.name, c.unit, main.name)) for c in free]
+    likely = [(m.score, c) for c, m in found if m.kind == "time"]
+    best = max((score for score, _ in likely), default=0)
+    top = [c for score, c in likely if score == best]
+    if top:
+        return [(top[0], "its name" if len(top) == 1 else "its name, the first of that kind")], None, ""
+    if main.rate_hz is not None:
+        return [], main.rate_hz, main.why_rate
+    expected = (
+        '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
+    )
+    unseen = f"no column that a time is told from among {listed(file)}"
+    raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
+
+
+def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
+    """One column of dates and times, or a date and a time of day."""
+    from .forms import forms_of
+
+    parts = [(c, forms_of([s for s in c.sample if s])) for c in stamps]
+    if not any(c.sample for c in stamps):
+        return [(stamps[0], "it holds dates and times")]
+    whole = [c for c, f in parts if any("%d" in form and ("%H" in form or "%I" in form) for form in f)]
+    if whole:
+        return [(whole[0], "it holds dates and times")]
+    dates = [c for c, f in parts if any("%d" in form for form in f)]
+    clocks = [c for c, f in parts if any("%M" in form for form in f)]
+    if dates and clocks:
+        return [(dates[0], "it holds dates"), (clocks[0], "it holds times of day")]
+    return [((clocks or stamps)[0], "it holds times of day")]
+
+
+def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str]) -> Iterator[Choice]:
+    if chosen.channels is not None:
+        for name, source in chosen.channels.items():
+            table, column = _find(file, source, main)
+            if table is not main:
+                raise InputError(
+                    file.path.name, f"channel {name} of another table", f"a column of {main.name!r}"
+                )
+            yield Choice(name, main, column, chosen.units.get(name, column.unit), "named by the map")
+        return
+    count = 0
+    for column in main.columns:
+        parts = words(split_unit(column.name)[0])
+        known = next((w for w in parts if w in _CHANNELS), None)
+        if column.name in taken or column.kind != "number" or known is None or count >= _MOST_CHANNELS:
+            continue
+        if column.sample and not any(column.sample):
+            continue
+        count += 1
+        unit = column.unit or split_unit(column.name)[1]
+        yield Choice(
+            _channel_name(column.name, unit, _CHANNELS[known]), main, column, unit, "its name: a channel"
+        )
+
+
+def _channel_name(name: str, unit: str | None, native: str) -> str:
+    """A plain name; with the ending of the unit that it is converted to, where its unit is known."""
+    plain = "_".join(words(split_unit(name)[0])).encode("ascii", "ignore").decode() or "channel"
+    endings = {"V": "v", "hPa": "hpa", "A": "ma", "uT": "ut", "degC": "c"}
+    if unit and native in endings and channel_unit(f"{plain}_{endings[native]}") is not None:
+        try:
+            conversion(unit, str(channel_unit(f"x_{endings[native]}")))
+        except UnitError:
+            return plain
+        return f"{plain}_{endings[native]}"
+    return plain

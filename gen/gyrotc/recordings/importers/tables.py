@@ -1,0 +1,146 @@
+"""What every format of a logger becomes: tables of named columns, read in chunks.
+
+A file holds one table (CSV) or many (the topics of a flight log, the groups of a measurement file). Columns are named
+`table/column` where there are many. An importer knows what its format says of units and of time; it guesses nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.errors import InputError
+
+__all__ = ["CHUNK_ROWS", "Chunk", "Column", "LoggerFile", "LoggerTable", "library"]
+
+CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
+Array = NDArray[Any]
+ColumnKind = Literal["number", "stamp", "text"]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        name: Name as the file has it.
+        unit: As the file gives it, None where it gives none.
+        why: Where the unit stands.
+        kind: What its cells hold; "stamp": dates and times of day.
+        sample: The first cells as text, for previews and to tell the form of stamps.
+    """
+
+    name: str
+    unit: str | None = None
+    why: str = ""
+    kind: ColumnKind = "number"
+    sample: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some rows of a table.
+
+    Attributes:
+        columns: Values by name: numbers (NaN where a cell is missing), datetime64[ns], or text (pyarrow).
+        first: Number of the first row in the table, from 0.
+        done: Share of the table that has been read with these rows, 0 to 1.
+    """
+
+    columns: dict[str, Any]
+    first: int
+    done: float
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()))) if self.columns else 0
+
+
+@dataclass(frozen=True)
+class LoggerTable(ABC):
+    """Rows of one rhythm.
+
+    Attributes:
+        name: Name within the file; empty where there is one table.
+        columns: Its columns.
+        rate_hz: Rows per second where the format states it and no column holds times.
+        why_rate: Where that stands.
+        started: Time of the first row where the format states it.
+        notes: What a user should know of how the table was read.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    rate_hz: float | None = None
+    why_rate: str = ""
+    started: datetime | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @abstractmethod
+    def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
+        """Rows in order, with the columns asked for.
+
+        Raises:
+            InputError: A row that cannot be read, with its place and the change that goes on.
+        """
+
+    def place(self, row: int) -> str:
+        """Where a row stands, for messages."""
+        return f"row {row + 1}" if not self.name else f"{self.name}, row {row + 1}"
+
+    def column(self, name: str) -> Column | None:
+        """The column of a name, None if there is none."""
+        return next((c for c in self.columns if c.name == name), None)
+
+
+@dataclass(frozen=True, slots=True)
+class LoggerFile:
+    """A file of a logger.
+
+    Attributes:
+        path: Where it is.
+        format: Words for its format.
+        tables: What it holds.
+        facts: Facts about the recording that the file states, such as a serial.
+        csv: How a CSV file is read, as keys of `[csv]` of a map; empty for other formats.
+        since_power_on: Whether its clock starts when the unit is switched on.
+        close: Ends the reading: after it no chunk comes.
+    """
+
+    path: Path
+    format: str
+    tables: tuple[LoggerTable, ...]
+    facts: dict[str, str] = field(default_factory=dict)
+    csv: dict[str, Any] = field(default_factory=dict)
+    since_power_on: bool = False
+    close: Callable[[], object] = lambda: None
+
+
+def library(path: Path, module: str, extra: str, what: str) -> ModuleType:
+    """A library that only one format, that of the file at `path`, needs.
+
+    Raises:
+        InputError: It is not installed; the message says what to install.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        package = module.split(".", maxsplit=1)[0]
+        found = f"{what} is read by {package}, which is not installed"
+        raise InputError(path.name, found, f"pip install 'gyrotc[{extra}]'") from error
+
+
+def numbers(values: Any) -> Array:
+    """An array of numbers as it is, in this machine's byte order, one value a row."""
+    array = np.asarray(values)
+    if array.dtype.byteorder == ">":
+        array = array.astype(array.dtype.newbyteorder("="))
+    return np.ascontiguousarray(array.reshape(-1))

@@ -1,0 +1,89 @@
+"""TDMS files of LabVIEW (`nptdms`): units and rhythm from the properties of channels, read part by part."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...common.errors import InputError
+from .arrays import ArrayTable, Part
+from .tables import Column, LoggerFile, LoggerTable, library, numbers
+
+__all__ = ["open_tdms"]
+
+_UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
+
+
+def open_tdms(path: Path) -> LoggerFile:
+    """A TDMS file: each group a table, where its channels are of one length.
+
+    Raises:
+        InputError: nptdms is not installed, or the file is damaged.
+    """
+    nptdms = library(path, "nptdms", "tdms", "a TDMS file")
+    stream = path.open("rb")  # nptdms leaves one that it opens itself open where the file is damaged
+    try:
+        file = nptdms.TdmsFile.open(stream)
+        tables = tuple(table for group in file.groups() for table in _tables(group))
+    except Exception as error:  # whatever a damaged file makes of the parser
+        stream.close()
+        what = " ".join(str(error).split())[:100]
+        raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
+    if not tables:
+        stream.close()
+        raise InputError(path.name, "no numeric channels", "a TDMS file with channels of numbers")
+    facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
+    return LoggerFile(path, "TDMS file", tables, facts, close=stream.close)
+
+
+def _tables(group: Any) -> list[LoggerTable]:
+    lengths: dict[int, list[Any]] = {}
+    for channel in group.channels():
+        if len(channel) > 1:
+            lengths.setdefault(len(channel), []).append(channel)
+    tables: list[LoggerTable] = []
+    for rows, channels in lengths.items():
+        columns, parts = [], {}
+        for channel in channels:
+            column = _column(channel)
+            if column is not None:
+                columns.append(column)
+                parts[column.name] = _part(channel)
+        step = channels[0].properties.get("wf_increment")
+        rate = 1.0 / float(step) if step else None
+        name = group.name if len(lengths) == 1 else f"{group.name} ({rows} rows)"
+        why = f"wf_increment = {step} s of {channels[0].name}" if rate else ""
+        started = _instant(channels[0].properties.get("wf_start_time")) if rate else None
+        if columns:
+            tables.append(ArrayTable(name, tuple(columns), rate, why, started, rows=rows, parts=parts))
+    return tables
+
+
+def _column(channel: Any) -> Column | None:
+    kind = getattr(channel.dtype, "kind", "O")
+    if kind == "M":
+        return Column(channel.name, "UTC", kind="stamp")
+    if kind not in "iuf":
+        return None
+    unit = next((str(channel.properties[k]) for k in _UNIT_KEYS if channel.properties.get(k)), None)
+    return Column(channel.name, unit, "a property of the channel" if unit else "")
+
+
+def _part(channel: Any) -> Part:
+    def part(first: int, last: int) -> Any:
+        values = channel[first:last]
+        return (
+            values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)
+        )
+
+    return part
+
+
+def _instant(value: Any) -> datetime | None:
+    if value is None:
+        return None
+    microseconds = int(np.datetime64(value, "us").astype(np.int64))
+    return datetime.fromtimestamp(microseconds / 1e6, timezone.utc)

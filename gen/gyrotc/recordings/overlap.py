@@ -1,0 +1,130 @@
+"""Runs that hold the same rows: an exam on training data is refused, rows that count twice are told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import InputError
+from .problems import Problems
+from .reading import Reader, Recording
+from .records import Floats, Run, SharedRows
+from .schema import FILE
+from .shared import windows_in_common, windows_that_repeat
+
+__all__ = ["shared_rows"]
+
+_PART = 2**20  # rows that are compared at once
+_MOST = 20  # stretches of two runs that are told
+_TOLERANCE = 2.0**-22  # relative; rows are compared as float32
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """Time (s), temperature and rate of a run's file as they were recorded, NaN outside the run.
+
+    Two of them are in memory at once, so values are what they are compared as.
+    """
+
+    time_s: Floats
+    values: tuple[NDArray[np.float32], ...]
+
+
+def shared_rows(
+    runs: Sequence[Run], recordings: Mapping[str, Recording], problems: Problems
+) -> tuple[SharedRows, ...]:
+    """Rows that runs of one role have in common, or that a run has twice.
+
+    Rows that a training run and an exam have in common are a problem, with the exclusion that mends it.
+    """
+    found: list[SharedRows] = []
+    prints = [recordings[run.file].fingerprints.within(run) for run in runs]
+    for j, other in enumerate(runs):
+        for i, one in enumerate(runs[: j + 1]):
+            windows = windows_that_repeat(prints[j]) if i == j else windows_in_common(prints[j], prints[i])
+            for shared in _stretches(other, one, windows) if len(windows) else ():
+                if one.role == other.role:
+                    found.append(shared)
+                else:
+                    of_exam = shared if other.role == "exam" else _turned(shared)
+                    problems.add(_refused(of_exam), *of_exam.marks)
+    return tuple(found)
+
+
+def _turned(shared: SharedRows) -> SharedRows:
+    return replace(
+        shared,
+        file=shared.other_file,
+        rows=shared.other_rows,
+        span_s=shared.other_span_s,
+        other_file=shared.file,
+        other_rows=shared.rows,
+        other_span_s=shared.span_s,
+    )
+
+
+def _refused(shared: SharedRows) -> InputError:
+    """The exam holds training data."""
+    start, end = shared.span_s
+    line = f'exclude = [{{from_s = {start!r}, to_s = {end!r}, reason = "also in {shared.other_file}"}}]'
+    return InputError(
+        f"{shared.file}, rows {shared.rows[0]} to {shared.rows[1]}",
+        f"{shared.rows[1] - shared.rows[0] + 1} rows of an exam that are also rows {shared.other_rows[0]} to "
+        f"{shared.other_rows[1]} of {shared.other_file}, which is trained on",
+        f"rows that training has not seen: {line} in the exam's [[run]] of {FILE}, or one role for both",
+    )
+
+
+def _stretches(one: Run, other: Run, windows: NDArray[np.int64]) -> Iterator[SharedRows]:
+    """Windows in common, each as far as the rows go on being the same."""
+    first, second = _span(one), _span(other)
+    for _ in range(_MOST):
+        if len(windows) == 0:
+            return
+        a, b, rows = windows[0].tolist()
+        before = _alike(first, second, a, b, -1)
+        after = max(_alike(first, second, a, b, 1), rows)
+        inside = (windows[:, 0] < a + after) & (windows[:, 1] - windows[:, 0] == b - a)
+        windows = windows[~inside]
+        yield SharedRows(
+            file=one.file,
+            rows=(a - before + 1, a + after),
+            span_s=_times(first.time_s, a - before, a + after, one.row_period_s),
+            other_file=other.file,
+            other_rows=(b - before + 1, b + after),
+            other_span_s=_times(second.time_s, b - before, b + after, other.row_period_s),
+        )
+
+
+def _span(run: Run) -> _Span:
+    reader = run.reader
+    rows = replace(reader, earth=None, applied=None)() if isinstance(reader, Reader) else run.rows()
+    inside = run.in_span(rows.time_s)
+    values = [rows.temperature_c.astype(np.float32), rows.rate_dph.astype(np.float32)]
+    for of_run in values:
+        of_run[~inside] = np.nan
+    return _Span(rows.time_s, tuple(values))
+
+
+def _times(time_s: Floats, first: int, end: int, period_s: float) -> tuple[float, float]:
+    """From the first row to the row that follows the last."""
+    end = min(end, len(time_s))
+    return float(time_s[first]), float(time_s[end] if end < len(time_s) else time_s[-1] + period_s)
+
+
+def _alike(one: _Span, other: _Span, a: int, b: int, step: int) -> int:
+    """Number of rows that are the same from rows a and b on (step 1), or before them (step -1)."""
+    n = min(len(one.time_s) - a, len(other.time_s) - b) if step > 0 else min(a, b)
+    for start in range(0, n, _PART):
+        count = min(_PART, n - start)
+        same = np.ones(count, dtype=bool)
+        for x, y in zip(one.values, other.values, strict=True):
+            u = x[a + start : a + start + count] if step > 0 else x[a - start - count : a - start][::-1]
+            v = y[b + start : b + start + count] if step > 0 else y[b - start - count : b - start][::-1]
+            same &= np.abs(u - v) <= _TOLERANCE * np.abs(u)
+        if not same.all():
+            return start + int(np.argmin(same))
+    return n

@@ -1,0 +1,245 @@
+"""One file: opened, its columns understood, its numbers checked; read again as often as it is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..common.errors import InputError
+from ..common.metrics import median
+from .columns import Layout, arrange
+from .csv_file import CsvFile
+from .evidence import Evidence
+from .parquetfile import ParquetFile
+from .problems import Problems
+from .records import Applied, EarthRate, Floats, Mark, Rows
+from .schema import Columns
+from .shared import Fingerprints, fingerprints_of
+from .source import Source
+from .units import Conversion, declared
+from .values import MIN_ROWS, Fault, faults, rate_faults
+
+__all__ = ["Reader", "Recording", "in_time", "open_file", "open_recording"]
+
+_LONGEST_GAP = 10.0  # row periods across which a temperature is interpolated
+_SHORTEST_S = 1e-5  # no gyro is recorded faster; a time scale taken wrong makes blocks of 10^12 rows
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A file whose numbers are in order.
+
+    Attributes:
+        file: The file.
+        layout: Its columns.
+        units: Conversions to gyrotc's units, by column.
+        evidence: What its units can be judged by.
+        fingerprints: What its rows can be known again by.
+        time_s: Its times, s.
+        n_rows: Number of its rows.
+        row_period_s: Median row period, s.
+    """
+
+    file: Source
+    layout: Layout
+    units: dict[str, Conversion]
+    evidence: Evidence
+    fingerprints: Fingerprints
+    time_s: Floats
+    n_rows: int
+    row_period_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reader:
+    """Reads the rows of one axis of a file.
+
+    Attributes:
+        units: Conversions to gyrotc's units, by column.
+        pulse_weight_arcsec: Angle of one pulse, arcsec; used where pulses were counted.
+        earth: Earth's rate to take off.
+        applied: Correction to add back.
+        temperature_late_s: How much later than the rate the temperature was recorded, s.
+    """
+
+    file: Source
+    layout: Layout
+    units: dict[str, Conversion]
+    axis: str | None
+    channels: tuple[str, ...]
+    pulse_weight_arcsec: float | None
+    earth: EarthRate | None
+    applied: Applied | None
+    row_period_s: float
+    temperature_late_s: float = 0.0
+
+    def __call__(self) -> Rows:
+        """All rows.
+
+        Raises:
+            InputError: The file has been changed since it was checked.
+        """
+        layout = self.layout
+        value = layout.value_of(self.axis)
+        self.file.check_unchanged()
+        columns = self.file.columns((layout.time, layout.temperature, value, *self.channels))
+        if columns is None:
+            columns, _, _ = self.file.scan()
+        columns = _converted(columns, self.units)
+        if layout.pulses:
+            weight = self.pulse_weight_arcsec or 1.0
+            columns |= {value: rate_of_pulses(columns[layout.time], columns[value], weight)}
+        columns = known_rows(columns, layout, self.channels)
+        time, rate = columns[layout.time], columns[value]
+        if self.earth is not None:
+            rate = rate - self.earth.rate_dph
+        channels = {name: columns[name] for name in self.channels}
+        rows = Rows(time, columns[layout.temperature], rate, channels)
+        if self.applied is not None:
+            rate = rate + self.applied.correction_dph(rows, self.row_period_s)
+            rows = Rows(time, rows.temperature_c, rate, channels)
+        return in_time(rows, self.temperature_late_s, self.row_period_s) if self.temperature_late_s else rows
+
+
+def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
+    """The rows with the temperature that was recorded `late_s` later; without those for which there is none."""
+    then = rows.time_s + late_s
+    after = np.searchsorted(rows.time_s, then).clip(1, len(rows.time_s) - 1)
+    known = (then >= rows.time_s[0]) & (then <= rows.time_s[-1])
+    known &= np.diff(rows.time_s)[after - 1] <= _LONGEST_GAP * row_period_s
+    temperature = np.interp(then, rows.time_s, rows.temperature_c)
+    channels = {name: values[known] for name, values in rows.channels.items()}
+    return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels)
+
+
+def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[str]) -> dict[str, Floats]:
+    """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
+
+    A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
+    """
+    known = np.ones(len(columns[layout.time]), dtype=bool)
+    for name in (layout.temperature, *channels):
+        with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
+            doubtful = np.isnan(np.sum(columns[name]))
+        if doubtful:
+            known &= ~np.isnan(columns[name])
+    return columns if known.all() else {name: values[known] for name, values in columns.items()}
+
+
+def _converted(columns: dict[str, Floats], units: Mapping[str, Conversion]) -> dict[str, Floats]:
+    """Columns in gyrotc's units."""
+    return {name: units[name](values) if name in units else values for name, values in columns.items()}
+
+
+def rate_of_pulses(time_s: Floats, pulses: Floats, weight_arcsec: float) -> Floats:
+    """Mean rate since the last row, deg/h (1 arcsec/s = 1 deg/h); NaN in the first row."""
+    rate = np.full(len(time_s), np.nan)
+    rate[1:] = pulses[1:] * weight_arcsec / np.diff(time_s)
+    return rate
+
+
+def open_recording(
+    name: str,
+    path: Path,
+    columns: Columns,
+    units: Mapping[str, str],
+    pulse_weight_arcsec: float | None,
+    problems: Problems,
+) -> Recording | None:
+    """Opens and checks one file; None (and problems) if it is not in order."""
+    before = len(problems)
+    try:
+        file = open_file(name, path)
+        layout = arrange(name, file.names, columns, problems)
+        if layout is None:
+            return None
+        if layout.pulses and pulse_weight_arcsec is None:
+            raise InputError(f"{name}, column pulses", "no weight", "pulse_weight_arcsec in dataset.toml")
+        if layout.pulses and "rate" in units:
+            raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
+        conversions = declared(units, _by_kind(layout))
+        time, evidence, fingerprints = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+    except InputError as error:
+        problems.add(error)
+        return None
+    if len(problems) > before:
+        return None
+    period = median(np.diff(time), overwrite_input=True)
+    if period < _SHORTEST_S:
+        where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
+        problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
+        return None
+    return Recording(file, layout, conversions, evidence, fingerprints, time, len(time), period)
+
+
+def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
+    return {
+        "time": [layout.time],
+        "temperature": [layout.temperature],
+        "rate": list(layout.axes.values()) or [layout.value],
+        "channels": layout.channels,
+    }
+
+
+def open_file(name: str, path: Path) -> Source:
+    """Opens a file by the ending of its name.
+
+    Raises:
+        InputError: There is none, or it is not what its name says.
+    """
+    return ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
+
+
+def _checked(
+    file: Source,
+    layout: Layout,
+    units: Mapping[str, Conversion],
+    pulse_weight_arcsec: float | None,
+    problems: Problems,
+) -> tuple[Floats, Evidence, Fingerprints]:  # long: one refusal after the other
+    """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
+    values = file.columns(file.names)
+    lines = None
+    if values is None:
+        values, lines, unread = file.scan()
+        for fault in unread:
+            problems.add(_problem(file, fault, fault.row))
+        if unread:
+            keep = np.all([~np.isnan(column) for column in values.values()], axis=0)
+            values = {name: column[keep] for name, column in values.items()}
+            lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
+    values = _converted(values, units)
+    time = values[layout.time]
+    found = list(faults(values, layout))
+    if layout.pulses and not found:
+        found += rate_faults(
+            layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0)
+        )
+    for fault in found:
+        place = lines[fault.row] if lines else file.place(fault.row)
+        mark = Mark(file.name, (fault.row + 1, fault.row + 1), column=fault.column)
+        problems.add(_problem(file, fault, place, units.get(fault.column)), mark)
+    if len(time) < MIN_ROWS:
+        problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))
+    rows = len(time)
+    values = known_rows(values, layout, layout.channels)
+    time = values[layout.time]
+    measured = min(np.count_nonzero(~np.isnan(values[n])) for n in layout.axes.values() or [layout.value])
+    if measured < MIN_ROWS <= rows:
+        some = f"{measured} rows with a temperature and a rate, the others have NaN"
+        problems.add(InputError(file.name, some, f"at least {MIN_ROWS}"))
+    rates = [values[name] for name in layout.axes.values() or [layout.value]]
+    evidence = Evidence(len(rates))
+    evidence.add(time, values[layout.temperature], rates)
+    return time, evidence, fingerprints_of(time, values[layout.temperature], rates)
+
+
+def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:
+    rows = file.row_unit
+    where = f"{file.name}, {rows} {place}" + (f", column {fault.column}" if fault.column else "")
+    more = f" (and {fault.rows - 1} more {rows}s)" if fault.rows > 1 else ""
+    declared_as = f" after conversion from {unit.unit}" if unit else ""
+    return InputError(where, fault.found + declared_as + more, fault.expected)

@@ -1,0 +1,1 @@
+"""Writing: result folders and files that appear whole or not at all, markers, locks, caches."""

@@ -1,0 +1,309 @@
+"""Fixed-point tables: (s, k) of every Gaussian rounded first, the linear weights solved again with them.
+
+The weights are solved against the model over the whole envelope, in closed form: the Gaussians are
+products of functions of one input, so the Gram matrix of a grid is the product of two small ones. The
+bound is proved from a grid of the difference and what its derivative allows between grid points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import CheckFailed
+from ..model import Envelope, Model
+from ..target.q31 import GAUSS_ERROR
+from ..target.table import Table
+from .authority import unbounded
+from .common import shared
+from .guards import guard_words
+from .handover import Axis, handover_error_dph, regions
+from .positions import POSITIONS, Inputs, Surface, difference, position_scale, surface_of
+from .sigma import sigma_values
+from .solve import gram, solve
+from .terms import q31_terms, term_size_dph
+
+__all__ = ["table_of"]
+
+_INPUT = 65536.0  # units of a temperature in C
+_MAX_SPAN = 2**26  # 1024 C in 2^-16 C: an offset times 32 then fits 32 bits
+_FINEST = 28  # largest number of fraction bits of an argument
+_COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
+_LARGEST_ARGUMENT = 2**31 - 1  # a signed 32-bit word
+_MAX_FACTOR = 65535  # of s
+_SOLVE_POINTS = 256  # of each input: weights are solved for on this grid, whose time grows with it
+# Of the normal equations, which it keeps solvable where Gaussians nearly coincide: docs/numerics.md, section 3
+_RIDGE = 1e-6
+# Of each input: the bound is loose by what a surface grows within a cell, the time grows with their number
+_GRID_CELLS = 512
+_SHARE = 2.0**-24  # unit of a share of a bank, which is cut off
+
+Floats = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Gaussians:
+    """Rounded Gaussians: arguments s x + k in 2^-fraction."""
+
+    factor: NDArray[np.int64]  # s, shape (n, 2)
+    offset: NDArray[np.int64]  # k
+    fraction: int
+
+    def fits(self) -> bool:
+        """Whether every argument, and every factor of one, fits its word."""
+        reach = np.maximum(np.abs(self.offset), np.abs(self.offset + self.factor * (POSITIONS - 1)))
+        return bool(
+            np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR
+        )
+
+    def on(self, surface: Surface) -> Surface:
+        """The surface with these Gaussians in place of its own."""
+        alpha = self.factor * 2.0**-self.fraction
+        center = np.divide(-self.offset, self.factor, out=np.zeros(alpha.shape), where=self.factor > 0)
+        return replace(surface, alpha=alpha, center=center)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fixed:
+    """One network in fixed point, but for the unit of its weights."""
+
+    exact: Surface
+    gaussians: _Gaussians
+    solved: Surface
+    lost: float  # |weights| of Gaussians that are nowhere felt
+
+
+def table_of(model: Model) -> Table:
+    """The table of a model in fixed point, without known answers.
+
+    Raises:
+        CheckFailed: The model cannot be held in fixed point, with the reason.
+    """
+    per_block = model.block_s / 60.0
+    envelope = _envelope(model, per_block)
+    inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
+    given = (*model.networks, *model.stand_ins)
+    surfaces = [surface_of(n, model.scale, per_block, inputs) for n in given]
+    felt = [_felt(surface) for surface in surfaces]
+    chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
+    fraction = min(_fraction(surface) for surface in chosen)
+    if fraction < _COARSEST:
+        raise CheckFailed(
+            "q31: a Gaussian is too narrow for the envelope, or too far from it, for its argument"
+        )
+    networks = [
+        _fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)
+    ]
+    largest = max(_size(network.solved) for network in networks)
+    frac_bits = _frac_bits(max(largest, abs(model.fallback_dph)) + term_size_dph(model))
+    bounds = [_bound(network, inputs, frac_bits) for network in networks]
+    of_map, stand_ins = bounds[: len(model.networks)], bounds[len(model.networks) :]
+    parts = {part: max(bound[part] for bound in of_map) for part in bounds[0]}
+    if len(model.networks) > 1:
+        axes = _axes(model, inputs, per_block)
+        parts["hand-over"] = handover_error_dph(model, "q31", axes, share_step=_SHARE, share_error=0.0)
+        parts["blend"] = 2.0**-frac_bits  # the quotient is rounded
+    table = _table(model, envelope, inputs, networks, frac_bits, parts)
+    return replace(table, stand_in_bounds_dph=tuple(math.fsum(bound.values()) for bound in stand_ins))
+
+
+def _fixed(whole: Surface, part: Surface, keep: NDArray[np.bool_], fraction: int) -> _Fixed:
+    gaussians = _rounded(part, fraction)
+    lost = math.fsum(np.abs(whole.weights[~keep]))
+    return _Fixed(part, gaussians, _solved(part, gaussians.on(part)), lost)
+
+
+def _bound(network: _Fixed, inputs: Inputs, frac_bits: int) -> dict[str, float]:
+    """Largest departures from the model in float64 over the envelope, deg/h, by their origin."""
+    whole = _whole(network.solved, frac_bits)
+    final = _in_dph(network.gaussians.on(network.solved), whole, frac_bits)
+    size = math.fsum(abs(w) for w in final.weights)
+    return {
+        "rounded inputs": _input_error(network.exact, inputs),
+        "rounded parameters": difference(network.exact, final, _GRID_CELLS),
+        "Gaussian": GAUSS_ERROR * size + network.lost * 2.0**-32,
+        "truncated result": 2.0**-frac_bits,
+    }
+
+
+def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
+    """T min, T max, slope min, slope max in 2^-16 C and 2^-16 C per block."""
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    low_t, high_t, low_r, high_r = (round(v * _INPUT) for v in (t0, t1, r0 * per_block, r1 * per_block))
+    if max(high_t - low_t, high_r - low_r) >= _MAX_SPAN - 1024:
+        raise CheckFailed("q31: the envelope spans more than 1023 C, or 1023 C per block")
+    return low_t, high_t, low_r, high_r
+
+
+def _felt(surface: Surface) -> NDArray[np.bool_]:
+    """Gaussians that reach 2^-32 somewhere in the envelope."""
+    center = surface.center
+    beyond = np.maximum(np.maximum(-center, center - POSITIONS), 0.0) * surface.alpha
+    return np.asarray(beyond[:, 0] ** 2 + beyond[:, 1] ** 2 < 32.0)
+
+
+def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
+    return replace(
+        surface, alpha=surface.alpha[keep], center=surface.center[keep], weights=surface.weights[keep]
+    )
+
+
+def _fraction(surface: Surface) -> int:
+    """As many fraction bits as the farthest argument leaves."""
+    fraction = _FINEST
+    while not _rounded(surface, fraction).fits():
+        fraction -= 1
+    return fraction
+
+
+def _rounded(surface: Surface, fraction: int) -> _Gaussians:
+    """s and k of every Gaussian."""
+    factor = np.rint(surface.alpha * 2.0**fraction).astype(np.int64)
+    offset = np.rint(-factor * surface.center).astype(np.int64)
+    return _Gaussians(factor, offset, fraction)
+
+
+def _columns(surface: Surface) -> tuple[Floats, Floats]:
+    """Factors of constant, linear parts and Gaussians on the grid: for T and for the slope."""
+    x = (np.arange(_SOLVE_POINTS) + 0.5) * (POSITIONS / _SOLVE_POINTS)
+    one, ramp = np.ones((x.size, 1)), x[:, None] / POSITIONS
+    first = np.concatenate([one, ramp, one, surface.factors(0, x)], axis=1)
+    second = np.concatenate([one, one, ramp, surface.factors(1, x)], axis=1)
+    return first, second
+
+
+def _solved(exact: Surface, rounded: Surface) -> Surface:
+    """Weights for the rounded Gaussians that come nearest to the exact surface, close to its own."""
+    old_t, old_r = _columns(exact)
+    new_t, new_r = _columns(rounded)
+    normal = gram(new_t, new_t) * gram(new_r, new_r)
+    cross = gram(new_t, old_t) * gram(new_r, old_r)
+    values = np.array([exact.w0, *exact.linear, *exact.weights])
+    right = np.zeros(len(values))
+    for k, value in enumerate(values):
+        right = right + value * (cross[:, k] - normal[:, k])
+    diagonal = np.arange(len(values))
+    normal[diagonal, diagonal] += _RIDGE * _SOLVE_POINTS**2
+    values = values + solve(normal, right)
+    return replace(exact, w0=float(values[0]), linear=values[1:3], weights=values[3:])
+
+
+def _size(surface: Surface) -> float:
+    """Largest sum that the surface's parts can make, deg/h."""
+    return math.fsum(abs(p) for p in (surface.w0, *surface.linear, *surface.weights))
+
+
+def _frac_bits(size: float) -> int:
+    """Most fraction bits of a bias with which a sum of this size stays below 2^30."""
+    largest = max(size, 2.0**-30)
+    bits = 30 - math.frexp(largest)[1]
+    if largest * 2.0**bits > 2**30 - 1024:  # room for the rounding of 512 weights
+        bits -= 1
+    if bits < 0:
+        raise CheckFailed(f"q31: weights of {largest:.3g} deg/h in all leave the range of 32 bits")
+    return bits
+
+
+def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:
+    """w0, linear parts and weights as integers."""
+    values = np.array([surface.w0, *surface.linear, *surface.weights])
+    return np.rint(values * 2.0**frac_bits).astype(np.int64)
+
+
+def _in_dph(surface: Surface, whole: NDArray[np.int64], frac_bits: int) -> Surface:
+    values = whole * 2.0**-frac_bits
+    return replace(surface, w0=float(values[0]), linear=values[1:3], weights=values[3:])
+
+
+def _input_error(exact: Surface, inputs: Inputs) -> float:
+    """Largest effect of an input that is moved to the middle of its cell, deg/h."""
+    moved = [0.5 + 0.5 * i.per_unit for i in inputs]  # the second: edges of the envelope are rounded, too
+    steepest = exact.steepest()
+    return math.fsum(moved[k] * float(steepest[k]) for k in (0, 1))
+
+
+def _table(
+    model: Model,
+    envelope: tuple[int, int, int, int],
+    inputs: Inputs,
+    networks: list[_Fixed],
+    frac_bits: int,
+    parts: dict[str, float],
+) -> Table:
+    unit = 2.0**frac_bits
+    narrow = 2 * (_FINEST - networks[0].gaussians.fraction)
+    wholes = [_whole(network.solved, frac_bits) for network in networks]
+    heads = [
+        [len(whole) - 3, *whole[:3], *_region(region, inputs, model)]
+        for whole, region in zip(wholes, regions(model), strict=True)
+    ]
+    records = [_records(n.gaussians, whole) for n, whole in zip(networks, wholes, strict=True)]
+    return Table(
+        numeric="q31",
+        **shared(model),
+        bias_frac_bits=frac_bits,
+        fallback=_word(round(model.fallback_dph * unit)),
+        **unbounded("q31"),
+        rezero=_word(round(model.rezero_dph * unit)),
+        scale=(inputs[0].gain, inputs[1].gain, narrow),
+        envelope=tuple(_word(v) for v in envelope),
+        networks=_words(heads),
+        centers=_words(np.concatenate(records)),
+        guards=guard_words(model, "q31"),
+        terms=q31_terms(model, frac_bits),
+        sigma=_words(sigma_values(model, frac_bits)),
+        probes=np.zeros(0, dtype=np.uint32),
+        error_bound_dph=math.fsum(parts.values()),
+        bound_parts_dph=parts,
+    )
+
+
+def _records(gaussians: _Gaussians, whole: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Records of the centers, shape (n, 5): s, k, s, k, weight."""
+    pairs = np.stack([gaussians.factor, gaussians.offset], axis=2).reshape(len(whole) - 3, 4)
+    return np.concatenate([pairs, whole[3:, None]], axis=1)
+
+
+def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
+    """A network's region in positions."""
+    per_block = model.block_s / 60.0
+    edges = []
+    for scale, pair, unit in zip(
+        inputs, (region.temperature_c, region.slope_c_per_min), (1.0, per_block), strict=True
+    ):
+        for value in pair:
+            edges.append(min(max(round(scale.position(value * unit * _INPUT)), 0), POSITIONS - 1))
+    return edges
+
+
+def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
+    """Inputs as the table compares them with the edges of regions: positions.
+
+    An input is moved to the middle of its cell, and by the rounding of the envelope to which both sides clamp.
+    """
+    boxes = regions(model)[: len(model.networks)]
+    edges = np.array([_region(region, inputs, model) for region in boxes], dtype=np.float64)
+    t, r = (
+        Axis(
+            factor=unit * _INPUT * scale.per_unit,
+            offset=-scale.low * scale.per_unit - 0.5,
+            limits=(0.0, POSITIONS - 1.0),
+            edges=edges[:, 2 * k : 2 * k + 2],
+            moved=0.5 + 0.5 * scale.per_unit,
+        )
+        for k, (scale, unit) in enumerate(zip(inputs, (1.0, per_block), strict=True))
+    )
+    return t, r
+
+
+def _word(value: int) -> int:
+    return int(value) & 0xFFFFFFFF
+
+
+def _words(values: object) -> NDArray[np.uint32]:
+    whole = np.asarray(values).reshape(-1).astype(np.int64)
+    return (whole & 0xFFFFFFFF).astype(np.uint32)

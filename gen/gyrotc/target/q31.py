@@ -1,0 +1,140 @@
+"""The map in fixed point: docs/numerics.md, section 3, in numpy integers of 64 bits.
+
+Every product fits: inputs have 16 bits, arguments 31, entries of the table 31, weights 31.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .numbers import divided
+from .table import ARRAYS, Table, Words
+
+__all__ = [
+    "CUT",
+    "ENTRIES",
+    "GAUSS_ERROR",
+    "POSITION_BITS",
+    "Points",
+    "biases",
+    "cells",
+    "exp2",
+    "exp2_table",
+    "normalise",
+    "stand_in",
+]
+
+ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
+CUT = 32 << 24  # u in 2^-24
+POSITION_BITS = 27  # gain of an input: position = offset * gain * 2^-27
+_H = np.uint64(1557473452)  # 2^-24
+_G = np.uint64(558709134)  # 2^-16
+_TOP = 2052389455  # 2^-29 of one, at the top of the table: docs/numerics.md, section 3
+#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u; proved by visiting every u (tests/py/test_reference.py)
+GAUSS_ERROR = 2.9e-8
+
+_FULL_SHARE = 2**24  # one, in 2^-24
+_LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
+
+Integers = NDArray[np.int64]
+
+
+def exp2_table() -> NDArray[np.uint64]:
+    """round(2052389455 · 2^(-i/64)), i = 0 ... 63."""
+    context = Context(prec=60)
+    exact = [_TOP * context.power(Decimal(2), Decimal(-i) / Decimal(ENTRIES)) for i in range(ENTRIES)]
+    return np.array([int(e.to_integral_value(ROUND_HALF_EVEN)) for e in exact], dtype=np.uint64)
+
+
+_TABLE = exp2_table()
+
+
+def exp2(u: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """2^-u in 2^-29, for u in 2^-24, 0 <= u < CUT: table · ((H - t)² + G), shifted."""
+    v = _H - ((u & np.uint64(0x3FFFF)) << np.uint64(6))
+    s = ((v * v) >> np.uint64(32)) + _G
+    entry = _TABLE[((u >> np.uint64(18)) & np.uint64(63)).astype(np.int64)]
+    return np.asarray(((entry * s) >> np.uint64(32)) >> (u >> np.uint64(24)))
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Inputs over the envelope, 0 ... 2^16 - 1."""
+
+    x_t: Integers
+    x_r: Integers
+
+
+def normalise(table: Table, x: Integers) -> Points:
+    """What the network sees of inputs (T, slope per block in 2^-16 C) inside the envelope, shape (n, 2)."""
+    low_t, _, low_r, _ = (int(v) for v in table.numbers(table.envelope))
+    return Points(_position(x[:, 0], low_t, table.scale[0]), _position(x[:, 1], low_r, table.scale[1]))
+
+
+def _position(x: Integers, low: int, gain: int) -> Integers:
+    offset = (x - low).astype(np.uint64) << np.uint64(5)
+    return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
+
+
+def biases(table: Table, points: Points) -> Words:
+    """Bits of the map's results."""
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
+    if len(networks) == 1:
+        return _bits(_network(table, networks[0], 0, points))
+    total: Integers = np.zeros_like(points.x_t)
+    shares: Integers = np.zeros_like(points.x_t)
+    first = 0
+    for network in networks:
+        share: Integers = np.minimum(_share(network[4:6], points.x_t), _share(network[6:8], points.x_r))
+        total = total + share * _network(table, network, first, points)
+        shares = shares + share
+        first += int(network[0])
+    blended = divided(total, np.maximum(shares, 1))
+    return _bits(np.where(shares > 0, blended, table.numbers([table.fallback])[0]))
+
+
+def stand_in(table: Table, number: int, points: Points) -> Integers:
+    """What the network of this number, from 1 on, makes of inputs."""
+    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
+
+
+def _bits(bias: Integers) -> Words:
+    return bias.astype(np.int32).view(np.uint32)
+
+
+def _network(table: Table, network: Integers, first: int, points: Points) -> Integers:
+    """One network, whose centers stand from record `first` on; units of the bias."""
+    narrow = int(table.scale[2])
+    count, w0, linear_t, linear_r = (int(n) for n in network[:4])
+    acc = (linear_t * points.x_t + linear_r * points.x_r) * 8192
+    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])[first : first + count]
+    for s_t, k_t, s_r, k_r, weight in centers:
+        a = (s_t * points.x_t + k_t).astype(np.uint64)  # squares are those of the signed number, mod 2^64
+        b = (s_r * points.x_r + k_r).astype(np.uint64)
+        u = (a * a + b * b) >> np.uint64(32 - narrow)
+        inside = u < CUT
+        e = exp2(np.where(inside, u, np.uint64(0))).astype(np.int64)
+        acc = acc + np.where(inside, weight * e, 0)
+    return np.asarray(w0 + (acc >> 29))
+
+
+def _share(region: Integers, x: Integers) -> Integers:
+    """Share of a network by one input, in 2^-24, before the blend is divided by their sum."""
+    low, high = (int(edge) for edge in region)
+    share = np.full_like(x, _FULL_SHARE)
+    if low > 0:
+        share = np.minimum(share, np.maximum(x - low, 0) * _FULL_SHARE // np.int64(high - low))
+    if high < _LAST_POSITION:
+        share = np.minimum(share, np.maximum(high - x, 0) * _FULL_SHARE // np.int64(high - low))
+    return share
+
+
+def cells(points: Points, counts: tuple[int, int]) -> Integers:
+    """Cells of a grid of so many over the envelope, (T, slope), shape (n, 2)."""
+    n_t, n_r = counts
+    return np.stack([(points.x_t * n_t) >> 16, (points.x_r * n_r) >> 16], axis=1)

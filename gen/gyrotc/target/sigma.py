@@ -1,0 +1,199 @@
+"""How uncertain every correction of a history is: what `gtc_<n>_snapshot` gives, from numpy alone.
+
+Mirror of libc/gtc_sigma.inl; docs/design.md gives the rules with their reasons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import f32, q31
+from .follow import FALLBACK as FALLEN
+from .follow import MAP, Steps
+from .recursion import Course, TableKind, TermOutcome
+from .squares import RULES, SQUARES
+from .status import FALLBACK, UNCOVERED, WARMING
+from .table import ARRAYS, Table, Words
+
+__all__ = ["Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
+
+Numbers = NDArray[Any]
+Whole = NDArray[np.int64]
+
+
+class Rule:
+    """Places of the rules behind the two grids, as in gtc_sigma.inl."""
+
+    HOLD, REST, SLOPE, START, BEYOND, BEYOND_SLOPE, FALLBACK, NONE, BETWEEN, NOISE, CORRELATION = range(RULES)
+
+
+@dataclass(frozen=True, slots=True)
+class SigmaEvidence:
+    """What a state knows of its corrections, one entry each, in numbers of the table's arithmetic.
+
+    Attributes:
+        status: Of the correction.
+        at, slope: Where the map was asked last.
+        drift, sure: Slope as far as it is known, and whether it is.
+        age: Blocks for which the correction is held.
+        since: Blocks since the terms began.
+        low, high: Of the temperatures that they saw since then.
+        away: Of each term that reads a channel, where nothing of the channel was believed.
+    """
+
+    status: NDArray[np.int32]
+    at: Numbers
+    slope: Numbers
+    drift: Numbers
+    sure: NDArray[np.bool_]
+    age: Whole
+    since: Whole
+    low: Numbers
+    high: Numbers
+    away: tuple[NDArray[np.bool_], ...]
+
+    def __len__(self) -> int:
+        return int(self.status.size)
+
+
+def evidence_of(
+    table: Table, steps: Steps, course: Course, outcome: TermOutcome, status: NDArray[np.int32]
+) -> SigmaEvidence:
+    """The evidence of every correction of a history.
+
+    Args:
+        table: The table.
+        steps: The corrections, at the temperatures of their blocks.
+        course, outcome: The corrections as the terms see them, and what these make of them.
+        status: Of every correction.
+    """
+    n = steps.kind.size
+    index = np.arange(n)
+    is_made = steps.kind == MAP
+    made = np.maximum.accumulate(np.where(is_made, index, 0))
+    began = np.maximum.accumulate(np.where(steps.is_restart, index, 0))
+    closings = np.cumsum(~steps.is_restart)
+    blocks = np.minimum(closings - closings[began], table.slope_blocks)
+    sure, drift = _drift(table, steps, began, blocks)
+    kept = np.cumsum(~is_made)
+    lost = int(table.guards[6]) + 1
+    age = np.where(steps.kind == FALLEN, lost, np.minimum(kept - kept[made], lost))
+    return SigmaEvidence(
+        status=status,
+        at=outcome.temperature[made],
+        slope=outcome.slope[made],
+        drift=drift[made],
+        sure=sure[made],
+        age=np.where(np.cumsum(is_made) > 0, age, 0),
+        since=course.elapsed - course.elapsed[began],
+        low=_extremes(np.minimum, course, steps.is_restart),
+        high=_extremes(np.maximum, course, steps.is_restart),
+        away=tuple(of_term[made] for of_term in outcome.away),
+    )
+
+
+def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Numbers:
+    """Lowest or highest temperature since the terms began last."""
+    starts = np.flatnonzero(is_restart)
+    parts = np.split(course.temperature, starts[starts > 0])
+    return np.concatenate([of.accumulate(part) for part in parts])
+
+
+def _drift(table: Table, steps: Steps, began: Whole, blocks: Whole) -> tuple[NDArray[np.bool_], Numbers]:
+    """Whether the slope is known, and it: that of the window, or from the start of the front end on."""
+    warming = (steps.remarks & WARMING) != 0
+    young = (blocks >= 2) & (blocks < table.slope_blocks)
+    start = steps.temperature[began]
+    estimate = SQUARES[table.numeric].estimate(steps.temperature, start, np.maximum(blocks, 1))
+    return ~warming | young, np.where(warming & young, estimate, steps.slope)
+
+
+def sigma_bits(table: Table, evidence: SigmaEvidence, constant: Any = None) -> Words:
+    """Bits of 1 σ of every correction, the first one that before anything is believed.
+
+    Args:
+        table: A table with uncertainties.
+        evidence: What is known of every correction.
+        constant: 1 σ of the constant of the power-on; None: as at a start.
+    """
+    do = SQUARES[table.numeric]
+    if constant is None:
+        constant = _rules(table)[Rule.BETWEEN]
+    none = do.squared(_rules(table)[Rule.NONE : Rule.NONE + 1])
+    squares = np.concatenate([none, variances(table, evidence)]) + do.squared(np.asarray([constant]))
+    roots = do.root(squares)
+    return roots.view(np.uint32) if table.numeric == "f32" else roots.astype(np.uint32)
+
+
+def variances(table: Table, evidence: SigmaEvidence) -> Numbers:
+    """Variance of every correction without that of the constant of the power-on."""
+    do, rules = SQUARES[table.numeric], _rules(table)
+    total = _of_map(table, evidence) + _of_age(table, evidence)
+    total = total + _of_start(table, evidence)
+    beyond = [_beyond(table, evidence, k) for k in (0, 1)]
+    total = total + (beyond[0] + beyond[1])
+    terms = np.zeros_like(total)
+    for part in _of_terms(table, evidence):
+        terms = terms + part
+    total = total + terms
+    fallen = (evidence.status & FALLBACK) != 0
+    return np.where(fallen, do.squared(rules[Rule.FALLBACK]), total)
+
+
+def _rules(table: Table) -> Numbers:
+    """Rules, then the words of the terms."""
+    cells = table.sigma_cells[0] * table.sigma_cells[1]
+    return table.numbers(table.sigma)[2 * cells :]
+
+
+def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
+    low, high = table.numbers(table.envelope).reshape(2, 2).T
+    x = np.clip(np.stack([evidence.at, evidence.slope], axis=1), low, high)
+    if table.numeric == "f32":
+        cell = f32.cells(table, f32.normalise(table, x.astype(np.float32)), table.sigma_cells)
+    else:
+        cell = q31.cells(q31.normalise(table, x), table.sigma_cells)
+    index = cell[:, 1] * table.sigma_cells[0] + cell[:, 0]
+    uncovered = (evidence.status & UNCOVERED) != 0
+    index = index + np.where(uncovered, table.sigma_cells[0] * table.sigma_cells[1], 0)
+    return SQUARES[table.numeric].squared(table.numbers(table.sigma)[index])
+
+
+def _of_age(table: Table, evidence: SigmaEvidence) -> Numbers:
+    do, rules = SQUARES[table.numeric], _rules(table)
+    moved = do.limited(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.HOLD]))
+    gone = do.squared(do.times(evidence.age, moved))
+    return np.asarray(gone + do.squared(do.times(evidence.age, rules[Rule.REST])))
+
+
+def _of_start(table: Table, evidence: SigmaEvidence) -> Numbers:
+    do, rules = SQUARES[table.numeric], _rules(table)
+    known = do.squared(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.SLOPE]))
+    square = np.where(evidence.sure, known, do.squared(rules[Rule.START]))
+    return np.where((evidence.status & WARMING) != 0, square, np.zeros_like(square))
+
+
+def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> Numbers:
+    do, rules = SQUARES[table.numeric], _rules(table)
+    x = (evidence.at, evidence.slope)[k]
+    low, high = table.numbers(table.envelope)[2 * k : 2 * k + 2]
+    return do.squared(do.per_c(x, np.clip(x, low, high), rules[Rule.BEYOND + k]))
+
+
+def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
+    """What each term does not know of the time before it began, or of a channel of which nothing is believed."""
+    do = SQUARES[table.numeric]
+    words, away = _rules(table)[RULES:], iter(evidence.away)
+    for i, record in enumerate(table.terms.reshape(-1, ARRAYS["terms"])):
+        first, word, kind = table.numbers(record[2:])[0], words[i], int(record[0])
+        if TableKind(kind).reads_channel:
+            yield np.where(next(away), do.squared(word), np.zeros_like(do.squared(word)))
+        elif kind == TableKind.MEMORY:
+            yield do.squared(do.remaining(word, first, evidence.since))
+        elif kind == TableKind.PLAY:
+            yield do.squared(do.unsettled(first, evidence.low, evidence.high, word))

@@ -1,0 +1,205 @@
+"""Training: samples in, networks out. It knows numbers only, no files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import InputError
+from ..common.metrics import LEAST_SPAN_C
+from .bank import fit_bank
+from .data import Scaling, TrainingData, cleaned, scaling_of
+from .evidence import TrainingFailed
+from .guard import objection
+from .linear import fit_mlr, fit_poly, fit_poly_slope
+from .mrbf import fit_mrbf, fit_mrbf_t
+from .ols import RIDGE, SIZE_RULES, fit_ols
+from .prior import Prior
+from .residual_noise import floor_dph
+from .result import Fit, Outcome, network, predict
+from .rungs import chosen_by_ladder
+from .simple import SIMPLE, fit_simple
+from .uncertainty import coverage, uncertainty
+
+__all__ = [
+    "AUTO",
+    "METHODS",
+    "NETWORK_METHODS",
+    "SIMPLE",
+    "SIZE_RULES",
+    "Fit",
+    "Outcome",
+    "TrainingData",
+    "TrainingFailed",
+    "coverage",
+    "fit",
+    "predict",
+    "trained",
+    "uncertainty",
+]
+
+METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
+NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
+"""Those whose map is networks alone, so that a table can hold it."""
+AUTO = "auto"
+"""The ladder: the simplest correction that does on unseen history what the best one does."""
+_MAX_CENTERS = 512  # what a table holds: docs/FORMAT.md, "Legal ranges"
+_MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
+_POLYNOMIALS = {"mlr": fit_mlr, "poly": fit_poly, "poly_slope": fit_poly_slope}
+_GUARDED = ("mrbf", "mrbf_t")
+
+
+def fit(
+    data: TrainingData,
+    *,
+    method: str = "mrbf",
+    seed: int = 0,
+    centers: int | None = None,
+    rho: float | None = None,
+    size_rule: str | None = None,
+    average_s: float = 100.0,
+    power_on: NDArray[np.int64] | None = None,
+    prior: Prior | None = None,
+    serial: str = "",
+) -> Fit:  # long: the ways to a map, one after the other
+    """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
+
+    Args:
+        data: Samples; exact duplicates by run and time count once.
+        method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: the ladder chooses, unless a number
+            of centers or ρ is asked for.
+        seed: Whatever is drawn at random (start of the Kohonen network, random centers) follows from it.
+        centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
+        rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
+        size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
+        average_s: Averaging of RMS figures, s.
+        power_on: For the ladder: number of the power-on of each run, by its index; None: each run is one.
+        prior: What units of the type share, or the unit's earlier model; for `AUTO` and "mrbf" without a number of
+            centers. Samples that do not agree with it are fitted without it, with a finding.
+        serial: The unit's, to tell whether a lot has seen it.
+
+    Raises:
+        InputError: Bad samples or arguments.
+        TrainingFailed: The equations of a method that was asked for by name cannot be solved.
+    """
+    method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
+    _check(method, centers, rho, average_s)
+    samples = cleaned(data)
+    scaling = scaling_of(samples)
+    findings: list[dict[str, object]] = []
+    rows: list[dict[str, object]] = []
+    reason = ""
+    like_auto = method in (AUTO, "mrbf") and centers is None
+    given = (
+        prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s)
+        if like_auto and prior
+        else None
+    )
+    findings += given.findings if given else []
+    if given is not None and given.map is not None:
+        (outcome, scaling), method, reason = given.map, "mrbf", given.reason
+    elif np.ptp(samples.temperature_c) < LEAST_SPAN_C:
+        outcome = _constant(samples)
+        findings.append(_no_information(samples))
+        method = "constant" if method == AUTO else method
+    elif method == AUTO:
+        found = chosen_by_ladder(samples, scaling, power_on, seed=seed, average_s=average_s)
+        method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
+        findings += found.findings
+    else:
+        outcome = trained(
+            method, samples, scaling, seed=seed, centers=centers, rho=rho, size_rule=size_rule, average_s=average_s
+        )  # fmt: skip
+        against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
+        if against:
+            findings.append(_beyond(method, against))
+    mean = float(np.average(samples.bias_dph, weights=samples.weight))
+    bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
+    residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
+    floor = floor_dph(samples, residual, average_s)
+    return Fit(
+        method, outcome, scaling, findings, floor, average_s, mean, rows, reason,
+        given.lot if given else None, given.prior if given else None, given.known if given else None,
+    )  # fmt: skip
+
+
+def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:
+    known = (AUTO, *dict.fromkeys((*METHODS, *NETWORK_METHODS)))
+    if method not in known:
+        raise InputError("method", repr(method), "one of " + ", ".join(known))
+    if centers is not None and not 0 <= centers <= _MAX_CENTERS:
+        raise InputError("centers", repr(centers), f"0 ... {_MAX_CENTERS}")
+    if rho is not None and not 0.0 <= rho < 1.0:
+        raise InputError("rho", repr(rho), "0 ... 1")
+    if not (np.isfinite(average_s) and average_s > 0.0):
+        raise InputError("average_s", repr(average_s), "a number of seconds above 0")
+
+
+def trained(
+    method: str,
+    data: TrainingData,
+    scaling: Scaling,
+    *,
+    seed: int = 0,
+    centers: int | None = None,
+    rho: float | None = None,
+    size_rule: str | None = None,
+    average_s: float = 100.0,
+    ridge: float = RIDGE,
+) -> Outcome:
+    """What one method makes of cleaned samples, whatever they tell about temperature; arguments as those of `fit`.
+
+    Args:
+        ridge: For the methods by orthogonal least squares, as `fit_ols` takes it.
+
+    Raises:
+        InputError: A size rule that does not exist.
+        TrainingFailed: The equations cannot be solved.
+    """
+    if method in _POLYNOMIALS:
+        return _POLYNOMIALS[method](data, scaling, average_s)
+    if method in SIMPLE:
+        return fit_simple(method, data, scaling, average_s)
+    if method in _MAPS:
+        return _MAPS[method](data, scaling, seed=seed, centers=centers, average_s=average_s)
+    return fit_ols(
+        method,
+        data,
+        scaling,
+        seed=seed,
+        centers=centers,
+        rho=rho,
+        size_rule=size_rule,
+        average_s=average_s,
+        ridge=ridge,
+    )
+
+
+def _constant(samples: TrainingData) -> Outcome:
+    """A temperature span under 2 C says nothing about temperature: the mean is the model."""
+    mean = float(np.average(samples.bias_dph, weights=samples.weight))
+    return Outcome(
+        networks=(network(mean),),
+        curves={"sizes": [], "chosen": 0, "samples": len(samples)},
+        withheld="a constant model has nothing to predict from",
+    )
+
+
+def _no_information(samples: TrainingData) -> dict[str, object]:
+    span = float(np.ptp(samples.temperature_c))
+    return {
+        "id": "no_temperature_information",
+        "text": f"Temperature spans only {span:.2f} C: nothing can be learnt about it; the model is the mean bias.",
+        "evidence": {"span_c": span, "required_c": LEAST_SPAN_C},
+    }
+
+
+def _beyond(method: str, against: str) -> dict[str, object]:
+    return {
+        "id": "map_beyond_data",
+        "text": f"The map of {method}, which was asked for by name, should not be used: {against}. Without --method "
+        "the ladder chooses a correction that keeps to the data.",
+        "evidence": {"method": method},
+    }

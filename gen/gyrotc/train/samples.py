@@ -1,0 +1,189 @@
+"""Training samples of a recording: the front end that the target will have, run over its rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..quality.screen import departing_rows
+from ..target import status as status_bits
+from ..target.believe import Guarded
+from ..target.follow import FALLBACK, KEEP, MAP, Settings, Steps, follow, period_us, samples_per_block
+from ..target.numbers import F32
+from ..target.stream import Stream
+
+if TYPE_CHECKING:
+    from ..recordings.records import Rows, Run
+
+__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks"]
+
+PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
+_GAP = 1.5  # median row periods
+_MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """What the front end makes of one run: one entry per block, from the first row of the file on.
+
+    A training sample is a block that is `used`: input (`temperature_c`, `slope_c`), answer
+    `rate_dph`, weight `rows`.
+    """
+
+    start_s: NDArray[np.float64]
+    valid: NDArray[np.bool_]  # the block itself has enough believed samples
+    temperature_c: NDArray[np.float32]  # input in force during the block (NaN before the first sample)
+    slope_c: NDArray[np.float32]  # input in force, C per block
+    mean_c: NDArray[np.float32]  # mean of the block itself (0 where it has no believed sample)
+    status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
+    rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
+    rows: NDArray[np.int64]  # number of these rows
+    left_out_s: NDArray[np.float64]  # times of rows that were left out of these means as spikes or bursts
+    steps: Steps  # every correction of the run
+    in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
+    stream: Stream  # its samples
+    settings: Settings
+
+    @property
+    def begins_s(self) -> float | None:
+        """Start of the first block with rows of the run, s: means of it begin here, believed or not."""
+        starts = self.start_s[self.rows > 0]
+        return float(starts[0]) if starts.size else None
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which blocks are training samples."""
+        return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
+
+
+def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
+    """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
+    gaps = np.diff(time_s)
+    gaps /= row_period_s
+    late = np.flatnonzero(gaps > _GAP)
+    missed = np.zeros(time_s.size, dtype=np.int64)
+    missed[late + 1] = np.minimum(np.rint(gaps[late]) - 1.0, _MAX_MISSED).astype(np.int64)
+    return missed
+
+
+def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
+    """Whole blocks between power-on and the first row; 0 where power-on is not known or came later."""
+    if run.power_on_s is None:
+        return 0
+    return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
+
+
+def run_blocks(  # long: one line for each field of the result
+    rows: Rows,
+    run: Run,
+    *,
+    block_s: float,
+    slope_blocks: int,
+    max_step_c: float,
+    max_rate_c_per_min: float,
+    stuck_s: float = 0.0,
+    agree_s: float = 0.0,
+    hold_blocks: int = 30,
+    lead_blocks: int = 0,
+) -> Blocks:
+    """Runs the float32 front end over a recording.
+
+    Args:
+        rows: All rows of the run's file.
+        run: Gives row period and span.
+        block_s: Length of a block, s.
+        slope_blocks: Window of dT/dt, blocks.
+        max_step_c: Believable change between two samples, C, besides ...
+        max_rate_c_per_min: ... this rate times the time since the last believed one.
+        agree_s: How long readings must agree that do not follow the last one, s.
+        stuck_s: Time after which a reading that stays the same is none, s; 0: never.
+        hold_blocks: Invalid blocks in a row that are bridged before the fallback.
+        lead_blocks: 1: map and terms see where the slope brings a block's mean by the time that it is in force.
+    """
+    n = samples_per_block(block_s, run.row_period_s)
+    block_us = max(1, round(block_s * 1e6))
+    guard = Guarded(
+        low=np.float32(PLAUSIBLE_C[0]),
+        high=np.float32(PLAUSIBLE_C[1]),
+        max_step=np.float32(max_step_c),
+        max_rate=np.float32(max_rate_c_per_min / 60e6),
+        agree_us=round(agree_s * 1e6),
+        stuck_us=round(stuck_s * 1e6),
+        missing_blocks=hold_blocks,
+    )
+    settings = Settings(
+        samples_per_block=n,
+        period_us=period_us(block_us, n),
+        block_us=block_us,
+        slope_blocks=slope_blocks,
+        guard=guard,
+        longest_blocks=hold_blocks,
+    )
+    missed = missed_before(rows.time_s, run.row_period_s)
+    stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
+    steps = follow(F32, stream.samples, settings).led(lead_blocks)
+    n_blocks = steps.valid.size
+    last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
+    k = steps.in_force(last)
+    temperature, slope, status = _in_force(steps, k)
+    rate, count, left_out = _mean_rate(rows, run, stream.position // n, n_blocks, n)
+    return Blocks(
+        start_s=np.interp(np.arange(n_blocks) * n, stream.position, rows.time_s) if n_blocks else np.empty(0),
+        valid=steps.valid,
+        temperature_c=temperature,
+        slope_c=slope,
+        mean_c=steps.mean,
+        status=status,
+        rate_dph=rate,
+        rows=count,
+        left_out_s=rows.time_s[left_out],
+        steps=steps,
+        in_force=_last_map(steps, k),
+        stream=stream,
+        settings=settings,
+    )
+
+
+def _last_map(steps: Steps, k: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The last correction up to each of k that the map made: one that is kept goes on."""
+    if steps.kind.size == 0:
+        return k
+    made = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), -1))
+    return np.where(k >= 0, made[k], -1)
+
+
+def _in_force(
+    steps: Steps, k: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Input and status in force during each block, from the correction at its last sample (-1: none)."""
+    started = k >= 0
+    source, made = k[started], _last_map(steps, k)[started]
+    temperature = np.full(k.size, np.nan, dtype=np.float32)
+    slope = np.zeros(k.size, dtype=np.float32)
+    status = np.full(k.size, status_bits.HELD, dtype=np.int32)
+    temperature[started] = np.where(made < 0, np.float32(np.nan), steps.temperature[made])
+    slope[started] = np.where(made < 0, np.float32(0.0), steps.slope[made])
+    kind = steps.kind[source]
+    kept = steps.remarks[source] | np.where(kind == KEEP, status_bits.HELD, 0)
+    status[started] = np.where(kind == FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)
+    return temperature, slope, status
+
+
+def _mean_rate(
+    rows: Rows, run: Run, block: NDArray[np.int64], n_blocks: int, rows_per_block: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Mean measured rate and number of rows in the span, for each block, and the rows that were left out."""
+    counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
+    left_out = departing_rows(rows, run, rows_per_block)
+    counted[left_out] = False
+    rate = rows.rate_dph
+    if not counted.all():
+        block, rate = block[counted], rate[counted]
+    count = np.bincount(block, minlength=n_blocks)
+    total = np.bincount(block, weights=rate, minlength=n_blocks)
+    with np.errstate(invalid="ignore"):
+        mean = total / count
+    return mean, count.astype(np.int64), left_out

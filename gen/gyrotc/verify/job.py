@@ -1,0 +1,254 @@
+"""Prove that the emitted C is what gyrotc made, and gives on every target bit for bit what the reference gives.
+
+Makes every file of `DIR/c` again from `model.json`
+and compares it byte for byte; only then compiles them for each target, runs the board test and compares every result
+word with what the reference computes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..common.errors import InputError
+from ..model import Model, load_model
+from ..recordings.records import Dataset
+from ..results.base import read_optional
+from ..results.release import STATED
+from ..results.verification import (
+    EmittedWith,
+    MapError,
+    SignatureCheck,
+    Verification,
+    VerifiedFile,
+    VerifiedTarget,
+    WorstError,
+)
+from ..store.marker import check_intact
+from ..tables.files import emit_texts, expected_answers
+from ..tables.vectors import Vectors, make_vectors
+from .board import Job, board_entries
+from .confined import end_all
+from .emitted import EDITABLE, c_hash, file_entries, made_again
+from .exhaustive import visit_all
+from .logs import log_entries
+from .recordings import replay_dataset
+from .signatures import check_signature, load_public_key
+from .toolchain import Target, all_targets
+
+__all__ = ["chosen_targets", "file_entries", "verify"]
+
+Progress = Callable[[str], None]
+
+# Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
+_NEXT_PROGRAM_S = 0.05
+
+
+def verify(  # long: the order of the checks, then one line for each field of the result
+    folder: Path,
+    *,
+    targets: Sequence[str] = (),
+    dataset: Dataset | None = None,
+    log: Path | None = None,
+    exhaustive: bool = False,
+    compiled: bool = True,
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
+    trust_code: bool = False,
+    progress: Progress | None = None,
+) -> Verification:
+    """Verifies `folder/c` against `folder/model.json`; what `verify.json` holds.
+
+    Args:
+        folder: What `build` or `emit` wrote.
+        targets: Names of targets, or `all`; empty for the default ones, with `log` for none.
+        dataset: Recordings to replay on every target besides.
+        log: Output of a board test that ran elsewhere. Its entries join those of an earlier
+            `verify.json` of the same model and code; later calls keep them.
+        exhaustive: Visit every input of the fixed-point table besides.
+        compiled: False: no target; files and bounds are checked against model and reference alone.
+        edited: Files of `EDITABLE` that the user made their own: they may differ.
+        signature: Public key with which `folder/c` must be signed.
+        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
+        progress: Called with the name of each target before it is tried.
+
+    Raises:
+        InputError: No emitted code, an unknown target, an unreadable log, no table to visit all inputs of.
+        CheckFailed: The log is not whole, or of another model.
+    """
+    say = progress or (lambda _: None)
+    _check_edited(edited)
+    key = load_public_key(signature) if signature is not None else None
+    if key is not None:
+        check_intact(folder, STATED, needed=False)
+    model = load_model(folder / "model.json")
+    chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
+    say("comparing files")
+    options, emission = made_again(folder / "c", model)
+    tables = emission.tables
+    if exhaustive and "q31" not in tables:
+        raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
+    vectors = make_vectors(model, tuple(tables))
+    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
+    texts = emit_texts(
+        model,
+        emission,
+        asked=options.numeric is not None,
+        zero_at=options.zero_at_c,
+    )
+    emitted = file_entries(job.c_folder, texts, edited)
+    signed = check_signature(job.c_folder, key) if key is not None else None
+    wrong = [file.file for file in emitted if file.status == "fail"]
+    barred = wrong and not trust_code
+    identity = (model.hash, c_hash(folder / "c"))
+    entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
+    entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
+    if dataset is not None and not barred:
+        entries = replay_dataset(job, entries, chosen, dataset, say)
+    entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
+    exact = options.shifted(model)
+    errors = [_error(job, exact, vectors, numeric) for numeric in tables]
+    if exhaustive and not barred:
+        errors = [_every_input(job, exact, say) if e.numeric == "q31" else e for e in errors]
+    passed, failed, missing = _counts(
+        entries, [*emitted, *errors, *([signed] if signed else [])], set(targets)
+    )
+    return Verification(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        model_hash=identity[0],
+        c_hash=identity[1],
+        passed=passed,
+        failed=failed,
+        missing=missing,
+        targets=tuple(entries),
+        log=brought,
+        options=EmittedWith(numeric=options.numeric, zero_at_c=options.zero_at_c),
+        emitted=tuple(emitted),
+        signature=signed,
+        errors=tuple(errors),
+        error_bound_dph=max(e.bound_dph for e in errors),
+        worst_error_dph=WorstError(
+            value=max(e.worst_dph for e in errors), inputs_visited=max(e.inputs_visited for e in errors)
+        ),
+    )
+
+
+def chosen_targets(names: Sequence[str]) -> list[Target]:
+    """The targets of these names or of `all`; without a name the default ones. Raises InputError on an unknown name."""
+    known = all_targets()
+    for name in names:
+        if name != "all" and name not in known:
+            raise InputError("--target", repr(name), ", ".join([*known, "all"]))
+    if not names:
+        return [t for t in known.values() if t.default]
+    return [t for t in known.values() if "all" in names or t.name in names]
+
+
+def _check_edited(names: Sequence[str]) -> None:
+    for name in names:
+        if name not in EDITABLE:
+            raise InputError(
+                "--allow-edited", repr(name), f"{', '.join(sorted(EDITABLE))}: the rest is not to be edited"
+            )
+
+
+def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[VerifiedTarget]:
+    """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
+    more = f" (and {len(wrong) - 1} more files)" if len(wrong) > 1 else ""
+    reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}; --trust-code runs it all the same"
+    pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
+    return [VerifiedTarget(name=name, numeric=n, status="fail", error=reason) for name, n in pairs]
+
+
+def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[VerifiedTarget]:
+    """Entries in the order of the targets; compilers and emulators run side by side."""
+
+    begun = itertools.count(1)
+
+    def one(target: Target) -> list[VerifiedTarget]:
+        progress(f"{target.name}, target {next(begun)} of {len(targets)}")
+        return board_entries(job, target)
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        tests = [pool.submit(one, target) for target in targets]
+        try:
+            return [entry for test in tests for entry in test.result()]
+        except BaseException:  # one failed, or the user stops: the others end now, not with their queue
+            pool.shutdown(wait=False, cancel_futures=True)
+            while not all(test.done() for test in tests):  # a thread may go on with a next program
+                end_all()
+                wait(tests, timeout=_NEXT_PROGRAM_S)
+            raise
+
+
+def _earlier(folder: Path, identity: tuple[str, str], *, boards_only: bool) -> list[VerifiedTarget]:
+    """Entries of an earlier `verify.json` that still hold: same model, same code."""
+    try:
+        earlier = read_optional(folder / "verify.json", Verification)
+    except InputError:
+        return []
+    if earlier is None or (earlier.model_hash, earlier.c_hash) != identity:
+        return []
+    return [entry for entry in earlier.targets if entry.log is not None or not boards_only]
+
+
+def _merged(earlier: list[VerifiedTarget], entries: list[VerifiedTarget]) -> list[VerifiedTarget]:
+    new = {(entry.name, entry.numeric) for entry in entries}
+    return [entry for entry in earlier if (entry.name, entry.numeric) not in new] + entries
+
+
+def _counts(
+    entries: Sequence[VerifiedTarget],
+    checks: Sequence[VerifiedFile | MapError | SignatureCheck],
+    named: set[str],
+) -> tuple[int, int, int]:
+    """Targets passed, failed, missing. A named target that is missing has failed, and so has a check."""
+    status = [entry.status for entry in entries]
+    absent = sum(entry.status == "missing" and entry.name in named for entry in entries)
+    wrong = sum(check.status == "fail" for check in checks)
+    return status.count("pass"), status.count("fail") + absent + wrong, status.count("missing")
+
+
+def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> MapError:
+    """Largest departure of the emitted map from the float64 model over the map vectors, and the bound."""
+    table = job.tables[numeric]
+    inputs = table.decode_inputs(vectors.map_inputs(numeric))
+    status, bits = job.expected[numeric][1 : 1 + len(inputs)].T
+    usable = (status < 2**31) & np.all(np.isfinite(inputs), axis=1)
+    got = table.decode_bias(bits[usable])
+    t, slope = inputs[usable].T
+    exact = model.map_dph(t, slope * 60.0 / model.block_s)
+    worst = float(np.max(np.abs(got - exact), initial=0.0))
+    return MapError(
+        numeric=numeric,
+        status="pass" if worst <= table.error_bound_dph else "fail",
+        bound_dph=table.error_bound_dph,
+        worst_dph=worst,
+        inputs_visited=int(usable.sum()),
+    )
+
+
+def _every_input(job: Job, model: Model, progress: Progress) -> MapError:
+    """The same for every input of the fixed-point table."""
+    table = job.tables["q31"]
+    visited = visit_all(job.c_folder, model, table, trusted=job.trusted, progress=progress)
+    sound = visited.mismatches == 0 and visited.worst_dph <= table.error_bound_dph
+    return MapError(
+        numeric="q31",
+        status="pass" if sound else "fail",
+        bound_dph=table.error_bound_dph,
+        worst_dph=visited.worst_dph,
+        arithmetic_dph=visited.arithmetic_dph,
+        mean_dph=visited.mean_dph,
+        inputs_visited=visited.inputs,
+        mismatches=visited.mismatches,
+        first_mismatches=tuple(visited.first),
+    )
