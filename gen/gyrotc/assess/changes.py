@@ -10,9 +10,9 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..recordings.records import Dataset
@@ -34,7 +34,6 @@ from .limits import Limits
 
 __all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "started_on"]
 
-Floats = NDArray[np.float64]
 
 _GRID = (61, 25)  # points of T and of dT/dt over the common envelope
 
@@ -206,7 +205,7 @@ def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
     )
 
 
-def _expected_rms(old: Model, new: Model, t: Floats, slope: Floats) -> float | None:
+def _expected_rms(old: Model, new: Model, t: FloatArray, slope: FloatArray) -> float | None:
     """RMS that the uncertainties of two maps give over points of T and dT/dt although nothing has moved."""
     before, after = (_variance(model, t, slope) for model in (old, new))
     if before is None or after is None:
@@ -214,7 +213,7 @@ def _expected_rms(old: Model, new: Model, t: Floats, slope: Floats) -> float | N
     return float(np.sqrt(np.mean(before + after)))
 
 
-def _variance(model: Model, t: Floats, slope: Floats) -> Floats | None:
+def _variance(model: Model, t: FloatArray, slope: FloatArray) -> FloatArray | None:
     if model.uncertainty_dph is None:
         return None
     rows = np.array(model.uncertainty_dph.rows)

@@ -17,6 +17,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import Progress
 from ..common.errors import CheckFailed, GyrotcError
 from ..common.metrics import Averages, average, statistics, time_statistics
 from ..common.texts import file_stem
@@ -47,7 +48,6 @@ from .uncertainty import figure_uncertainties, root_mean, squares_of
 
 __all__ = ["ReplayedRun", "Watch", "evaluate", "trace_name"]
 
-Progress = Callable[[str], None]
 Watch = Callable[[Run, Averages], None]
 _HOST = "host-gcc-O2"
 _TRACE_ROWS = 2**16  # written at once

@@ -13,14 +13,13 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from ..results.evaluation import EvaluatedRun, FigureUncertainty
 
 __all__ = ["figure_uncertainties", "root_mean", "squares_of"]
 
-Array = NDArray[np.float64]
 
 _BLOCK_S = (
     7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
@@ -66,7 +65,7 @@ def figure_uncertainties(
     return found | dict(_of_windows(judged, runs, average_s))
 
 
-def squares_of(sigma_dph: Array | None) -> tuple[float, int]:
+def squares_of(sigma_dph: FloatArray | None) -> tuple[float, int]:
     """Sum of squares and number of the 1 sigma of corrections; nothing where a table states none."""
     return (0.0, 0) if sigma_dph is None else (float(np.sum(sigma_dph**2)), sigma_dph.size)
 
@@ -77,7 +76,7 @@ def root_mean(squares: Iterable[tuple[float, int]]) -> float | None:
     return float(np.sqrt(total / number)) if number else None
 
 
-def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[Array, Array]]:
+def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[FloatArray, FloatArray]]:
     """Stretches of at most an hour inside the runs: means before and after."""
     total = sum(a.after_dph.size for a in judged)
     length = min(_BLOCK_S / average_s, total / _LEAST_BLOCKS)
@@ -90,7 +89,7 @@ def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[Array, A
     return parts
 
 
-def _jackknife(blocks: Sequence[tuple[Array, Array]]) -> dict[str, FigureUncertainty]:
+def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> dict[str, FigureUncertainty]:
     sums = np.array([(a.size, a.sum(), (a**2).sum(), (b**2).sum()) for b, a in blocks])
     n, first, second, before = (sums.sum(axis=0) - sums).T
     mean = first / n

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from ..common.arrays import FloatArray
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .search import Reach, SearchRule
 from .words import Telling, Wording
 
@@ -23,7 +24,7 @@ def _passed(day: float, d0_day: float) -> float:
     return day if math.isinf(d0_day) else d0_day * math.log1p(day / d0_day)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     amount = values["slope_dph_per_day"] * _passed(scene.day, values["d0_day"])
     return np.full(len(scene.time_s), amount)
 
@@ -35,7 +36,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(np.full((len(history.time_s), 1), amount), np.full(len(history.time_s), dated))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"slope_dph_per_day": float(weights[0])}
 
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .search import SearchRule, anywhere
 from .tabled import Tabled
 from .words import Telling, Wording
@@ -17,7 +18,7 @@ from .words import Telling, Wording
 __all__ = ["CAUSE", "channel_of"]
 
 
-def channel_of(channel: Array | None) -> Array:
+def channel_of(channel: FloatArray | None) -> FloatArray:
     """The channel that a term names.
 
     Raises:
@@ -28,7 +29,7 @@ def channel_of(channel: Array | None) -> Array:
     return channel
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     departure = channel_of(scene.channel) - values["reference"]
     return np.asarray(values["slope_dph_per_unit"] * departure)
 
@@ -39,7 +40,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(channel[:, None], np.isfinite(channel))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"slope_dph_per_unit": float(weights[0]), "reference": 0.0}
 
 

@@ -12,9 +12,10 @@ import math
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.recursion import TableKind
 from .auxiliary import channel_of
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .tabled import Tabled
 from .words import Telling, Wording
 
@@ -23,14 +24,14 @@ __all__ = ["CAUSE"]
 _OCTAVES = math.sqrt(math.log2(math.e))  # exp(−x²) = 2^−(this x)²
 
 
-def _columns(channel: Array, values: Values) -> Array:
+def _columns(channel: FloatArray, values: Values) -> FloatArray:
     """The line and both Gaussians, shape (n, 3)."""
     away = channel - values["reference"]
     bells = [np.exp(-((d / values["width"]) ** 2)) for d in (away, channel - values["second_center"])]
     return np.stack([away, *bells], axis=1)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     weights = [values[name] for name in _LINEAR]
     return np.asarray(_columns(channel_of(scene.channel), values) @ weights)
 
@@ -40,7 +41,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(_columns(channel, values), np.isfinite(channel))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return dict(zip(_LINEAR, weights.tolist(), strict=True))
 
 

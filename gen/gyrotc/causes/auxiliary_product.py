@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.recursion import TableKind
 from .auxiliary import channel_of
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .tabled import Tabled
 from .words import Telling, Wording
 
@@ -18,13 +19,13 @@ __all__ = ["CAUSE"]
 _LINEAR = ("slope_dph_per_unit", "slope_dph_per_unit_per_c")
 
 
-def _columns(temperature_c: Array, channel: Array, values: Values) -> Array:
+def _columns(temperature_c: FloatArray, channel: FloatArray, values: Values) -> FloatArray:
     """The line, and the line times the temperature, shape (n, 2)."""
     away = channel - values["reference"]
     return np.stack([away, (temperature_c - values["reference_c"]) * away], axis=1)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     weights = [values[name] for name in _LINEAR]
     return np.asarray(_columns(scene.cavity_c, channel_of(scene.channel), values) @ weights)
 
@@ -34,7 +35,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(_columns(history.temperature_c, channel, values), np.isfinite(channel))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return dict(zip(_LINEAR, weights.tolist(), strict=True))
 
 

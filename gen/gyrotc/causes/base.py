@@ -19,13 +19,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .search import SearchRule
 from .tabled import Tabled
 from .words import Wording
 
 __all__ = ["Cause", "Features", "History", "Kind", "Needs", "Parameter", "Scene", "Values"]
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 Kind = Literal["input", "add", "random", "static", "record"]
@@ -84,10 +84,10 @@ class History:
         day: Days since the first dated run; None without a date.
     """
 
-    time_s: Array
-    temperature_c: Array
-    on_s: Array | None = None
-    channel: Array | None = None
+    time_s: FloatArray
+    temperature_c: FloatArray
+    on_s: FloatArray | None = None
+    channel: FloatArray | None = None
     run: int = 0
     runs: int = 1
     day: float | None = None
@@ -100,7 +100,7 @@ class Features:
     For kind "input" the columns are the temperature that the map should see (C) and its rate (C/min).
     """
 
-    columns: Array
+    columns: FloatArray
     known: NDArray[np.bool_]
 
 
@@ -118,12 +118,12 @@ class Scene:
         day: Days since the first run.
     """
 
-    time_s: Array
-    on_s: Array
-    node_c: Array
-    cavity_c: Array
-    sensed_c: Array
-    channel: Array | None
+    time_s: FloatArray
+    on_s: FloatArray
+    node_c: FloatArray
+    cavity_c: FloatArray
+    sensed_c: FloatArray
+    channel: FloatArray | None
     day: float
 
 
@@ -167,12 +167,14 @@ class Cause:
     search: SearchRule | None = None
     table: Tabled | None = None
     finer_map: bool = False
-    cavity: Callable[[Scene, Values], Array] | None = None
-    bias: Callable[[Scene, Values, np.random.Generator], Array] | None = None
-    record: Callable[[Scene, Values], Array] | None = None
+    cavity: Callable[[Scene, Values], FloatArray] | None = None
+    bias: Callable[[Scene, Values, np.random.Generator], FloatArray] | None = None
+    record: Callable[[Scene, Values], FloatArray] | None = None
     features: Callable[[History, Values], Features] | None = None
-    amplitudes: Callable[[Array], dict[str, float]] | None = None
-    mended: Callable[[Array, Array, Array, Values], tuple[Array, Array]] | None = None
+    amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
+    mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = (
+        None
+    )
     overtone: Callable[[Values, int], Values] | None = None
     unseen_s: Callable[[Values], float] | None = None
     repair: Callable[[Values], str] | None = None

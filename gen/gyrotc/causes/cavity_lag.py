@@ -5,9 +5,10 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 
 from __future__ import annotations
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .memory import RATES, lagged
 from .search import SearchRule, geometric
 from .tabled import Tabled, blocks_per_tau, memory_gain
@@ -16,7 +17,7 @@ from .words import Wording
 __all__ = ["CAUSE"]
 
 
-def _cavity(scene: Scene, values: Values) -> Array:
+def _cavity(scene: Scene, values: Values) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.cavity_c)
 
 

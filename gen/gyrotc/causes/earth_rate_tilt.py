@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
-from .base import Array, Cause, Parameter, Scene, Values
+from .base import Cause, Parameter, Scene, Values
 from .words import Telling, Wording
 
 __all__ = ["CAUSE", "EARTH_RATE_DPH"]
@@ -21,7 +22,7 @@ EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
 _REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     fixture_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     latitude = math.radians(values["latitude_deg"])
     arcsec_per_c = (

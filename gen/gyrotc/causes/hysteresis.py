@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.operators import play
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .search import SearchRule, SingleCycle, geometric
 from .tabled import Tabled
 from .words import Telling, Wording
@@ -19,7 +20,7 @@ from .words import Telling, Wording
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     z = play(values["width_c"], scene.cavity_c)
     return np.asarray(values["amplitude_dph_per_c"] * (z - scene.cavity_c))
 
@@ -32,7 +33,7 @@ def _features(history: History, values: Values) -> Features:
     return Features((z - temperature)[:, None], span >= 2.0 * values["width_c"])
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"amplitude_dph_per_c": float(weights[0])}
 
 

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from ..common.arrays import FloatArray
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .search import SearchRule, anywhere
 from .words import Telling, Wording
 
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(
         values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"])
     )

@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .search import Reach, SearchRule
 from .tabled import Tabled, turns
 from .words import Telling, Wording
@@ -22,7 +23,7 @@ from .words import Telling, Wording
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     phase = 2.0 * math.pi * scene.cavity_c / values["period_c"] + values["phase_rad"]
     return np.asarray(values["amplitude_dph"] * np.cos(phase))
 
@@ -33,7 +34,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(np.column_stack((np.cos(angle), np.sin(angle))), known)
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     """a cos x + b sin x = A cos(x + phase)."""
     return {
         "amplitude_dph": float(np.hypot(weights[0], weights[1])),

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from ..common.arrays import FloatArray
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .search import SearchRule, anywhere
 from .words import Telling, Wording
 
@@ -17,7 +18,7 @@ _REPEATED = "the same hold after power-ons at three temperatures, each twice"
 _REFERENCE_C = 20.0  # room temperature: where the offset counts as none
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     found_c = scene.node_c[int(np.argmax(scene.on_s >= 0.0))]
     return np.full(len(scene.time_s), values["slope_dph_per_c"] * (found_c - _REFERENCE_C))
 
@@ -29,7 +30,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(np.full((n, 1), found_c - _REFERENCE_C), np.ones(n, dtype=bool))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"slope_dph_per_c": float(weights[0])}
 
 

@@ -7,15 +7,16 @@ a static map absorbs it and nothing in its residual can show it. There is nothin
 
 from __future__ import annotations
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
-from .base import Array, Cause, Parameter, Scene, Values
+from .base import Cause, Parameter, Scene, Values
 from .memory import RATES
 from .words import Wording
 
 __all__ = ["CAUSE"]
 
 
-def _record(scene: Scene, values: Values) -> Array:
+def _record(scene: Scene, values: Values) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.sensed_c)
 
 

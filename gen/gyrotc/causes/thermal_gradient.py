@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .memory import RATES, lagged
 from .search import SearchRule, SingleCycle, geometric
 from .tabled import Tabled, half_block_before, memory_gain
@@ -22,7 +23,7 @@ from .words import Wording
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     second_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     return np.asarray(values["amplitude_dph_per_c"] * (second_c - scene.node_c))
 
@@ -32,7 +33,7 @@ def _features(history: History, values: Values) -> Features:
     return Features((z - history.temperature_c)[:, None], memory.known)
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"amplitude_dph_per_c": float(weights[0])}
 
 

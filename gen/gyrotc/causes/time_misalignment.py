@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.operators import delayed
-from .base import Array, Cause, Features, History, Parameter, Scene, Values
+from .base import Cause, Features, History, Parameter, Scene, Values
 from .memory import CORNERS, RATES
 from .search import Reach, SearchRule
 from .words import Wording
@@ -22,7 +23,7 @@ _FAR_SHARE = 0.1  # of the longest run: farther shifts put too much of a run's e
 _MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
 
 
-def _record(scene: Scene, values: Values) -> Array:
+def _record(scene: Scene, values: Values) -> FloatArray:
     return delayed(values["shift_s"], scene.time_s, scene.sensed_c)
 
 
@@ -40,7 +41,9 @@ def _grid(reach: Reach) -> list[Values]:
     return [{"shift_s": float(s)} for s in np.concatenate([-steps[::-1], steps])]
 
 
-def _mended(time_s: Array, temperature_c: Array, slope: Array, values: Values) -> tuple[Array, Array]:
+def _mended(
+    time_s: FloatArray, temperature_c: FloatArray, slope: FloatArray, values: Values
+) -> tuple[FloatArray, FloatArray]:
     """Not a number where the temperature of that time was not recorded."""
     later = time_s + values["shift_s"]
     true_c, true_slope = (

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from ..common.arrays import FloatArray
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .search import SearchRule, anywhere
 from .words import Telling, Wording
 
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.full(len(scene.time_s), rng.normal(0.0, values["std_dph"]))
 
 
@@ -25,7 +26,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(columns, np.ones(len(history.time_s), dtype=bool))
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"std_dph": float(np.sqrt(np.mean(weights**2)))}
 
 

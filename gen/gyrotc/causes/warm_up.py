@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..target.recursion import TableKind
-from .base import Array, Cause, Features, History, Needs, Parameter, Scene, Values
+from .base import Cause, Features, History, Needs, Parameter, Scene, Values
 from .memory import COLD_STARTS
 from .search import SearchRule, geometric
 from .tabled import Tabled, half_block_before, octaves_per_block
@@ -17,11 +18,11 @@ from .words import Telling, Wording
 __all__ = ["CAUSE"]
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * _fading(scene.on_s, values["tau_s"]))
 
 
-def _fading(on_s: Array, tau_s: float) -> Array:
+def _fading(on_s: FloatArray, tau_s: float) -> FloatArray:
     return np.where(on_s >= 0.0, np.exp(-np.maximum(on_s, 0.0) / tau_s), 0.0)
 
 
@@ -33,7 +34,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(_fading(history.on_s, values["tau_s"])[:, None], history.on_s >= 0.0)
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"amplitude_dph": float(weights[0])}
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import FloatArray
 from .metrics import MAD_TO_SIGMA
 
 __all__ = ["cell_means", "noise_of"]
 
-Floats = NDArray[np.float64]
 
-
-def cell_means(length_s: float, time_s: Floats, *columns: Floats) -> tuple[Floats, ...]:
+def cell_means(length_s: float, time_s: FloatArray, *columns: FloatArray) -> tuple[FloatArray, ...]:
     """Means of the time and of every column over cells from the first row on; cells without rows are left out.
 
     Args:
@@ -26,6 +24,6 @@ def cell_means(length_s: float, time_s: Floats, *columns: Floats) -> tuple[Float
     return tuple(np.add.reduceat(v, first) / count for v in (time_s, *columns))
 
 
-def noise_of(z: Floats) -> float:
+def noise_of(z: FloatArray) -> float:
     """Standard deviation of numbers about 0 of which most are noise."""
     return MAD_TO_SIGMA * float(np.median(np.abs(z)))

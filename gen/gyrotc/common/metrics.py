@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import FloatArray
 from .ceilings import need_memory
 
 __all__ = [
@@ -26,7 +27,6 @@ __all__ = [
     "time_statistics",
 ]
 
-Array = NDArray[np.float64]
 
 MAD_TO_SIGMA = 1.0 / NormalDist().inv_cdf(0.75)
 """σ of a normal distribution over its median absolute deviation: half of it lies within its quartiles."""
@@ -44,10 +44,10 @@ _BIN_BYTES = 24  # of a mean while it is made: its count, its number and a sum
 class Averages:
     """Means over `average_s` of one run: their times (s), and rates before and after (deg/h)."""
 
-    time_s: Array
-    before_dph: Array
-    after_dph: Array
-    temperature_c: Array
+    time_s: FloatArray
+    before_dph: FloatArray
+    after_dph: FloatArray
+    temperature_c: FloatArray
 
 
 def median(values: NDArray[Any], overwrite_input: bool = False) -> float:
@@ -61,7 +61,7 @@ def median(values: NDArray[Any], overwrite_input: bool = False) -> float:
     return float((ordered[middle - 1] + ordered[middle]) / 2)
 
 
-def middle_of_five(a: Array, b: Array, c: Array, d: Array, e: Array) -> Array:
+def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e: FloatArray) -> FloatArray:
     """Median of each five numbers, none of them NaN; arrays of one shape."""
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
@@ -69,7 +69,7 @@ def middle_of_five(a: Array, b: Array, c: Array, d: Array, e: Array) -> Array:
 
 
 def _bins(
-    time_s: Array, scored: NDArray[np.bool_], average_s: float, from_s: float | None
+    time_s: FloatArray, scored: NDArray[np.bool_], average_s: float, from_s: float | None
 ) -> tuple[NDArray[np.int64], int]:
     """Bin of every row (from `from_s` on; None: the first row) and their number; a bin less than half full gets -1."""
     if time_s.size == 0:
@@ -89,10 +89,10 @@ def _bins(
 
 
 def average(
-    time_s: Array,
-    temperature_c: Array,
-    before_dph: Array,
-    after_dph: Array,
+    time_s: FloatArray,
+    temperature_c: FloatArray,
+    before_dph: FloatArray,
+    after_dph: FloatArray,
     *,
     scored: NDArray[np.bool_],
     average_s: float,
@@ -109,7 +109,7 @@ def average(
     bins = bins[used]
     count = np.bincount(bins, minlength=n)
 
-    def mean(values: Array) -> Array:
+    def mean(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(bins, weights=values[used], minlength=n) / count)
 
     return Averages(
@@ -120,7 +120,7 @@ def average(
     )
 
 
-def statistics(values: Array) -> dict[str, float | None]:
+def statistics(values: FloatArray) -> dict[str, float | None]:
     """Mean, standard deviation, RMS and largest magnitude, deg/h; None where there is no sample."""
     if values.size == 0:
         return dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))

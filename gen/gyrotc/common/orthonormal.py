@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
+
+from .arrays import FloatArray
 
 __all__ = ["TOLERANCE", "main_directions", "orthonormal"]
 
-Array = NDArray[np.float64]
 
 TOLERANCE = float(np.sqrt(np.finfo(np.float64).eps))
 """Share of a column's norm that must be its own beside the other columns.
@@ -18,7 +18,7 @@ rounding unit (1.5e-8) has a square at the level of the rounding of 1: its direc
 """
 
 
-def orthonormal(*blocks: Array) -> Array:
+def orthonormal(*blocks: FloatArray) -> FloatArray:
     """Orthonormal columns that span the columns of all blocks, shapes (N, k), in shape (N, rank).
 
     Where all columns are independent these are the columns made orthogonal in their order (Householder). Where some
@@ -39,7 +39,7 @@ def orthonormal(*blocks: Array) -> Array:
     return np.asarray(q[:, : np.count_nonzero(np.abs(np.diag(r)) > TOLERANCE)])
 
 
-def main_directions(columns: Array, share: float) -> Array:
+def main_directions(columns: FloatArray, share: float) -> FloatArray:
     """Orthonormal directions in which columns, shape (N, k), are at least `share` as strong as in the strongest."""
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, size > share * size[:1]])

@@ -20,7 +20,6 @@ __all__ = ["Autopilot", "Cubic", "best_cubic"]
 
 Autopilot = Literal["px4", "ardupilot"]
 Words = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 _RAD_S = np.pi / 180.0 / 3600.0  # of one deg/h
 _SCALE = np.float32(1e-6)  # ArduPilot's, so that its parameters are easy to read

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import FloatArray
 from ..model import Model
 from ..results.map import MapOfAxis, MapOnGrid
 
 __all__ = ["GRID", "MapGrid", "csv_text", "grid_of", "map_result"]
 
-Floats = NDArray[np.float64]
 
 GRID = (61, 25)  # temperatures and rates of a table: finer than any map of a gyro
 _WITHIN = 4  # parts of a cell at which the loss is measured: its middle and two more in each direction
@@ -36,10 +36,10 @@ class MapGrid:
     """
 
     model: Model
-    temperature_c: Floats
-    slope_c_per_min: Floats
-    bias_dph: Floats
-    rest_dph: Floats
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
+    bias_dph: FloatArray
+    rest_dph: FloatArray
     rms_dph: float
     largest_dph: float
 
@@ -56,12 +56,12 @@ def grid_of(model: Model, points: tuple[int, int] = GRID) -> MapGrid:
     return MapGrid(model, t, r, bias, np.asarray(model.map_dph(t, 0.0)), rms, largest)
 
 
-def _points(span: tuple[float, float], count: int) -> Floats:
+def _points(span: tuple[float, float], count: int) -> FloatArray:
     """Points of an axis in float32, each once: an envelope without width has one."""
     return np.unique(np.linspace(*span, count).astype(np.float32)).astype(np.float64)
 
 
-def _between(axis: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _between(axis: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
     """Places within the cells of an axis: the cell's number, and how far in it they lie."""
     if axis.size == 1:
         return np.zeros(1, dtype=np.int64), np.zeros(1)
@@ -69,7 +69,7 @@ def _between(axis: Floats) -> tuple[NDArray[np.int64], Floats]:
     return cell, np.tile(np.arange(_WITHIN) / _WITHIN, axis.size - 1)
 
 
-def _lost(model: Model, t: Floats, r: Floats, bias: Floats) -> Floats:
+def _lost(model: Model, t: FloatArray, r: FloatArray, bias: FloatArray) -> FloatArray:
     """Bilinear interpolation minus map, at places in all cells."""
     (i, u), (k, v) = _between(t), _between(r)
     i1, k1 = np.minimum(i + 1, t.size - 1), np.minimum(k + 1, r.size - 1)

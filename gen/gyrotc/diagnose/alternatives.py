@@ -12,15 +12,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes.base import History
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
 from .blocks import Records, centred_slope
 
 __all__ = ["Shape", "shapes_of"]
 
-Array = NDArray[np.float64]
 
 _TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))  # a factor 1.6 apart: memories nearer than that are alike
 _EDGES = (0.6, 1.3)  # thresholds, in standard deviations of T − z
@@ -47,7 +46,7 @@ class Shape:
 
     name: str
     parameters: int
-    columns: Array
+    columns: FloatArray
     common: bool = False
 
 
@@ -63,11 +62,11 @@ def shapes_of(records: Records) -> Iterator[Shape]:
         yield Shape("creep after turns of the temperature", 1, crept)
 
 
-def _late(history: History, tau: float) -> Array:
+def _late(history: History, tau: float) -> FloatArray:
     return np.asarray(first_order(tau, history.time_s, history.temperature_c) - history.temperature_c)
 
 
-def _nonlinear(records: Records, late: dict[float, list[Array]]) -> Iterator[Shape]:
+def _nonlinear(records: Records, late: dict[float, list[FloatArray]]) -> Iterator[Shape]:
     """Memory that acts other than in proportion, alone and beside a proportional part."""
     for lags in late.values():
         size = float(np.std(np.concatenate(lags))) + 1e-12
@@ -93,7 +92,7 @@ def _one_sided(records: Records) -> Iterator[Shape]:
                 yield Shape("memory that differs between warming and cooling", 2, column)
 
 
-def _two_sided_lag(history: History, up: float, down: float) -> Array:
+def _two_sided_lag(history: History, up: float, down: float) -> FloatArray:
     """z − T of a node with one time constant while T > z and another while T < z, shape (n, 1)."""
     t = history.temperature_c
     step = np.diff(history.time_s, prepend=history.time_s[0])
@@ -106,7 +105,7 @@ def _two_sided_lag(history: History, up: float, down: float) -> Array:
     return out[:, None]
 
 
-def _modulated(records: Records, late: dict[float, list[Array]]) -> Iterator[Shape]:
+def _modulated(records: Records, late: dict[float, list[FloatArray]]) -> Iterator[Shape]:
     """Memory whose strength changes over T, and changes sign with it or not."""
     for lags in late.values():
         for act in (lags, [np.abs(d) for d in lags]):
@@ -126,7 +125,7 @@ def _switched(records: Records) -> Iterator[Shape]:
     for gap in _GAPS_C:
         for upper in np.arange(low + gap + _SWITCH_C / 2, high, _SWITCH_C):
 
-            def hats(h: History, on: float = float(upper), off: float = float(upper) - gap) -> Array:
+            def hats(h: History, on: float = float(upper), off: float = float(upper) - gap) -> FloatArray:
                 state = _switch(h.temperature_c, on, off)
                 near = np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / _HAT_C)
                 return np.asarray(near * state[:, None])
@@ -138,14 +137,14 @@ def _switched(records: Records) -> Iterator[Shape]:
                 yield Shape("a map that a switch changes", 2, columns[:, used], common=True)
 
 
-def _switch(t: Array, on: float, off: float) -> Array:
+def _switch(t: FloatArray, on: float, off: float) -> FloatArray:
     """State 0 or 1: the last threshold that was passed, 0 before any."""
     event = np.where(t > on, 1, np.where(t < off, -1, 0))
     last = np.maximum.accumulate(np.where(event != 0, np.arange(len(t)), -1))
     return np.where(last >= 0, event[np.maximum(last, 0)] > 0, False).astype(float)
 
 
-def _creep(history: History, grain: float) -> Array:
+def _creep(history: History, grain: float) -> FloatArray:
     """Sign of the last direction times log(1 + time since it turned / grain), shape (n, 1)."""
     slope = centred_slope(history)
     sign = np.where(slope > _TURNING, 1, np.where(slope < -_TURNING, -1, 0))

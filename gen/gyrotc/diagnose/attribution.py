@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from .candidates import Candidate, searched
 from .contest import Contest, contest
 from .detection import Found, detect
@@ -29,7 +29,6 @@ from .wide_memory import WideMemory, outlasts, rate_independent
 
 __all__ = ["Attribution", "attribute", "choose"]
 
-Array = NDArray[np.float64]
 
 _LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
 _WELL = 0.08  # p-value of what is left that a pair must reach,
@@ -66,7 +65,7 @@ class Attribution:
     wide: WideMemory | None = None
 
     @property
-    def columns(self) -> Array:
+    def columns(self) -> FloatArray:
         """All columns that stand in the model when the causes are named, shape (N, k)."""
         return _columns(self.causes, self.wide)
 
@@ -272,7 +271,7 @@ def _with(search: Search, causes: tuple[Refined, ...], wide: WideMemory | None =
     return current, "beside" if swapped else "map and beside"
 
 
-def _columns(causes: tuple[Refined, ...], wide: WideMemory | None) -> Array:
+def _columns(causes: tuple[Refined, ...], wide: WideMemory | None) -> FloatArray:
     return model_columns(causes) if wide is None else np.column_stack([model_columns(causes), wide.columns])
 
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes.base import History
+from ..common.arrays import FloatArray
 from ..common.ceilings import need_memory
 
 __all__ = ["Record", "Records", "centred_slope", "singled_out"]
 
-Array = NDArray[np.float64]
 _BLOCK_BYTES = 8 * 64  # of the features of a block that are averaged together
 _SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could stand for
 
@@ -37,10 +37,10 @@ class Record:
 
     name: str
     history: History
-    rate_dph: Array
+    rate_dph: FloatArray
     usable: NDArray[np.bool_]
     environment: str = ""
-    channels: Mapping[str, Array] = field(default_factory=dict)
+    channels: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def row_s(self) -> float:
@@ -88,7 +88,9 @@ class Records:
         ends = np.cumsum([k.size for k in self.kept])
         return [slice(int(e - k.size), int(e)) for e, k in zip(ends, self.kept, strict=True)]
 
-    def average_run(self, number: int, rows: Array, weight: NDArray[np.bool_] | None = None) -> Array:
+    def average_run(
+        self, number: int, rows: FloatArray, weight: NDArray[np.bool_] | None = None
+    ) -> FloatArray:
         """Block means of one run's rows, shape (n,) or (n, k); `weight` leaves rows out (default: `usable`)."""
         use = self.runs[number].usable if weight is None else weight
         index, kept = self.index[number], self.kept[number]
@@ -100,15 +102,15 @@ class Records:
         means = sums[kept] / np.maximum(count[kept], 1.0)[:, None]
         return means[:, 0] if rows.ndim == 1 else means
 
-    def average(self, rows: Sequence[Array]) -> Array:
+    def average(self, rows: Sequence[FloatArray]) -> FloatArray:
         """Block means of all runs, joined: shape (N,) or (N, k)."""
         return np.concatenate([self.average_run(k, r) for k, r in enumerate(rows)])
 
-    def columns(self, feature: Callable[[History], Array]) -> Array:
+    def columns(self, feature: Callable[[History], FloatArray]) -> FloatArray:
         """A feature of the histories as joined block means, shape (N, k)."""
         return self.average([feature(run.history) for run in self.runs])
 
-    def target(self, masks: Sequence[NDArray[np.bool_]] | None = None) -> Array:
+    def target(self, masks: Sequence[NDArray[np.bool_]] | None = None) -> FloatArray:
         """Block means of the measured rate, deg/h, shape (N,); `masks` (per run) leave rows out."""
         use = [r.usable for r in self.runs] if masks is None else masks
         return np.concatenate(
@@ -138,7 +140,7 @@ class Records:
         return digest.hexdigest()
 
 
-def singled_out(where: NDArray[np.bool_]) -> Array:
+def singled_out(where: NDArray[np.bool_]) -> FloatArray:
     """One column for every block that is marked, 1 there and 0 elsewhere, shape (N, marked)."""
     at = np.flatnonzero(where)
     out = np.zeros((where.size, at.size))
@@ -146,7 +148,7 @@ def singled_out(where: NDArray[np.bool_]) -> Array:
     return out
 
 
-def centred_slope(history: History) -> Array:
+def centred_slope(history: History) -> FloatArray:
     """dT/dt in C/min at every row: least-squares slope over ±100 s (at least ±2 rows), one-sided at the ends."""
     time, value = history.time_s, history.temperature_c
     half = max(_SLOPE_SPAN_S / 2, 2.0 * float(np.median(np.diff(time))))

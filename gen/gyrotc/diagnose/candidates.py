@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..causes.base import Cause, History, Parameter, Values
 from ..causes.search import Reach, SearchRule
+from ..common.arrays import FloatArray
 from .blocks import Records
 
 __all__ = [
@@ -25,7 +25,6 @@ __all__ = [
     "testable",
 ]
 
-Array = NDArray[np.float64]
 Role = Literal["columns", "input", "variance", "structure"]
 
 
@@ -76,12 +75,12 @@ def reach_of(records: Records) -> Reach:
     return Reach(span, max(float(np.ptp(r.history.time_s)) for r in records.runs))
 
 
-def columns_of(records: Records, cause: str, values: Values) -> Array:
+def columns_of(records: Records, cause: str, values: Values) -> FloatArray:
     """Block means of the columns that a cause adds, shape (N, k)."""
     features = CATALOGUE[cause].features
     assert features is not None
 
-    def rows(history: History) -> Array:
+    def rows(history: History) -> FloatArray:
         return features(history, values).columns
 
     return records.columns(rows)

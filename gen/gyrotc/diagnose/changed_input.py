@@ -8,18 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from .blocks import Records, centred_slope
 from .candidates import Candidate, diagnosed, reach_of, searched
 from .static_map import MapBasis
 
 __all__ = ["changed_inputs", "proportional_map", "replaced_map"]
 
-Array = NDArray[np.float64]
 
 _WHOLE = 0.999  # share of a block's rows that must know their input: all, up to the rounding of the mean
 
 
-def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], Array, NDArray[np.bool_]]:
+def changed_inputs(
+    records: Records, basis: MapBasis
+) -> tuple[list[Candidate], FloatArray, NDArray[np.bool_]]:
     """Map of the changed inputs for every candidate of kind "input"."""
     reach = reach_of(records)
     candidates, maps, knowns = [], [], []
@@ -32,14 +34,16 @@ def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], 
     return candidates, np.array(maps), np.array(knowns)
 
 
-def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[Array, NDArray[np.bool_]]:
+def replaced_map(
+    records: Records, basis: MapBasis, candidate: Candidate
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
     seen = _moved_inputs(records, candidate)
     maps = [records.average_run(k, basis(t, slope)) for k, (t, slope, _) in enumerate(seen)]
     return np.concatenate(maps), np.concatenate([known for _, _, known in seen])
 
 
-def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | None) -> Array:
+def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | None) -> FloatArray:
     """Block means of `MapBasis.proportional` of changed inputs (None: of the plain ones), shape (N, k)."""
     if candidate is None:
         seen = [(run.history.temperature_c, centred_slope(run.history)) for run in records.runs]
@@ -48,7 +52,9 @@ def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | N
     return records.average([basis.proportional(t, slope) for t, slope in seen])
 
 
-def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+def _moved_inputs(
+    records: Records, candidate: Candidate
+) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
     """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
     features = CATALOGUE[candidate.id].features
     assert features is not None

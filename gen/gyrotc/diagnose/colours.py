@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..recordings.records import Dataset
 
 __all__ = ["COLOURS", "Colour", "Declared", "declared_noise", "flicker_row", "markov_row"]
 
-Array = NDArray[np.float64]
 
 _FLICKER_S = tuple(100.0 * 4.0**k for k in range(6))  # s, from one block to a day
 
@@ -40,7 +40,7 @@ class Colour:
     walk: float = 0.0
     quantum: float = 0.0
 
-    def matrix(self, number: NDArray[np.int64], block_s: float) -> Array:
+    def matrix(self, number: NDArray[np.int64], block_s: float) -> FloatArray:
         """Covariance of the blocks `number` of one run, shape (n, n)."""
         lags = np.arange(int(number[-1]) - int(number[0]) + 1 if number.size else 0)
         row = np.where(lags == 0, self.white, 0.0)
@@ -55,7 +55,7 @@ class Colour:
         return np.asarray(cov)
 
 
-def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> Array:
+def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> FloatArray:
     """Covariance of block means of a Markov process of variance 1, by lag in blocks."""
     x = block_s / tau_s
     own = 2.0 * (x + np.expm1(-x)) / x**2
@@ -63,7 +63,7 @@ def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> Array:
     return np.asarray(np.where(lags == 0, own, other))
 
 
-def flicker_row(lags: NDArray[np.int64], block_s: float) -> Array:
+def flicker_row(lags: NDArray[np.int64], block_s: float) -> FloatArray:
     """The same for flicker noise: equal Markov processes, correlation times a factor 4 apart."""
     return np.asarray(sum(markov_row(lags, block_s, tau) for tau in _FLICKER_S))
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .candidates import searched
 from .changed_input import proportional_map
@@ -21,7 +21,6 @@ from .wide_memory import WideMemory
 
 __all__ = ["Contest", "contest"]
 
-Array = NDArray[np.float64]
 
 _BENT = "memory that does not act in proportion"
 _BEND, _BEND_SHARE = 15.0, 0.1  # energy, and share of the cause's gain, that a map may bend more than before
@@ -76,7 +75,7 @@ class _NestedModels:
         self.white = [gains.whiten(c.columns) for c in causes]
         self.others = gains.whiten(gains.search.bank.alternatives)
 
-    def held(self, kept: Sequence[int]) -> Array:
+    def held(self, kept: Sequence[int]) -> FloatArray:
         """Orthonormal columns of a model: the map, plain or of another input, and what the causes add."""
         swapped = any(self.causes[k].candidate.role == "input" for k in kept)
         static = [] if swapped else [self.gains.map]
@@ -138,11 +137,11 @@ class _NestedModels:
         return [i for i in range(len(self.causes)) if i != k]
 
 
-def _energy(held: Array, y: Array) -> float:
+def _energy(held: FloatArray, y: FloatArray) -> float:
     return float(((held.T @ y) ** 2).sum())
 
 
-def _common(held: Array, columns: Array, y: Array) -> float:
+def _common(held: FloatArray, columns: FloatArray, y: FloatArray) -> float:
     """Likelihood ratio of one variance common to the weights of some columns beside a model."""
     rest = columns - held @ (held.T @ columns)
     left, size, _ = np.linalg.svd(rest, full_matrices=False)
@@ -152,7 +151,7 @@ def _common(held: Array, columns: Array, y: Array) -> float:
     return float(ratio_of((left[:, keep].T @ y) ** 2, size[keep] ** 2)[0])
 
 
-def _gain(other: Alternative, columns: Array, a: Array, before: Array) -> float:
+def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatArray) -> float:
     """Twice the log-likelihood that one shape adds."""
     size, vectors = np.linalg.eigh(columns.T @ columns)
     keep = size > _OWN * float(before.max())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from ..causes.search import Reach, SingleCycle
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
@@ -17,7 +18,6 @@ from .pairs import APART
 
 __all__ = ["CycleFits", "memories"]
 
-Array = NDArray[np.float64]
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
@@ -65,7 +65,7 @@ class CycleFits:
         longest_s = max(float(np.ptp(r.history.time_s[r.usable])) for r in records.runs)
         self.reach = Reach(float(np.ptp(t)), longest_s)
 
-    def _less_map(self, x: Array) -> Array:
+    def _less_map(self, x: FloatArray) -> FloatArray:
         return np.asarray(x - self.static @ (self.static.T @ x))
 
     @cached_property
@@ -81,7 +81,7 @@ class CycleFits:
         return found
 
     @cached_property
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, FloatArray]:
         """Their columns less the map's part, unit norm, by kind, shape (N, count)."""
         out = {}
         for id, states in self.grid.items():
@@ -90,7 +90,7 @@ class CycleFits:
             out[id] = rest / np.linalg.norm(rest, axis=0)
         return out
 
-    def energies(self, kinds: tuple[str, ...]) -> Array:
+    def energies(self, kinds: tuple[str, ...]) -> FloatArray:
         """What every combination of one or two states explains, (deg/h)², shape (count, ...)."""
         a = self.columns[kinds[0]].T @ self.rest
         if len(kinds) == 1:
@@ -109,28 +109,28 @@ class CycleFits:
         logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
         return np.asarray(np.abs(logs[:, None] - logs[None, :]) > APART)
 
-    def left(self, members: tuple[Candidate, ...]) -> Array:
+    def left(self, members: tuple[Candidate, ...]) -> FloatArray:
         """Residual of map and states."""
         return self._without(np.column_stack([self._column(m) for m in members]))
 
-    def without_rate(self, powers: tuple[tuple[int, int], ...]) -> Array:
+    def without_rate(self, powers: tuple[tuple[int, int], ...]) -> FloatArray:
         """Residual of the map and of products of T and dT/dt."""
         t, r = self._inputs
         return self._without(self._less_map(np.column_stack([t**a * r**b for a, b in powers])))
 
     @cached_property
-    def _inputs(self) -> tuple[Array, Array]:
+    def _inputs(self) -> tuple[FloatArray, FloatArray]:
         """Block means of T and centred dT/dt, scaled to -1 ... 1."""
         runs = self.records.runs
         t = self.records.average([run.history.temperature_c for run in runs])
         r = self.records.average([centred_slope(run.history) for run in runs])
         return 2.0 * (t - t.min()) / float(np.ptp(t)) - 1.0, r / float(np.abs(r).max())
 
-    def _without(self, columns: Array) -> Array:
+    def _without(self, columns: FloatArray) -> FloatArray:
         q = orthonormal(columns)
         return np.asarray(self.rest - q @ (q.T @ self.rest))
 
-    def _column(self, member: Candidate) -> Array:
+    def _column(self, member: Candidate) -> FloatArray:
         rest = self._less_map(columns_of(self.records, member.id, member.values)[:, 0])
         return np.asarray(rest / np.linalg.norm(rest))
 
@@ -174,7 +174,7 @@ class CycleFits:
         return at(float(found.x)), float(found.fun)
 
 
-def _shared(here: list[float], low: float, high: float, grid: Array) -> tuple[float, float]:
+def _shared(here: list[float], low: float, high: float, grid: FloatArray) -> tuple[float, float]:
     """Limits of the first of two parameters that move together, so that both stay on the grid's range."""
     gap = here[1] - here[0]
     return max(low, float(grid[0]) - min(gap, 0.0)), min(high, float(grid[-1]) - max(gap, 0.0))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from ..common.arrays import FloatArray
 from ..common.quantiles import CHI2_95_TWO
 from .candidates import Candidate
 from .joined import Held
@@ -18,7 +18,6 @@ from .views import View, residual_log_likelihood
 
 __all__ = ["Found", "detect"]
 
-Array = NDArray[np.float64]
 
 _SEED = 20140916  # any: it fixes the draws, so that a diagnosis repeats to the last digit
 _PLACES = 9  # of an adjusted p-value: below every draw all are alike, and the sum's rounding is no order
@@ -64,7 +63,7 @@ def detect(search: Search, held: Held) -> list[Found]:
     return [Found(search.joined.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
 
 
-def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: int) -> Array:
+def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: int) -> FloatArray:
     """Residual log-likelihood of a colour with map and candidate projected out, for every candidate."""
     gram, a = projection.gram, projection.a * view.scale
     alive, diagonal = projection.alive, np.diag(projection.gram)

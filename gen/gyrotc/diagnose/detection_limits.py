@@ -9,16 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from .candidates import Candidate, searched, shape_parameter
 from .project import project
 from .search import Search
 
 __all__ = ["CauseLimit", "amplitude_energy", "detection_limits", "limit_of"]
 
-Array = NDArray[np.float64]
 
 _LARGEST = 1e150  # a norm whose square is finite stands for an infinite one
 
@@ -62,7 +61,7 @@ def detection_limits(search: Search) -> dict[str, CauseLimit]:
     return {key: limit_of(key.split(":")[0], points) for key, points in found.items()}
 
 
-def amplitude_energy(cause: str, power: Array) -> float:
+def amplitude_energy(cause: str, power: FloatArray) -> float:
     """d² of a cause at unit amplitude from that of its columns, shape (k,): of all draws, or of any one column."""
     return float(power.sum() if CATALOGUE[cause].kind == "random" else power.mean())
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import BoolArray, FloatArray
 from ..common.orthonormal import orthonormal
 from .blocks import Records, centred_slope
 from .colours import COLOURS, Declared
@@ -22,9 +22,7 @@ from .whitener import Whitener
 
 __all__ = ["Discrepancy", "Ensemble", "ensemble_of"]
 
-Array = NDArray[np.float64]
-BlockMask = NDArray[np.bool_]
-OfResiduals = Callable[[Array], Array]
+OfResiduals = Callable[[FloatArray], FloatArray]
 
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
@@ -57,8 +55,8 @@ class Ensemble:
         discrepancies: All statistics, rarest first.
     """
 
-    residual: Array
-    simulated: Array
+    residual: FloatArray
+    simulated: FloatArray
     discrepancies: tuple[Discrepancy, ...]
 
 
@@ -66,7 +64,7 @@ def ensemble_of(
     search: Search,
     declared: Declared | None,
     *,
-    beside: Array | None = None,
+    beside: FloatArray | None = None,
     estimated: bool = False,
     seed: int = 1,
 ) -> Ensemble:
@@ -103,7 +101,7 @@ def ensemble_of(
     return Ensemble(measured, simulated[:, :100], tuple(found))
 
 
-def _discrepancy(name: str, measured: float, simulated: Array, rounding: float) -> Discrepancy:
+def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: float) -> Discrepancy:
     """The rank of the measured value; where the model takes a statistic away wholly, none is rare."""
     n = simulated.size
     above = float(np.count_nonzero(simulated >= measured))
@@ -137,39 +135,39 @@ def _statistics(search: Search) -> dict[str, OfResiduals]:
     return found
 
 
-def _rms(e: Array) -> Array:
+def _rms(e: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((e**2).mean(axis=0)))
 
 
-def _unknown(e: Array) -> Array:
+def _unknown(e: FloatArray) -> FloatArray:
     """A statistic that these runs do not have."""
     return np.full(e.shape[1], np.nan)
 
 
-def _autocorrelation(e: Array, spans: Sequence[slice]) -> Array:
+def _autocorrelation(e: FloatArray, spans: Sequence[slice]) -> FloatArray:
     """Of neighbouring blocks."""
     top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)
     return np.asarray(top / (e**2).sum(axis=0))
 
 
-def _rms_of_means(e: Array, spans: Sequence[slice], width: int) -> Array:
+def _rms_of_means(e: FloatArray, spans: Sequence[slice], width: int) -> FloatArray:
     """RMS of means over `width` blocks."""
     parts = [_grouped(e[s], width) for s in spans if s.stop - s.start >= width]
     return _rms(np.concatenate(parts)) if parts else _unknown(e)
 
 
-def _rms_of_runs(e: Array, spans: Sequence[slice]) -> Array:
+def _rms_of_runs(e: FloatArray, spans: Sequence[slice]) -> FloatArray:
     """RMS of the means of runs."""
     return _rms(np.array([e[s].mean(axis=0) for s in spans])) if len(spans) > 1 else _unknown(e)
 
 
-def _loop(e: Array, branches: Sequence[tuple[BlockMask, BlockMask]]) -> Array:
+def _loop(e: FloatArray, branches: Sequence[tuple[BoolArray, BoolArray]]) -> FloatArray:
     """RMS over temperature of the mean difference between heating and cooling."""
     gaps = [e[up].mean(axis=0) - e[down].mean(axis=0) for up, down in branches]
     return _rms(np.array(gaps)) if gaps else _unknown(e)
 
 
-def _branches(records: Records) -> list[tuple[BlockMask, BlockMask]]:
+def _branches(records: Records) -> list[tuple[BoolArray, BoolArray]]:
     """Blocks that heat and that cool, shape (N,) each, for every cell of temperature that has enough of both."""
     slope = records.average([centred_slope(r.history) for r in records.runs])
     temperature = records.average([r.history.temperature_c for r in records.runs])
@@ -178,22 +176,22 @@ def _branches(records: Records) -> list[tuple[BlockMask, BlockMask]]:
     return [(up, down) for up, down in pairs if min(up.sum(), down.sum()) >= _FEWEST]
 
 
-def _first_mean(e: Array, spans: Sequence[slice], width: int) -> Array:
+def _first_mean(e: FloatArray, spans: Sequence[slice], width: int) -> FloatArray:
     """Mean over the runs of the mean of their first `width` blocks."""
     return np.asarray(np.mean([e[s][:width].mean(axis=0) for s in spans], axis=0))
 
 
-def _kurtosis(e: Array) -> Array:
+def _kurtosis(e: FloatArray) -> FloatArray:
     """Fourth moment over the square of the second, about 0."""
     square = e * e
     return np.asarray((square * square).mean(axis=0) / square.mean(axis=0) ** 2)
 
 
-def _trend(e: Array, spans: Sequence[slice], date: Array) -> Array:
+def _trend(e: FloatArray, spans: Sequence[slice], date: FloatArray) -> FloatArray:
     """Slope of the means of runs in standardised dates."""
     return np.asarray(np.mean([x * e[s].mean(axis=0) for x, s in zip(date, spans, strict=True)], axis=0))
 
 
-def _grouped(e: Array, width: int) -> Array:
+def _grouped(e: FloatArray, width: int) -> FloatArray:
     n = e.shape[0] // width
     return np.asarray(e[: n * width].reshape(n, width, -1).mean(axis=1))

@@ -7,13 +7,14 @@ none, runs (or branches of few runs) are left out in turn, and causes and parame
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import Progress
 from ..common.metrics import Averages
 from ..recordings.records import Dataset
 from ..results.lot import LotUse
@@ -30,7 +31,6 @@ from .shipping import Shipping, shipping
 
 __all__ = ["Extension", "extend"]
 
-Progress = Callable[[str], None]
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts
 _LEARNT = 0.67  # share of the dates that is learnt from where no exam run is later

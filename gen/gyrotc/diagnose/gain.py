@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages, time_statistics
 from ..results.diagnosed import Estimate, GainOnUnseen
 
 __all__ = ["Gain", "floor_of", "gain_of"]
 
-Array = NDArray[np.float64]
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
@@ -124,7 +123,7 @@ def gain_of(
 
 def _pieces(
     before: Sequence[Averages], after: Sequence[Averages], average_s: float
-) -> tuple[Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sums of squares before and after, and number of samples, of half-hour pieces."""
     most = sum(x.after_dph.size for x in before) // _FEWEST_PIECES
     size = max(min(round(_PIECE_S / average_s), most), 1)
@@ -137,7 +136,7 @@ def _pieces(
     return np.concatenate(b2), np.concatenate(a2), np.concatenate(weight).astype(float)
 
 
-def _middle_95(draws: Array) -> tuple[float, float]:
+def _middle_95(draws: FloatArray) -> tuple[float, float]:
     low, high = np.quantile(draws, [0.025, 0.975])
     return float(low), float(high)
 
@@ -155,7 +154,7 @@ def _angle_removed(
     return _HOUR_S * low, _HOUR_S * high
 
 
-def _hours(run: Averages, average_s: float) -> Array:
+def _hours(run: Averages, average_s: float) -> FloatArray:
     """Means over full hours of one run, deg/h."""
     if run.time_s.size == 0:
         return np.zeros(0)

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, searched
@@ -25,7 +26,6 @@ from .whitener import Whitener
 
 __all__ = ["CauseSet", "Gains", "Point"]
 
-Array = NDArray[np.float64]
 
 _INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
 
@@ -54,8 +54,8 @@ class _Base:
 
     candidate: Candidate | None
     gain: float
-    gram: Array
-    a: Array
+    gram: FloatArray
+    a: FloatArray
     taken: _Taken | None = None
 
 
@@ -69,11 +69,11 @@ class _Taken:
         shares: Of the largest effect for a weight of 1, shape (k,).
     """
 
-    weights: Array
-    less: Array
-    shares: Array
+    weights: FloatArray
+    less: FloatArray
+    shares: FloatArray
 
-    def allows(self, at: slice, weights: Array) -> bool:
+    def allows(self, at: slice, weights: FloatArray) -> bool:
         """Whether they are still believed beside other columns with these weights."""
         left = self.weights - self.less[:, at] @ weights
         return float(((self.shares * left) ** 2).sum()) <= 1.0
@@ -116,16 +116,16 @@ class Gains:
         self._bases: list[_Base] | None = None
 
     @cached_property
-    def map_q(self) -> Array:
+    def map_q(self) -> FloatArray:
         """Orthonormal columns of the whitened map."""
         return orthonormal(self.map)
 
-    def plain_columns(self, at: slice) -> Array:
+    def plain_columns(self, at: slice) -> FloatArray:
         """Whitened bank columns with the map projected out."""
         columns = self._columns[:, at]
         return np.asarray(columns - self.map_q @ (self.map_q.T @ columns))
 
-    def rest_after(self, candidate: Candidate, white: Array) -> float:
+    def rest_after(self, candidate: Candidate, white: FloatArray) -> float:
         """Energy of whitened data that the map of another input leaves on the blocks where it is known."""
         i = self.search.bank.inputs.index(candidate)
         known = self.search.bank.known[i]
@@ -142,7 +142,9 @@ class Gains:
             self._bases = [self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)]
         return self._bases
 
-    def _project(self, candidate: Candidate | None, design: Array, known: NDArray[np.bool_] | None) -> _Base:
+    def _project(
+        self, candidate: Candidate | None, design: FloatArray, known: NDArray[np.bool_] | None
+    ) -> _Base:
         blocks = [self.beside]
         if known is not None and not known.all():
             blocks.append(self.whiten(singled_out(~known)))
@@ -158,11 +160,11 @@ class Gains:
         return _Base(candidate, gain, gram, columns.T @ self.target - cross.T @ c)
 
     @cached_property
-    def _gram(self) -> Array:
+    def _gram(self) -> FloatArray:
         return np.asarray(self._columns.T @ self._columns)
 
     @cached_property
-    def _whole_gram(self) -> Array:
+    def _whole_gram(self) -> FloatArray:
         return np.asarray(self.whole.T @ self.whole)
 
     def single(self) -> Iterator[Point]:
@@ -186,7 +188,7 @@ class Gains:
             assert base.candidate is not None
             yield from self._on(base, (base.candidate,))
 
-    def _gain(self, base: _Base, at: slice, before: Array) -> float:
+    def _gain(self, base: _Base, at: slice, before: FloatArray) -> float:
         """What one column or two add; 0 where they have nothing of their own, or no size that is believed."""
         own, a = base.gram[at, at], base.a[at]
         if a.size == 1:
@@ -217,7 +219,7 @@ class Gains:
             yield Point((*members, candidate), base.gain + gain)
 
 
-def _take(base: _Base, at: slice, shares: Array) -> _Base | None:
+def _take(base: _Base, at: slice, shares: FloatArray) -> _Base | None:
     """`base` with further columns projected out; None if they have nothing of their own."""
     own = base.gram[at, at]
     values, vectors = np.linalg.eigh(own)

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes.base import History
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.records import Dataset, Rows, Run
 from .blocks import Record, Records
 
 __all__ = ["block_length", "records_of"]
 
-Array = NDArray[np.float64]
 
 _ROW_S = 5.0  # finer rows are averaged first
 _MIN_BLOCKS = 1000  # below this number of blocks they are made shorter than the averaging asks for
@@ -76,7 +76,7 @@ def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, N
     use = usable[:n].reshape(-1, group)
     count = np.maximum(use.sum(axis=1), 1)
 
-    def mean(values: Array) -> Array:
+    def mean(values: FloatArray) -> FloatArray:
         part = values[:n].reshape(-1, group)
         return np.asarray(np.where(use, np.nan_to_num(part), 0.0).sum(axis=1) / count)
 
@@ -93,7 +93,7 @@ def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, N
     return filled, 2 * use.sum(axis=1) >= group
 
 
-def _bridged(time_s: Array, values: Array) -> Array:
+def _bridged(time_s: FloatArray, values: FloatArray) -> FloatArray:
     """Straight lines over missing values: operators need some history; the rows themselves do not count."""
     good = np.isfinite(values)
     if good.all():

@@ -6,14 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from ..common.arrays import FloatArray
 from ..common.quantiles import CHI2_95_ONE
 
 __all__ = ["Interval", "parabola_top", "profile_interval", "random_size"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +38,7 @@ def parabola_top(
     return here + move, float(-c2)
 
 
-def profile_interval(profile: Array) -> tuple[float, float]:
+def profile_interval(profile: FloatArray) -> tuple[float, float]:
     """The least interval with every value whose likelihood is not below the 95 % quantile of one parameter.
 
     A profile may have several tops, as that of a wave's period has; what lies between two of them belongs to it.
@@ -61,7 +59,7 @@ def profile_interval(profile: Array) -> tuple[float, float]:
     return low, high
 
 
-def random_size(weights: Array, spread: Array) -> Interval:
+def random_size(weights: FloatArray, spread: FloatArray) -> Interval:
     """Standard deviation of normal offsets from their estimates: chi-square limits, noise taken off."""
     n = weights.size
     centred = weights - weights.mean()

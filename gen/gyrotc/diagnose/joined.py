@@ -11,17 +11,15 @@ from itertools import accumulate, pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray, IntArray
 from .candidates import Candidate
 from .scores import ScoredColumns
 from .signature_bank import SignatureBank
 
 __all__ = ["Channels", "Held", "Joined", "JoinedLayout", "join"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Channels = tuple[Array, list[Candidate]]
+Channels = tuple[FloatArray, list[Candidate]]
 """Columns of the auxiliary channels, shape (N, c), and their candidates."""
 
 Held = Literal["map", "map and beside", "beside"]
@@ -51,7 +49,7 @@ class JoinedLayout:
         """Number of joined columns."""
         return int(self.beside.stop)
 
-    def held(self, what: Held) -> Index:
+    def held(self, what: Held) -> IntArray:
         """Numbers of the columns that a model holds."""
         parts = {
             "map": (self.static,),
@@ -77,22 +75,22 @@ class Joined:
     """
 
     layout: JoinedLayout
-    channels: Array
-    inputs: Array
-    beside: Array
-    on_map: Array
-    norm: Array
+    channels: FloatArray
+    inputs: FloatArray
+    beside: FloatArray
+    on_map: FloatArray
+    norm: FloatArray
     added: tuple[Candidate, ...]
     columns: ScoredColumns
     owners: tuple[Candidate, ...]
 
     @property
-    def outside(self) -> Array:
+    def outside(self) -> FloatArray:
         """All columns that are not in the bank, shape (N, c + i + b)."""
         return np.column_stack([self.channels, self.inputs, self.beside])
 
 
-def join(bank: SignatureBank, y: Array, channels: Channels | None, beside: Array | None) -> Joined:
+def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: FloatArray | None) -> Joined:
     """Joins the bank, shape (N, ...), with channels, changed inputs and what stands beside the map."""
     none = np.zeros((y.size, 0))
     own, names = channels if channels is not None else (none, [])
@@ -121,7 +119,7 @@ def join(bank: SignatureBank, y: Array, channels: Channels | None, beside: Array
     )
 
 
-def _changes(bank: SignatureBank, y: Array) -> list[Array]:
+def _changes(bank: SignatureBank, y: FloatArray) -> list[FloatArray]:
     """What every changed input changes of the fitted map, 0 where it is not known."""
     weights = bank.map.T @ y
     moved = [replaced @ weights - bank.map @ weights for replaced in bank.replaced]
@@ -133,8 +131,8 @@ def _candidates(
 ) -> tuple[ScoredColumns, tuple[Candidate, ...]]:
     """Where single columns, pairs and groups of one variance stand, and whose they are."""
     single: list[tuple[int, Candidate]] = []
-    pairs: list[tuple[Index, Candidate]] = []
-    variance: list[tuple[Index, Candidate]] = []
+    pairs: list[tuple[IntArray, Candidate]] = []
+    variance: list[tuple[IntArray, Candidate]] = []
     for signature in bank.groups:
         at = np.arange(signature.columns.start, signature.columns.stop) + layout.signatures.start
         candidate = signature.candidate

@@ -22,6 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, diagnosed, searched
@@ -31,7 +32,6 @@ from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
 __all__ = ["MarginalLikelihood"]
 
-Array = NDArray[np.float64]
 _Kinds = tuple[Kind, ...]  # of a model, sorted
 _Near = dict[_Kinds, list[Point]]
 _Name = tuple[str, str, str]  # of a candidate
@@ -143,11 +143,15 @@ class MarginalLikelihood:
     def _where(self) -> dict[_Name, slice]:
         return {_name(c): at for c, at in (*self.gains.plain, *self.gains.random)}
 
-    def _map(self, candidate: Candidate) -> Array:
+    def _map(self, candidate: Candidate) -> FloatArray:
         return np.asarray(self.gains.whiten(self.bank.replaced[self.bank.inputs.index(candidate)]))
 
     def _marginal(
-        self, mapped: Array, free: Sequence[Array], drawn: Sequence[Array], left_out: NDArray[np.bool_]
+        self,
+        mapped: FloatArray,
+        free: Sequence[FloatArray],
+        drawn: Sequence[FloatArray],
+        left_out: NDArray[np.bool_],
     ) -> float:
         """Twice the log-likelihood of data over the noise, with free columns and groups of weights with a variance."""
         raw = mapped @ self._back
@@ -161,12 +165,12 @@ class MarginalLikelihood:
         return _largest(y, groups) - float(y @ y)
 
     @cached_property
-    def _back(self) -> Array:
+    def _back(self) -> FloatArray:
         """From the map's basis to the functions that it is made of, shape (m, 3 + a + b)."""
         return np.asarray(np.linalg.pinv(self.bank.basis.mix))
 
 
-def _largest(y: Array, groups: Sequence[Array]) -> float:
+def _largest(y: FloatArray, groups: Sequence[FloatArray]) -> float:
     """Twice the log of N(y; 0, I + Σ v_g G_g G_gᵀ) over N(y; 0, I), at the likeliest variances v."""
     base = orthonormal(*groups)
     data = base.T @ y
@@ -176,7 +180,7 @@ def _largest(y: Array, groups: Sequence[Array]) -> float:
         power = float((small**2).sum()) / max(group.shape[1], 1)
         inner.append(small @ small.T / max(power, 1e-300))
 
-    def cost(logs: Array) -> tuple[float, Array]:
+    def cost(logs: FloatArray) -> tuple[float, FloatArray]:
         size = np.exp(logs)
         factor = cho_factor(
             np.eye(data.size) + sum(s * g for s, g in zip(size, inner, strict=True)), lower=True

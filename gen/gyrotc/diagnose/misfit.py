@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from ..common.orthonormal import main_directions, orthonormal
 from .joined import Held
 from .project import project
@@ -29,7 +29,6 @@ from .whitener import Whitener
 
 __all__ = ["Misfit", "explained", "misfit"]
 
-Array = NDArray[np.float64]
 
 _DIRECTION_C = (
     3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
@@ -80,7 +79,7 @@ def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int =
 
 
 def _told(
-    current: Search, views: Sequence[View], weight: Array, held: Held, changed: Array, chance: int
+    current: Search, views: Sequence[View], weight: FloatArray, held: Held, changed: FloatArray, chance: int
 ) -> tuple[float, float]:
     """The same where the noise has one of some colours, each as likely as its weight says."""
     tests = np.array([_tests(current, view, held, changed) for view in views])
@@ -89,7 +88,7 @@ def _told(
     return min(1.0, _TESTS * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
 
 
-def _tests(current: Search, view: View, held: Held, changed: Array) -> list[tuple[float, float]]:
+def _tests(current: Search, view: View, held: Held, changed: FloatArray) -> list[tuple[float, float]]:
     """p-value and energy left of every test under one colour."""
     return [*_dictionary(project(current, view, held)), _changes(current, view, held, changed)]
 
@@ -118,7 +117,7 @@ def _dictionary(projection: Projection) -> list[tuple[float, float]]:
     ]
 
 
-def _changed(current: Search, causes: Sequence[Refined]) -> Array:
+def _changed(current: Search, causes: Sequence[Refined]) -> FloatArray:
     """Every cause with an amplitude that differs by run, temperature and direction, shape (N, k)."""
     records = current.records
     t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
@@ -138,7 +137,7 @@ def _changed(current: Search, causes: Sequence[Refined]) -> Array:
     return np.column_stack(columns) if columns else np.zeros((records.size, 0))
 
 
-def _changes(current: Search, view: View, held: Held, changed: Array) -> tuple[float, float]:
+def _changes(current: Search, view: View, held: Held, changed: FloatArray) -> tuple[float, float]:
     """p-value and energy of what changing amplitudes would explain."""
     if changed.shape[1] == 0:
         return 1.0, 0.0

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .gains import Gains
 from .refine import Refined
 
 __all__ = ["overlap"]
 
-Array = NDArray[np.float64]
 
 _TELLING = 10.0  # d² of the part that the rival cannot mimic: odds of about e^5 for the right one (docs/diagnosis.md)
 _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
@@ -36,12 +35,12 @@ def overlap(gains: Gains, cause: Refined, rivals: list[str]) -> dict[str, float]
     return out
 
 
-def _explained(columns: Array, target: Array) -> float:
+def _explained(columns: FloatArray, target: FloatArray) -> float:
     """Share of the energy of `target`, shape (N,), that lies in the span of columns, shape (N, k)."""
     return float(((orthonormal(columns).T @ target) ** 2).sum() / (target @ target))
 
 
-def _fitted(gains: Gains, cause: Refined) -> Array:
+def _fitted(gains: Gains, cause: Refined) -> FloatArray:
     """Map and cause as fitted, without noise, deg/h."""
     bank = gains.search.bank
     if cause.candidate.role == "input":

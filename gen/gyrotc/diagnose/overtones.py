@@ -7,15 +7,14 @@ BIC asks for it; nothing of them has a part in naming the cause.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes.base import Cause, History, Values
+from ..common.arrays import FloatArray
 from ..train.bumps import BesideSmooth, beside_smooth
 from ..train.data import TrainingData, scaling_of
 
 __all__ = ["overtones_of"]
 
-Array = NDArray[np.float64]
 
 _NUMBERS = (2, 3)  # of the overtones: with the wave itself they leave a term of four to something else
 _PARAMETERS = 2  # of an overtone: sine and cosine
@@ -51,12 +50,12 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
     return tuple(found)
 
 
-def _columns(beside: BesideSmooth, term: Cause, values: Values) -> Array:
+def _columns(beside: BesideSmooth, term: Cause, values: Values) -> FloatArray:
     assert term.features is not None
     history = History(time_s=np.arange(beside.t.size, dtype=np.float64), temperature_c=beside.t)
     return beside.rest(term.features(history, values).columns * beside.root[:, None])
 
 
-def _energy(beside: BesideSmooth, columns: list[Array]) -> float:
+def _energy(beside: BesideSmooth, columns: list[FloatArray]) -> float:
     q = np.linalg.qr(np.column_stack(columns))[0]
     return float(((q.T @ beside.y) ** 2).sum())

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from ..causes import CATALOGUE
+from ..common.arrays import Progress
 from ..common.orthonormal import main_directions, orthonormal
 from .attribution import Attribution, attribute
 from .blocks import Records
@@ -28,8 +28,6 @@ from .search import Search, open_search
 
 __all__ = ["Analysis", "analyse", "search_of"]
 
-Array = NDArray[np.float64]
-Progress = Callable[[str], None]
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MAIN = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .joined import Held
 from .scores import Projection
 from .search import Search
@@ -12,7 +13,6 @@ from .views import View
 
 __all__ = ["project"]
 
-Array = NDArray[np.float64]
 
 _RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
 
@@ -30,7 +30,7 @@ def project(search: Search, view: View, held: Held) -> Projection:
     return _project(search, view, mix.T @ view.gram @ mix, mix.T @ view.b, out)
 
 
-def _without_map(search: Search, total: int) -> Array:
+def _without_map(search: Search, total: int) -> FloatArray:
     """From the joined columns to those of a model without the map, shape (P, P)."""
     joined = search.joined
     layout = joined.layout
@@ -41,7 +41,9 @@ def _without_map(search: Search, total: int) -> Array:
     return mix
 
 
-def _project(search: Search, view: View, full: Array, b: Array, out: NDArray[np.int64]) -> Projection:
+def _project(
+    search: Search, view: View, full: FloatArray, b: FloatArray, out: NDArray[np.int64]
+) -> Projection:
     size, vectors = np.linalg.eigh(full[np.ix_(out, out)])
     keep = size > _RANK * size[-1]
     half = vectors[:, keep] / np.sqrt(size[keep])

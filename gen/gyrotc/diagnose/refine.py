@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import causes as terms
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from ..common.quantiles import CHI2_95_ONE, NORMAL_95
 from .blocks import singled_out
@@ -21,7 +22,6 @@ from .static_map import fine_columns
 
 __all__ = ["Refined", "model_columns", "refine", "sized"]
 
-Array = NDArray[np.float64]
 
 _ROUNDS = 2  # several parameters are moved one after the other, twice
 _STEP = 0.02  # relative step of the derivative to a parameter
@@ -44,12 +44,12 @@ class Refined:
     """
 
     candidate: Candidate
-    columns: Array
-    tangent: Array | None
+    columns: FloatArray
+    tangent: FloatArray | None
     parameters: dict[str, Interval]
-    contribution: Array
-    edges: Array | None
-    profile: Array | None
+    contribution: FloatArray
+    edges: FloatArray | None
+    profile: FloatArray | None
 
     @property
     def plausible(self) -> bool:
@@ -62,12 +62,12 @@ class Refined:
         return max(ends) >= parameter.low / _BEYOND and min(ends) <= parameter.high * _BEYOND
 
 
-def model_columns(causes: Sequence[Refined]) -> Array:
+def model_columns(causes: Sequence[Refined]) -> FloatArray:
     """All columns that stand in the model when the causes are named: theirs, their tangents, masked edges."""
     return np.column_stack([b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None])
 
 
-def _columns(search: Search, candidate: Candidate) -> Array:
+def _columns(search: Search, candidate: Candidate) -> FloatArray:
     records = search.records
     if candidate.role == "input":
         return replaced_map(records, search.bank.basis, candidate)[0]
@@ -111,10 +111,10 @@ class _Fit:
         self.q = orthonormal(*held)
         y = gains.whiten(search.y) / gains.scale
         self.y = y - self.q @ (self.q.T @ y)
-        self._cache: dict[_Key, Array] = {}
-        self._shares: dict[_Key, Array] = {}
+        self._cache: dict[_Key, FloatArray] = {}
+        self._shares: dict[_Key, FloatArray] = {}
 
-    def white(self, candidate: Candidate) -> Array:
+    def white(self, candidate: Candidate) -> FloatArray:
         """Whitened columns of a candidate less what the map (or the masked edges) explain."""
         key = _key(candidate)
         if key not in self._cache:
@@ -132,7 +132,7 @@ class _Fit:
             return 0.0
         return float(((q.T @ self.y) ** 2).sum())
 
-    def _believed(self, members: list[Candidate], white: list[Array]) -> bool:
+    def _believed(self, members: list[Candidate], white: list[FloatArray]) -> bool:
         weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=1e-10)[0]
         at = 0
         for member, own in zip(members, white, strict=True):
@@ -161,7 +161,7 @@ def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tupl
     """Moves the nonlinear parameters of all members to their optimum, one after the other, in two rounds."""
     fit = _Fit(search, gains, members)
     current = list(members)
-    profiles: list[Array | None] = [None] * len(current)
+    profiles: list[FloatArray | None] = [None] * len(current)
     for _ in range(_ROUNDS if len(current) > 1 else 1):
         for k, member in enumerate(current):
             if shape_parameter(member.id) is None or member.channel is not None:
@@ -171,7 +171,7 @@ def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tupl
     return tuple(_result(search, fit, current, k, profiles[k]) for k in range(len(current)))
 
 
-def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[Array, float]:
+def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[FloatArray, float]:
     """Profile likelihood of the k-th member's parameter over the search's grid and about its optimum, and the optimum.
 
     Only about the optimum where the cause changes the map's input: a point of its grid is a map of its own.
@@ -209,7 +209,9 @@ def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
     return searched(member.id).width(here, reach_of(fit.search.records).span_c)
 
 
-def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile: Array | None) -> Refined:
+def _result(
+    search: Search, fit: _Fit, members: list[Candidate], k: int, profile: FloatArray | None
+) -> Refined:
     """Amplitudes with intervals that allow for the uncertainty of the nonlinear parameters."""
     swapped = [m for m in members if m.role == "input"]
     blocks = [fit.edges] if swapped else [fit.edges, search.bank.map]
@@ -238,7 +240,7 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
     return Refined(members[k], own, tangent, parameters, np.asarray(contribution), edges, profile)
 
 
-def _tangent(search: Search, candidate: Candidate, weights: Array | None) -> Array | None:
+def _tangent(search: Search, candidate: Candidate, weights: FloatArray | None) -> FloatArray | None:
     """Derivative to the nonlinear parameter: of the columns, or of their weighted sum for a map."""
     parameter = shape_parameter(candidate.id)
     if parameter is None or candidate.channel is not None:
@@ -255,7 +257,7 @@ def _tangent(search: Search, candidate: Candidate, weights: Array | None) -> Arr
     return np.asarray(slope @ weights)[:, None]
 
 
-def _spread(fit: _Fit, design: Array, tangents: list[Array], start: int, count: int) -> Array:
+def _spread(fit: _Fit, design: FloatArray, tangents: list[FloatArray], start: int, count: int) -> FloatArray:
     """Covariance of the weights `start` ... when everything is free, shape (count, count)."""
     white = fit.gains.whiten(np.column_stack([design, *tangents]))
     norm = np.where(np.linalg.norm(white, axis=0) > 0, np.linalg.norm(white, axis=0), 1.0)
@@ -265,7 +267,7 @@ def _spread(fit: _Fit, design: Array, tangents: list[Array], start: int, count: 
 
 
 def _amplitudes(
-    candidate: Candidate, weights: Array, spread: Array, fit: _Fit, columns: Array
+    candidate: Candidate, weights: FloatArray, spread: FloatArray, fit: _Fit, columns: FloatArray
 ) -> dict[str, Interval]:
     """Linear parameters by the term's own rule, with intervals."""
     term = terms.CATALOGUE[candidate.id]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..causes.base import Cause, Scene
+from ..common.arrays import FloatArray
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
 from ..target.recursion import Course, CourseChannel, TermOutcome
@@ -41,7 +42,6 @@ __all__ = [
     "terms_of",
 ]
 
-Array = NDArray[np.float64]
 
 MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 _LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
@@ -90,9 +90,9 @@ class Played:
     data: TrainingData
     in_force: NDArray[np.int64]
     course: Course
-    slope: Array
+    slope: FloatArray
     begins_s: float | None
-    on_s: Array
+    on_s: FloatArray
     day: float | None
     channels: Mapping[str, CourseChannel]
     block_s: float
@@ -219,7 +219,7 @@ def terms_of(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def added_range(
-    runs: Sequence[Played], effects: Sequence[Effect], beside: Array | float = 0.0
+    runs: Sequence[Played], effects: Sequence[Effect], beside: FloatArray | float = 0.0
 ) -> list[float]:
     """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h.
 
@@ -238,7 +238,7 @@ def added_range(
     return [float(both.min()), float(both.max())]
 
 
-def _simulated(run: Played, effect: Effect) -> Array:
+def _simulated(run: Played, effect: Effect) -> FloatArray:
     """What a cause that no table holds adds, as the simulation has it, deg/h."""
     seen = run.data.temperature_c
     scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
@@ -286,7 +286,7 @@ def levelled(data: TrainingData, std_dph: float) -> TrainingData:
     return out
 
 
-def _re_zeroed(rest: Array, time_s: Array, effects: Sequence[Effect]) -> Array:
+def _re_zeroed(rest: FloatArray, time_s: FloatArray, effects: Sequence[Effect]) -> FloatArray:
     """Residuals after a rest at their start: its mean counts as far as the offsets are larger than its noise."""
     variance = max(e.values["std_dph"] for e in effects if e.term.kind == "random") ** 2
     first = rest[time_s < time_s[0] + _RE_ZERO_S]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import BoolArray
 from ..common.metrics import Averages
 from ..recordings.records import Dataset
 from ..train.data import joined
@@ -23,7 +23,6 @@ from .single_cycle import cycle_of
 
 __all__ = ["FEW_RUNS", "Chain", "Refitting", "folds_of"]
 
-Mask = NDArray[np.bool_]
 Chain = list[list[Averages]]
 """Residuals of the scored runs for every set of causes, from none to all."""
 
@@ -61,7 +60,7 @@ class Refitting:
         }
 
     def fit(
-        self, effects: Sequence[Effect], kept: list[Mask] | None = None, *, beside: bool | None = None
+        self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None
     ) -> Fit:
         """The map beside the effects (`beside`: as if there were any); fits on all samples are remembered."""
         whole = kept is None or all(m.all() for m in kept)
@@ -74,7 +73,7 @@ class Refitting:
             self._fits.append((list(effects), rate, fitted))
         return fitted
 
-    def everything(self) -> list[Mask]:
+    def everything(self) -> list[BoolArray]:
         """All training samples, per run."""
         return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
 
@@ -88,7 +87,7 @@ class Refitting:
         """Residuals of the training runs themselves: more first differences for the noise floor."""
         return self._residuals(self.everything(), self.train, self.everything(), effects)
 
-    def left_out(self, held: list[Mask], count: int) -> Chain:
+    def left_out(self, held: list[BoolArray], count: int) -> Chain:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
         kept = [~m for m in held]
         effects = completed(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
@@ -100,9 +99,9 @@ class Refitting:
 
     def _residuals(
         self,
-        kept: list[Mask],
+        kept: list[BoolArray],
         runs: list[Played],
-        scored: list[Mask],
+        scored: list[BoolArray],
         effects: Sequence[Effect],
         *,
         beside: bool | None = None,
@@ -110,7 +109,7 @@ class Refitting:
         fitted = self.fit(effects, kept, beside=beside)
         return scored_means(fitted, runs, effects, self.average_s, scored)
 
-    def _chosen(self, held: list[Mask], count: int) -> tuple[Refined, ...]:
+    def _chosen(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
         """Best `count` causes on the records without the held-out samples."""
         masks = []
         for run, played, out in zip(self.records.runs, self.train, held, strict=True):
@@ -124,7 +123,7 @@ class Refitting:
         return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
 
 
-def folds_of(refitting: Refitting) -> list[list[Mask]]:
+def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
     """Held-out masks: groups of runs, or spans of few runs."""
     sizes = [len(run.data.bias_dph) for run in refitting.train]
     if len(refitting.train) >= FEW_RUNS:

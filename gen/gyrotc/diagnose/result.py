@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ..common.arrays import Progress
 from ..common.metrics import LEAST_SPAN_C
 from ..model import Model
 from ..quality.events import Event, accepted, events_of
@@ -33,8 +34,6 @@ from .summary import not_testable, result_of
 from .verdict import holds
 
 __all__ = ["Diagnosis", "diagnose"]
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
+from ..common.arrays import FloatArray, IntArray
+
 __all__ = ["Projection", "ScoredColumns", "Scores", "draw_null", "score"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _DRAWS = 4000  # 40 draws lie beyond the 1 % point: it is known to one sixth of itself
 _WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
@@ -37,9 +37,9 @@ class ScoredColumns:
         structure: Columns (of `Projection.common`) for the omnibus test.
     """
 
-    single: Index
-    pairs: Index
-    variance: tuple[Index, ...]
+    single: IntArray
+    pairs: IntArray
+    variance: tuple[IntArray, ...]
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ class Projection:
         rank: Number of columns projected out.
     """
 
-    a: Array
-    gram: Array
-    before: Array
-    common: Array
+    a: FloatArray
+    gram: FloatArray
+    before: FloatArray
+    common: FloatArray
     rest: float
     log_det: float
     rank: int
@@ -70,7 +70,7 @@ class Projection:
         return np.asarray(np.diag(self.gram) > _GONE * self.before)
 
     @cached_property
-    def structure(self) -> tuple[Array, Array]:
+    def structure(self) -> tuple[FloatArray, FloatArray]:
         """Independent directions of the dictionary and their energies: what a random mixture of signatures has.
 
         Returns:
@@ -86,16 +86,16 @@ class Projection:
 class Scores:
     """−log p of every candidate, in the order single, pairs, variance, structure; shape (..., candidates)."""
 
-    single: Array
-    pairs: Array
-    variance: Array
-    structure: Array
+    single: FloatArray
+    pairs: FloatArray
+    variance: FloatArray
+    structure: FloatArray
 
-    def joined(self) -> Array:
+    def joined(self) -> FloatArray:
         return np.concatenate([self.single, self.pairs, self.variance, self.structure], axis=-1)
 
 
-def score(projection: Projection, columns: ScoredColumns, a: Array) -> Scores:
+def score(projection: Projection, columns: ScoredColumns, a: FloatArray) -> Scores:
     """Scores for inner products `a`, shape (P,) or (draws, P)."""
     size = np.diag(projection.gram)
     alive = projection.alive
@@ -112,7 +112,7 @@ def score(projection: Projection, columns: ScoredColumns, a: Array) -> Scores:
     )
 
 
-def _pair_energy(projection: Projection, pairs: Index, a: Array) -> Array:
+def _pair_energy(projection: Projection, pairs: IntArray, a: FloatArray) -> FloatArray:
     """Energy of the data in the plane of two columns."""
     g = projection.gram
     p, q = pairs[:, 0], pairs[:, 1]
@@ -124,19 +124,19 @@ def _pair_energy(projection: Projection, pairs: Index, a: Array) -> Array:
     return np.asarray(energy)
 
 
-def _variance(projection: Projection, index: Index, a: Array) -> Array:
+def _variance(projection: Projection, index: IntArray, a: FloatArray) -> FloatArray:
     """−log p of the likelihood ratio of one common variance against none (half a chi-square)."""
     ratio = variance_ratio(projection, index, a)[0]
     return np.asarray(-log_ndtr(-np.sqrt(np.maximum(ratio, 0.0))))
 
 
-def variance_ratio(projection: Projection, index: Index, a: Array) -> tuple[Array, Array]:
+def variance_ratio(projection: Projection, index: IntArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Likelihood ratio 2 Δ log L and the variance (in the unit of the columns' weights) that gives it."""
     gram = projection.gram[np.ix_(index, index)]
     return variance_ratio_of(gram, a[..., index], float(projection.before[index].max()))
 
 
-def variance_ratio_of(gram: Array, a: Array, before: float) -> tuple[Array, Array]:
+def variance_ratio_of(gram: FloatArray, a: FloatArray, before: float) -> tuple[FloatArray, FloatArray]:
     """The same from inner products of the columns, shape (k, k), and with the data, shape (..., k)."""
     size, vectors = np.linalg.eigh(gram)
     keep = size > _RANK * max(before, 1e-300)
@@ -146,7 +146,7 @@ def variance_ratio_of(gram: Array, a: Array, before: float) -> tuple[Array, Arra
     return ratio_of((a @ vectors[:, keep]) ** 2 / size[keep], size[keep])
 
 
-def ratio_of(energy: Array, s: Array) -> tuple[Array, Array]:
+def ratio_of(energy: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The same from energies of independent directions, shape (..., r), and their sizes, shape (r,)."""
     gain = np.outer(_LAMBDA / s.mean(), s)
     ratio = energy @ (gain / (1.0 + gain)).T - np.log1p(gain).sum(axis=1)
@@ -155,14 +155,14 @@ def ratio_of(energy: Array, s: Array) -> tuple[Array, Array]:
     return np.maximum(top, 0.0), np.where(top > 0.0, _LAMBDA[best] / s.mean(), 0.0)
 
 
-def _structure(projection: Projection, a: Array) -> Array:
+def _structure(projection: Projection, a: FloatArray) -> FloatArray:
     """−log p of one common variance of all signatures against none."""
     directions, size = projection.structure
     ratio = ratio_of((a @ directions) ** 2, size)[0]
     return np.asarray(-log_ndtr(-np.sqrt(ratio)))
 
 
-def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: int = _DRAWS) -> Array:
+def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: int = _DRAWS) -> FloatArray:
     """Largest score in data without effect, shape (draws,)."""
     used = np.flatnonzero(projection.alive)
     gram = projection.gram[np.ix_(used, used)]
@@ -174,7 +174,7 @@ def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: 
     return np.asarray(score(projection, columns, a).joined().max(axis=-1))
 
 
-def _root(gram: Array) -> Array:
+def _root(gram: FloatArray) -> FloatArray:
     """A factor F with F F' = gram; what rounding made negative in it, of columns that hardly differ, counts as 0."""
     try:
         return np.asarray(np.linalg.cholesky(gram))

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import fdtrc, ndtr, pdtrc
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..common.orthonormal import orthonormal
 from .blocks import Records, centred_slope
 
 __all__ = ["Screened", "screen"]
 
-Array = NDArray[np.float64]
 
 _MEDIAN_ROWS = (
     15  # odd; a median over 15 rows follows a ramp; up to seven outliers in a row do not carry it away
@@ -49,7 +49,7 @@ class Screened:
     masks: tuple[NDArray[np.bool_], ...]
     n_outliers: int
     expected_outliers: float
-    sigma: Array | None
+    sigma: FloatArray | None
     findings: tuple[tuple[str, float, dict[str, float]], ...]
 
 
@@ -70,12 +70,12 @@ def screen(records: Records) -> Screened:
     return Screened(masks, found, expected, sigma, tuple(findings))
 
 
-def _detrended(rate: Array) -> Array:
+def _detrended(rate: FloatArray) -> FloatArray:
     """Rows less their running median."""
     return np.asarray(rate - median_filter(rate, _MEDIAN_ROWS, mode="reflect"))
 
 
-def _step(rate: Array, noise: float) -> float:
+def _step(rate: FloatArray, noise: float) -> float:
     """What lies between two neighbouring values that occur, in the middle of all; of fine rows next to nothing.
 
     What is printed, or a mean of rounded rows, is beside its step by a trace of the noise: that is the same value.
@@ -110,7 +110,7 @@ def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, flo
     return tuple(masks), found, expected
 
 
-def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Array | None, float, float]:
+def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray | None, float, float]:
     """Does the quick part of the noise depend on |dT/dt|, T or the time since power-on?
 
     The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a
@@ -142,7 +142,9 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Arr
     return np.clip(sigma, 0.1, 10.0), p, ratio
 
 
-def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Array, NDArray[np.int64]]:
+def _quick_power(
+    records: Records, masks: Sequence[NDArray[np.bool_]]
+) -> tuple[FloatArray, NDArray[np.int64]]:
     """Mean squared difference of neighbouring usable rows of a block, and the block, where there are such rows."""
     power, index = [], []
     for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
@@ -160,7 +162,7 @@ def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[
     return np.concatenate(power), np.concatenate(index)
 
 
-def _variance_design(records: Records) -> Array:
+def _variance_design(records: Records) -> FloatArray:
     """Constant, |dT/dt|, its square, hats over T, and a fading with time since power-on, shape (N, k)."""
     t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
     r = np.abs(records.average([centred_slope(run.history) for run in records.runs]))
@@ -194,7 +196,7 @@ def _temperature_step(records: Records) -> float | None:
     return float(np.median(steps)) if len(steps) * 2 > len(records.runs) else None
 
 
-def cleaned(records: Records, screened: Screened) -> tuple[Array, NDArray[np.int64]]:
+def cleaned(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[np.int64]]:
     """Block means without the outliers, and the blocks of which nothing is left (their value is 0).
 
     The blocks themselves stay the same, so that a bank of the temperature records stays valid.

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.quantiles import CHI2_95_TWO
 from .blocks import Records
 from .colours import COLOURS, Colour
@@ -20,7 +20,6 @@ from .views import Question, View, possible_effects, view_of, view_of_bank
 
 __all__ = ["Search", "open_search"]
 
-Array = NDArray[np.float64]
 
 _COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour and one that is contradicted
 
@@ -42,7 +41,7 @@ class Search:
 
     question: Question
     channels: Channels | None
-    beside: Array | None
+    beside: FloatArray | None
     declared: Colour | None
     views: Mapping[int, View]
     best: int
@@ -60,12 +59,12 @@ class Search:
         return self.question.bank
 
     @property
-    def y(self) -> Array:
+    def y(self) -> FloatArray:
         """Block means of the rate, deg/h, shape (N,)."""
         return self.question.y
 
     @property
-    def sigma(self) -> Array | None:
+    def sigma(self) -> FloatArray | None:
         """Factor of the noise of every block, shape (N,); None: even."""
         return self.question.sigma
 
@@ -92,11 +91,11 @@ class Search:
         """Whether the data are so much likelier under another colour that that of the view cannot be theirs."""
         return 2.0 * (self.likeliest.log_likelihood - view.log_likelihood) > _COLOUR_RATIO
 
-    def map_weights(self) -> Array:
+    def map_weights(self) -> FloatArray:
         """Least-squares weights of the map, shape (m,)."""
         return np.asarray(self.bank.map.T @ self.y)
 
-    def extended(self, columns: Array) -> Search:
+    def extended(self, columns: FloatArray) -> Search:
         """The same search with further columns, shape (N, k), in every model.
 
         Only the colours that the data allow are looked at again.
@@ -118,11 +117,11 @@ class Search:
 def open_search(
     records: Records,
     bank: SignatureBank,
-    y: Array,
+    y: FloatArray,
     *,
     channels: Channels | None = None,
-    beside: Array | None = None,
-    sigma: Array | None = None,
+    beside: FloatArray | None = None,
+    sigma: FloatArray | None = None,
     declared: Colour | None = None,
     colours: Sequence[int] | None = None,
 ) -> Search:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order, play
 from .alternatives import shapes_of
 from .blocks import Records
@@ -22,7 +23,6 @@ from .whitener import Whitener
 
 __all__ = ["Alternative", "Signature", "SignatureBank", "build", "direction_of"]
 
-Array = NDArray[np.float64]
 
 _DICTIONARY_LAGS_S = (
     150.0,
@@ -78,23 +78,23 @@ class SignatureBank:
     """
 
     basis: MapBasis
-    map: Array
-    signatures: Array
-    scale: Array
-    on_map: Array
+    map: FloatArray
+    signatures: FloatArray
+    scale: FloatArray
+    on_map: FloatArray
     groups: tuple[Signature, ...]
     inputs: tuple[Candidate, ...]
-    replaced: Array
+    replaced: FloatArray
     known: NDArray[np.bool_]
-    common: Array
-    grams: Array
-    log_dets: Array
+    common: FloatArray
+    grams: FloatArray
+    log_dets: FloatArray
     untestable: dict[str, str]
-    finer: Array
-    alternatives: Array
+    finer: FloatArray
+    alternatives: FloatArray
     alternative_groups: tuple[Alternative, ...]
 
-    def weighted(self, records: Records, sigma: Array) -> SignatureBank:
+    def weighted(self, records: Records, sigma: FloatArray) -> SignatureBank:
         """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
         grams, log_dets = _grams(records, self.map, self.signatures, sigma)
         return replace(self, grams=grams, log_dets=log_dets)
@@ -132,7 +132,7 @@ def build(records: Records, level: int) -> SignatureBank:
     )
 
 
-def _scale(rest: Array, raw: Array, groups: Sequence[Signature]) -> Array:
+def _scale(rest: FloatArray, raw: FloatArray, groups: Sequence[Signature]) -> FloatArray:
     """Norm of every column beside the map; one for all columns of a group of random amounts."""
     scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
     for group in groups:
@@ -141,13 +141,13 @@ def _scale(rest: Array, raw: Array, groups: Sequence[Signature]) -> Array:
     return np.asarray(scale)
 
 
-def _common(signatures: Array) -> Array:
+def _common(signatures: FloatArray) -> FloatArray:
     """From signatures to their principal directions, shape (K, p)."""
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
     return np.asarray(right[size > _COMMON * size[0]].T)
 
 
-def _alternatives(records: Records) -> tuple[Array, tuple[Alternative, ...]]:
+def _alternatives(records: Records) -> tuple[FloatArray, tuple[Alternative, ...]]:
     """Shapes that no cause has, side by side."""
     columns, groups = [], []
     at = 0
@@ -162,7 +162,9 @@ def _alternatives(records: Records) -> tuple[Array, tuple[Alternative, ...]]:
     return np.column_stack(columns), tuple(groups)
 
 
-def _grams(records: Records, static: Array, signatures: Array, sigma: Array | None) -> tuple[Array, Array]:
+def _grams(
+    records: Records, static: FloatArray, signatures: FloatArray, sigma: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
     """Inner products and log determinants under every colour."""
     both = np.column_stack([static, signatures])
     grams, log_dets = [], []
@@ -174,7 +176,7 @@ def _grams(records: Records, static: Array, signatures: Array, sigma: Array | No
     return np.array(grams), np.array(log_dets)
 
 
-def _finer(records: Records, static: Array, level: int) -> Array:
+def _finer(records: Records, static: FloatArray, level: int) -> FloatArray:
     """Orthonormal functions of the next level that are not in the map."""
     if level + 1 >= len(LEVELS):
         return np.zeros((len(static), 0))
@@ -183,15 +185,15 @@ def _finer(records: Records, static: Array, level: int) -> Array:
     return np.asarray(left[:, size > 0.1])
 
 
-def _columns(records: Records) -> tuple[list[Signature], list[Array], dict[str, str]]:
+def _columns(records: Records) -> tuple[list[Signature], list[FloatArray], dict[str, str]]:
     """Columns of every candidate that adds columns, and of the dictionary of the lack-of-fit test."""
     reach = reach_of(records)
     groups: list[Signature] = []
-    columns: list[Array] = []
+    columns: list[FloatArray] = []
     untestable: dict[str, str] = {}
     at = 0
 
-    def add(candidate: Candidate, block: Array) -> None:
+    def add(candidate: Candidate, block: FloatArray) -> None:
         nonlocal at
         groups.append(Signature(candidate, slice(at, at + block.shape[1])))
         columns.append(block)
@@ -214,7 +216,7 @@ def _columns(records: Records) -> tuple[list[Signature], list[Array], dict[str, 
     return groups, columns, untestable
 
 
-def _dictionary(records: Records) -> Array:
+def _dictionary(records: Records) -> FloatArray:
     """Shapes that no cause has, for the lack-of-fit test.
 
     Memories times T and rectified; texture over T that differs by direction, or that a memory modulates.
@@ -234,13 +236,13 @@ def _dictionary(records: Records) -> Array:
     return np.column_stack(out)
 
 
-def _late(records: Records, tau_s: float) -> Array:
+def _late(records: Records, tau_s: float) -> FloatArray:
     """How much a first-order memory of the temperature differs from it, C, shape (N, 1)."""
     return records.columns(
         lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None]
     )
 
 
-def direction_of(records: Records, width_c: float) -> Array:
+def direction_of(records: Records, width_c: float) -> FloatArray:
     """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
     return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, searched
@@ -25,7 +25,6 @@ from .scores import ratio_of
 
 __all__ = ["calibrated"]
 
-Array = NDArray[np.float64]
 
 _DRAWS = 300  # of each cause: odds of 9 to 1 are then known to about a third
 _SEED = 17  # any: the same recordings have the same odds
@@ -92,19 +91,19 @@ class _Model:
         price: Of its parameters in the criterion.
     """
 
-    held: Array
-    plus: Array
-    minus: Array
-    size: Array | None
+    held: FloatArray
+    plus: FloatArray
+    minus: FloatArray
+    size: FloatArray | None
     price: float
 
-    def gain(self, plus: Array, minus: Array) -> Array:
+    def gain(self, plus: FloatArray, minus: FloatArray) -> FloatArray:
         """Gain over the model without it, from inner products with the data, shapes (r, S) and (s, S)."""
         if self.size is not None:
             return np.asarray(ratio_of((plus**2).T, self.size)[0])
         return np.asarray((plus**2).sum(axis=0) - (minus**2).sum(axis=0))
 
-    def drawn(self, target: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
+    def drawn(self, target: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray | None]:
         """What the cause does at its fitted size, shape (N,); and weights of `plus` that are drawn anew, (r, S)."""
         held = self.held @ (self.held.T @ target)
         along = self.plus.T @ target
@@ -145,14 +144,14 @@ class _Place:
         random = candidate.role == "variance" and own.any()
         return _Model(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
 
-    def _columns(self, candidate: Candidate) -> Array:
+    def _columns(self, candidate: Candidate) -> FloatArray:
         return np.asarray(self.gains.whole[:, next(at for c, at in self._where if c == candidate)])
 
-    def _input(self, candidate: Candidate) -> Array:
+    def _input(self, candidate: Candidate) -> FloatArray:
         bank = self.gains.search.bank
         return np.asarray(self.gains.whiten(bank.replaced[bank.inputs.index(candidate)]))
 
-    def _edges(self, candidate: Candidate) -> list[Array]:
+    def _edges(self, candidate: Candidate) -> list[FloatArray]:
         bank = self.gains.search.bank
         known = bank.known[bank.inputs.index(candidate)]
         return [] if known.all() else [self.gains.whiten(singled_out(~known))]
@@ -184,15 +183,15 @@ class _Simulated:
         near = {kind: float(np.exp(-0.5 * ((x - lead) / width) ** 2).sum()) for kind, x in of.items()}
         return min((near[rival] + 0.5) / (near[named] + 0.5), 1.0)
 
-    def _of(self, model: _Model) -> Array:
+    def _of(self, model: _Model) -> FloatArray:
         """Inner products with recordings in which a cause acts as it was fitted, shape (directions, draws)."""
         mean, weights = model.drawn(self.target, self._rng)
         found = (self._all.T @ mean)[:, None] + self._noise
         return np.asarray(found if weights is None else found + (self._all.T @ model.plus) @ weights)
 
-    def _criteria(self, products: Array) -> dict[Kind, Array]:
+    def _criteria(self, products: FloatArray) -> dict[Kind, FloatArray]:
         """The criterion of every cause at its best point, shape (draws,) each."""
-        out: dict[Kind, Array] = {}
+        out: dict[Kind, FloatArray] = {}
         at = 0
         for kind, found in self.models.items():
             best = np.full(products.shape[1], -np.inf)

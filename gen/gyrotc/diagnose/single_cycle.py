@@ -17,10 +17,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from .. import causes
+from ..common.arrays import FloatArray
 from ..common.quantiles import CHI2_95_ONE, NORMAL_95
 from ..train.spans import turning_points
 from .attribution import Attribution
@@ -33,7 +33,6 @@ from .rivals import EQUIVALENT, Rival
 
 __all__ = ["Cycle", "Static", "Tried", "cycle_of", "is_single_cycle"]
 
-Array = NDArray[np.float64]
 
 _FEW_PASSES = 3  # of any temperature, in all runs together
 _UNCORRELATED = 0.05  # about what chance makes of a few hundred blocks
@@ -103,8 +102,8 @@ class Cycle:
     rivals: tuple[Rival, ...]
     rms_dph: float
     p_value: float
-    residual: Array
-    explained: Array
+    residual: FloatArray
+    explained: FloatArray
 
     @property
     def causes(self) -> tuple[Refined, ...]:
@@ -207,7 +206,7 @@ def _members(fits: CycleFits, kinds: tuple[str, ...]) -> tuple[Candidate, ...]:
     return tuple(fits.grid[k][int(i)] for k, i in zip(kinds, at, strict=True))
 
 
-def _effective_size(records: Records, residual: Array) -> float:
+def _effective_size(records: Records, residual: FloatArray) -> float:
     """Number of independent blocks: n/(1 + 2 Σ ρ), over the correlations of blocks until they are noise.
 
     So it hardly depends on how long a block is, as it would were the correlation of neighbours all that counted.

@@ -8,14 +8,13 @@ wave adds. Such a model fits, and is no explanation; on other temperatures it go
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from .search import Search
 
 __all__ = ["SizeLimit"]
 
-Array = NDArray[np.float64]
 
 _MOST = 2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
 
@@ -34,7 +33,7 @@ class SizeLimit:
         self.spread_dph = _MOST * float(np.std(y - left_out @ (left_out.T @ y)))
         self.noise = search.likeliest.scale
 
-    def shares(self, columns: Array) -> Array:
+    def shares(self, columns: FloatArray) -> FloatArray:
         """Share of the largest effect that a column is for a weight of 1 to whitened data over the noise scale.
 
         Args:
@@ -42,6 +41,6 @@ class SizeLimit:
         """
         return np.asarray(columns.std(axis=0) * self.noise / max(self.spread_dph, 1e-300))
 
-    def allows(self, contribution: Array) -> bool:
+    def allows(self, contribution: FloatArray) -> bool:
         """Whether a fitted effect, deg/h, shape (N,), is believed."""
         return bool(contribution.std() <= self.spread_dph)

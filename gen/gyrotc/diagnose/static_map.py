@@ -9,13 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .blocks import Records, centred_slope
 
 __all__ = ["LEVELS", "MapBasis", "fine_columns", "make_basis"]
 
-Array = NDArray[np.float64]
 
 LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3), (19, 8, 5), (28, 10, 5))
 """Gaussians over T alone, and over T × dT/dt, from coarse to fine."""
@@ -37,13 +36,13 @@ class MapBasis:
 
     middle: tuple[float, float]
     half: tuple[float, float]
-    along: Array
+    along: FloatArray
     along_width: float
-    across: Array
+    across: FloatArray
     across_width: tuple[float, float]
-    mix: Array
+    mix: FloatArray
 
-    def raw(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+    def raw(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Constant, linear and Gaussian functions, shape (n, 3 + a + b)."""
         t = (temperature_c - self.middle[0]) / self.half[0]
         r = (slope_c_per_min - self.middle[1]) / self.half[1]
@@ -54,19 +53,19 @@ class MapBasis:
         )
         return np.column_stack([np.ones_like(t), t, r, along, across])
 
-    def proportional(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+    def proportional(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Functions of which dT/dt is a factor at most once, shape (n, 5 + a): no more of the rate than that."""
         t = (temperature_c - self.middle[0]) / self.half[0]
         r = (slope_c_per_min - self.middle[1]) / self.half[1]
         along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
         return np.column_stack([np.ones_like(t), t, r, t * r, t * t * r, along])
 
-    def __call__(self, temperature_c: Array, slope_c_per_min: Array) -> Array:
+    def __call__(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """The basis at rows, shape (n, m)."""
         return np.asarray(self.raw(temperature_c, slope_c_per_min) @ self.mix)
 
 
-def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
+def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
     """Basis of a level and its block means, shape (N, m) with orthonormal columns."""
     n_t, n_a, n_r = LEVELS[level]
     slopes = [centred_slope(run.history) for run in records.runs]
@@ -98,7 +97,7 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, Array]:
     ]
 
 
-def fine_columns(records: Records, spacing_c: float = _FINE_C) -> Array:
+def fine_columns(records: Records, spacing_c: float = _FINE_C) -> FloatArray:
     """Local functions of T over the recorded range, as block means, shape (N, k); none that is zero."""
     low = min(float(r.history.temperature_c.min()) for r in records.runs)
     high = max(float(r.history.temperature_c.max()) for r in records.runs)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .blocks import Records
 from .colours import COLOURS, Colour
 from .joined import Joined
@@ -19,7 +19,6 @@ from .whitener import Whitener
 
 __all__ = ["Question", "View", "possible_effects", "residual_log_likelihood", "view_of", "view_of_bank"]
 
-Array = NDArray[np.float64]
 
 _MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
 _FEW_LEFT = (
@@ -43,8 +42,8 @@ class View:
     """
 
     colour: Colour
-    gram: Array
-    b: Array
+    gram: FloatArray
+    b: FloatArray
     yy: float
     log_det: float
     log_likelihood: float
@@ -65,13 +64,13 @@ class Question:
 
     records: Records
     bank: SignatureBank
-    y: Array
-    sigma: Array | None
+    y: FloatArray
+    sigma: FloatArray | None
     joined: Joined
-    effects: Array
+    effects: FloatArray
 
 
-def possible_effects(bank: SignatureBank, joined: Joined, size: int) -> Array:
+def possible_effects(bank: SignatureBank, joined: Joined, size: int) -> FloatArray:
     """Map, common directions, channels, main directions of other inputs, and what is beside, in joined columns.
 
     In a short recording (`size` blocks), where too little would be left of the data, map and beside alone: the rest
@@ -106,7 +105,7 @@ def view_of(question: Question, colour: Colour) -> View:
     return _view(question, colour, white.T @ white, whiten.log_det)
 
 
-def _view(question: Question, colour: Colour, gram: Array, log_det: float) -> View:
+def _view(question: Question, colour: Colour, gram: FloatArray, log_det: float) -> View:
     """Completes the inner products of the bank with those of the other columns and of the data."""
     whiten = Whitener(colour, question.records.kept, question.records.block_s, question.sigma)
     outside = question.joined.outside
@@ -125,7 +124,7 @@ def _view(question: Question, colour: Colour, gram: Array, log_det: float) -> Vi
 
 
 def _with_likelihood(
-    question: Question, colour: Colour, gram: Array, b: Array, yy: float, log_det: float
+    question: Question, colour: Colour, gram: FloatArray, b: FloatArray, yy: float, log_det: float
 ) -> View:
     """Projects out what may be an effect; what is left tells level and likelihood of the noise."""
     to = question.effects
@@ -141,7 +140,9 @@ def _with_likelihood(
     return View(colour, gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
 
 
-def residual_log_likelihood(rest: Array | float, freedom: int, log_det: Array | float) -> Array:
+def residual_log_likelihood(
+    rest: FloatArray | float, freedom: int, log_det: FloatArray | float
+) -> FloatArray:
     """Residual log-likelihood with the scale profiled, up to a constant that depends on `freedom` alone.
 
     Args:

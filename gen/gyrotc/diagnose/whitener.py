@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
+from ..common.arrays import FloatArray
 from .colours import Colour
 
 __all__ = ["Whitener"]
-
-Array = NDArray[np.float64]
 
 
 class Whitener:
@@ -26,11 +25,15 @@ class Whitener:
     """
 
     def __init__(
-        self, colour: Colour, blocks: Sequence[NDArray[np.int64]], block_s: float, sigma: Array | None = None
+        self,
+        colour: Colour,
+        blocks: Sequence[NDArray[np.int64]],
+        block_s: float,
+        sigma: FloatArray | None = None,
     ) -> None:
         self._sigma = sigma
         self._blocks = blocks
-        factors: dict[bytes, Array] = {}
+        factors: dict[bytes, FloatArray] = {}
         for number in blocks:
             key = (number - number[0]).tobytes() if not colour.walk else number.tobytes()
             if key not in factors:
@@ -40,15 +43,15 @@ class Whitener:
         if sigma is not None:
             self.log_det += 2.0 * float(np.log(sigma).sum())
 
-    def __call__(self, data: Array) -> Array:
+    def __call__(self, data: FloatArray) -> FloatArray:
         """Whitened data L⁻¹ x, shape as given, (N,) or (N, k)."""
         return self._solve(self._scaled(data), 0)
 
-    def back(self, white: Array) -> Array:
+    def back(self, white: FloatArray) -> FloatArray:
         """L⁻ᵀ w: applied to whitened data it gives the data times the inverse covariance."""
         return self._scaled(self._solve(white, 1))
 
-    def colour(self, white: Array) -> Array:
+    def colour(self, white: FloatArray) -> FloatArray:
         """L w: noise with this covariance from white noise, shape (N, k)."""
         out = np.empty_like(white)
         at = 0
@@ -58,12 +61,12 @@ class Whitener:
             at += len(factor)
         return out if self._sigma is None else np.asarray(out * self._sigma[:, None])
 
-    def _scaled(self, data: Array) -> Array:
+    def _scaled(self, data: FloatArray) -> FloatArray:
         if self._sigma is None:
             return data
         return np.asarray(data / (self._sigma if data.ndim == 1 else self._sigma[:, None]))
 
-    def _solve(self, data: Array, transposed: int) -> Array:
+    def _solve(self, data: FloatArray, transposed: int) -> FloatArray:
         out = np.empty_like(data)
         at = 0
         for factor in self._factor:

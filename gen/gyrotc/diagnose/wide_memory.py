@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from ..causes.base import History
+from ..common.arrays import FloatArray
 from ..common.orthonormal import orthonormal
 from ..target.operators import first_order, play
 from .blocks import Record, Records
@@ -33,7 +33,6 @@ from .scores import ratio_of
 
 __all__ = ["WideMemory", "outlasts", "rate_independent"]
 
-Array = NDArray[np.float64]
 
 _STEPS, _SOFT = 7, 0.85
 """Steps of the strength over the envelope, and the width of each in distances: 14 C over an envelope of 100 C. That is
@@ -69,7 +68,7 @@ class WideMemory:
 
     evidence: float
     constant: float
-    columns: Array
+    columns: FloatArray
     finer: float = 0.0
 
     def criterion(self, blocks: int) -> float:
@@ -89,7 +88,7 @@ class WideMemory:
         return "its loops are more than a single play, such as a table has, holds"
 
 
-def rate_independent(gains: Gains, beside: Sequence[Array]) -> WideMemory | None:
+def rate_independent(gains: Gains, beside: Sequence[FloatArray]) -> WideMemory | None:
     """Memory that does not depend on the rate, where the recordings speak for it rather than for one that fades.
 
     Args:
@@ -120,18 +119,18 @@ def outlasts(gains: Gains, behind: float, rival: float) -> bool:
     return clear and found.criterion(gains.size) > rival + EQUIVALENT
 
 
-def _families(gains: Gains, beside: Sequence[Array]) -> tuple[_Family, _Family]:
+def _families(gains: Gains, beside: Sequence[FloatArray]) -> tuple[_Family, _Family]:
     widest = max(reach_of(gains.search.records).most("C"), 2.0 * _NARROWEST_C)
     held = orthonormal(gains.beside, gains.map, *(gains.whiten(b) for b in beside))
     plays = _Family(gains, held, np.geomspace(_NARROWEST_C, widest, _POINTS), _play)
     return plays, _Family(gains, held, np.geomspace(_QUICKEST_S, _SLOWEST_S, _POINTS), _lag)
 
 
-def _play(history: History, size: float) -> Array:
+def _play(history: History, size: float) -> FloatArray:
     return play(size, history.temperature_c)
 
 
-def _lag(history: History, size: float) -> Array:
+def _lag(history: History, size: float) -> FloatArray:
     return first_order(size, history.time_s, history.temperature_c)
 
 
@@ -142,7 +141,9 @@ class _Family:
         held: Whitened orthonormal columns of the model, shape (N, h).
     """
 
-    def __init__(self, gains: Gains, held: Array, sizes: Array, operator: Callable[..., Array]) -> None:
+    def __init__(
+        self, gains: Gains, held: FloatArray, sizes: FloatArray, operator: Callable[..., FloatArray]
+    ) -> None:
         self.gains, self.held = gains, held
         records = gains.search.records
         nodes = _nodes(records)
@@ -175,7 +176,7 @@ class _Family:
         columns = np.column_stack([found.columns, more.columns])
         return replace(found, columns=columns, finer=more.evidence)
 
-    def _weighed(self, held: Array, plain: Array, white: Array) -> WideMemory:
+    def _weighed(self, held: FloatArray, plain: FloatArray, white: FloatArray) -> WideMemory:
         """Columns with one common variance, shape (N, k), beside a model."""
         rest = white - held @ (held.T @ white)
         left, size, right = np.linalg.svd(rest, full_matrices=False)
@@ -186,20 +187,20 @@ class _Family:
         return WideMemory(float(ratio), float(ratio), plain @ (right[asked].T / size[asked]))
 
 
-def _about(parts: Sequence[Array], k: int) -> Array:
+def _about(parts: Sequence[FloatArray], k: int) -> FloatArray:
     """Those about the k-th, side by side, each with its weight."""
     first = k - len(_NEAR) // 2
     return np.column_stack([q * parts[first + j] for j, q in enumerate(_NEAR) if 0 <= first + j < len(parts)])
 
 
-def _nodes(records: Records) -> Array:
+def _nodes(records: Records) -> FloatArray:
     """Temperatures over the envelope, C, at equal distances."""
     ends = [(float(h.min()), float(h.max())) for h in (r.history.temperature_c for r in records.runs)]
     low, high = min(a for a, _ in ends), max(b for _, b in ends)
     return np.linspace(low, high, max(round((high - low) / _NODE_C), _STEPS) + 1)
 
 
-def _steps(count: int) -> Array:
+def _steps(count: int) -> FloatArray:
     """A straight line and soft steps at nodes, each from -1 to 1, shape (count, 1 + steps)."""
     x = np.linspace(-1.0, 1.0, count)
     places = np.linspace(-1.0, 1.0, _STEPS)
@@ -207,7 +208,7 @@ def _steps(count: int) -> Array:
     return np.column_stack([x, 2.0 * ndtr((x[:, None] - places) / soft) - 1.0])
 
 
-def _occupied(records: Records, nodes: Array, state: Callable[[History], Array]) -> Array:
+def _occupied(records: Records, nodes: FloatArray, state: Callable[[History], FloatArray]) -> FloatArray:
     """Shares of every block that a state spends at each node, linear between two, shape (N, nodes).
 
     The block means of any function that is linear between the nodes are this times its values there.

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages, median
 from ..results.fleet import ComparedRun, Facts, LikelyStep, ResidualSeries
 
 __all__ = ["BINS", "BIN_C", "FIRST_C", "NOISY_RUN", "facts_of", "step_in"]
 
-Array = NDArray[np.float64]
 
 FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
 NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at
@@ -77,14 +76,14 @@ def _curve(runs: Sequence[Averages]) -> tuple[float | None, ...]:
     return tuple(float(s / n) if n >= _LEAST_IN_BIN else None for s, n in zip(total, count, strict=True))
 
 
-def _noise(residual: Array) -> float:
+def _noise(residual: FloatArray) -> float:
     """Noise of a mean from successive differences, of their bulk: steps and spikes do not count."""
     if residual.size < 3:
         return 0.0
     return float(MAD_TO_SIGMA * median(np.abs(np.diff(residual))) / np.sqrt(2.0))
 
 
-def step_in(residual: Array) -> tuple[int, float, float]:
+def step_in(residual: FloatArray) -> tuple[int, float, float]:
     """The likeliest step of a residual: index of the first mean after it, size (deg/h), and its score.
 
     The score is the largest difference between the means of what lies before and after, in standard deviations of that

@@ -10,8 +10,8 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
 from .facts import NOISY_RUN
@@ -19,7 +19,6 @@ from .turned import turned
 
 __all__ = ["reasons", "with_reasons"]
 
-Array = NDArray[np.float64]
 
 _LEAST = 8  # gyros of a kind; fewer do not say what is usual
 _FAR = 5.0  # robust standard deviations beyond which one stands apart
@@ -51,7 +50,7 @@ class _Kind:
         self.scatter = _scatter(self.curves, self.median)
         self.shape_scatter = _scatter(self.shapes, self.shape)
 
-    def distance(self, curve: Array) -> float:
+    def distance(self, curve: FloatArray) -> float:
         """How far a curve lies from the usual one, in robust standard deviations: as it is, or about its mean."""
         both = np.isfinite(curve) & self.seen
         if both.sum() < _LEAST_BINS:
@@ -61,7 +60,7 @@ class _Kind:
         shape = (about - self.shape)[both] / self.shape_scatter[both]
         return float(max(np.sqrt(np.mean(level**2)), np.sqrt(np.mean(shape**2))))
 
-    def factors(self) -> Array:
+    def factors(self) -> FloatArray:
         """Least-squares factor of each curve against the usual one; 0 where it cannot be told."""
         both = np.isfinite(self.curves) & self.seen
         usual = np.where(both, self.median, 0.0)
@@ -119,7 +118,7 @@ def _kinds(entries: Sequence[FleetEntry]) -> dict[str | None, _Kind]:
 
 def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
     """Two axes of a unit that show each what the other's kind shows."""
-    units: dict[str, dict[str, tuple[FleetEntry, Array]]] = defaultdict(dict)
+    units: dict[str, dict[str, tuple[FleetEntry, FloatArray]]] = defaultdict(dict)
     for axis, kind in kinds.items():
         for entry, curve in zip(kind.entries, kind.curves, strict=True):
             if axis is not None and entry.dataset is not None:
@@ -228,35 +227,35 @@ def _kin(entry: FleetEntry) -> str:
     return f"the other {entry.axis} axes" if entry.axis else "the others"
 
 
-def _run_figures(facts: Sequence[Facts], figure: Callable[[ComparedRun], float]) -> Array:
+def _run_figures(facts: Sequence[Facts], figure: Callable[[ComparedRun], float]) -> FloatArray:
     """A figure of every run by its place, NaN where a gyro has fewer runs than others."""
     most = max(len(of_one.runs) for of_one in facts)
     rows = [[figure(run) for run in of_one.runs] for of_one in facts]
     return np.array([row + [np.nan] * (max(most, 1) - len(row)) for row in rows], dtype=np.float64)
 
 
-def _usual(values: Array) -> tuple[float, float]:
+def _usual(values: FloatArray) -> tuple[float, float]:
     """Median and robust standard deviation."""
     center = float(np.nanmedian(values))
     return center, MAD_TO_SIGMA * float(np.nanmedian(np.abs(values - center)))
 
 
-def _numbers(values: Sequence[float | None]) -> Array:
+def _numbers(values: Sequence[float | None]) -> FloatArray:
     return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
 
-def _median(rows: Array) -> Array:
+def _median(rows: FloatArray) -> FloatArray:
     """Median of each column, NaN for one without a number."""
     empty = ~np.isfinite(rows).any(axis=0)
     return np.asarray(np.where(empty, np.nan, np.nanmedian(np.where(empty, 0.0, rows), axis=0)))
 
 
-def _row_means(rows: Array) -> Array:
+def _row_means(rows: FloatArray) -> FloatArray:
     count = np.maximum(np.isfinite(rows).sum(axis=1), 1)
     return np.asarray(np.nansum(rows, axis=1) / count)[:, None]
 
 
-def _scatter(rows: Array, center: Array) -> Array:
+def _scatter(rows: FloatArray, center: FloatArray) -> FloatArray:
     """Robust standard deviation of each column; at least a tenth of the largest, for few gyros may agree by chance."""
     found = MAD_TO_SIGMA * _median(np.abs(rows - center))
     largest = float(np.nanmax(found)) if np.isfinite(found).any() else 0.0

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..results.fleet import FleetEntry
 
 __all__ = ["turned"]
 
-Floats = NDArray[np.float64]
 
 _LEAST = 8  # gyros; fewer do not say what is usual
 _LEAST_PLACES = 6  # of a shorter curve a correlation of 0.9 may be chance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -16,6 +16,7 @@ from ..assess.changes import changes_since, load_earlier
 from ..assess.evaluate import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
+from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..model import Model
 from ..pages.report import write_report
@@ -41,7 +42,6 @@ from .recalibration import refuse_together, with_prior
 
 __all__ = ["Built", "build", "build_into"]
 
-Progress = Callable[[str], None]
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 
 

@@ -7,7 +7,7 @@ were left out in turn. Corrections are the maps in float64, with the input in fo
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
@@ -29,7 +30,6 @@ from ..train.spans import training_spans
 
 __all__ = ["CompareOptions", "compare"]
 
-Progress = Callable[[str], None]
 _JudgedOn = Literal["exam", "left_out"]
 
 

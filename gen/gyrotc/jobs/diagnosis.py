@@ -7,10 +7,11 @@ stands in the folder.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.result import Diagnosis, diagnose
 from ..model import Model
@@ -25,7 +26,6 @@ from ..train.fitting import FitOptions
 
 __all__ = ["diagnose_into", "extended_scenario", "save"]
 
-Progress = Callable[[str], None]
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 

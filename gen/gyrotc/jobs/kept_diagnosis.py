@@ -10,13 +10,14 @@ import functools
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from .. import _core
+from ..common.arrays import Progress
 from ..model import Model
 from ..recordings.records import Dataset
 from ..recordings.schema import FILE
@@ -30,7 +31,6 @@ from ..train.fitting import FitOptions
 
 __all__ = ["diagnosed"]
 
-Progress = Callable[[str], None]
 
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "jinja2", "pydantic", "pyarrow")
 _REPORT, _RESULT = "report.html", "diagnose.json"

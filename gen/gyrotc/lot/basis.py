@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..results.lot import LotFunctions
 
 __all__ = ["CONSTANT", "PARAMETERS", "PRIOR_LOG", "LotBasis", "fitted_parameters"]
 
-Floats = NDArray[np.float64]
 
 PARAMETERS = (
     "constant",
@@ -53,7 +53,7 @@ class LotBasis:
     half_range_c_per_min: float
     kept: NDArray[np.int64]
 
-    def values(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+    def values(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """The functions at inputs in C and C/min, shape (points, n)."""
         t = (np.asarray(temperature_c) - self.center_c) / self.half_range_c
         r = np.asarray(slope_c_per_min) / self.half_range_c_per_min
@@ -63,7 +63,7 @@ class LotBasis:
         coupled = (of_t[:, : _COUPLED[0], None] * of_r[:, None, :]).reshape(len(t), -1)
         return np.concatenate([np.ones((len(t), 1)), of_t, coupled], axis=1)[:, self.kept]
 
-    def variance(self, log_parameters: Floats) -> Floats:
+    def variance(self, log_parameters: FloatArray) -> FloatArray:
         """Variance of each coefficient under a smooth process, shape (n,)."""
         return np.asarray(_variance(log_parameters)[self.kept])
 
@@ -96,8 +96,8 @@ class LotBasis:
 
 
 def fitted_parameters(
-    basis: LotBasis, squares: Floats, units: float, start: Floats, *, free: bool = True
-) -> Floats:
+    basis: LotBasis, squares: FloatArray, units: float, start: FloatArray, *, free: bool = True
+) -> FloatArray:
     """Log parameters of the process whose coefficients have given mean squares.
 
     Args:
@@ -110,7 +110,7 @@ def fitted_parameters(
 
     seen = np.maximum(squares, 1e-14)
 
-    def cost(x: Floats) -> float:
+    def cost(x: FloatArray) -> float:
         variance = basis.variance(x)
         fit = 0.5 * units * float(np.sum(np.log(variance) + seen / variance))
         return fit + 0.5 * float(np.sum(((x - PRIOR_LOG) / _PRIOR_SD) ** 2))
@@ -122,20 +122,20 @@ def fitted_parameters(
     return np.asarray(found.x)
 
 
-def _frequencies(n: int) -> Floats:
+def _frequencies(n: int) -> FloatArray:
     return np.asarray(np.pi * (np.arange(n) + 1.0) / (2.0 * _REACH))
 
 
-def _sines(x: Floats, n: int) -> Floats:
+def _sines(x: FloatArray, n: int) -> FloatArray:
     return np.asarray(np.sin(np.outer(x + _REACH, _frequencies(n))) / np.sqrt(_REACH))
 
 
-def _density(size: float, scale: float, w: Floats) -> Floats:
+def _density(size: float, scale: float, w: FloatArray) -> FloatArray:
     """Spectral density of a squared-exponential process."""
     return np.asarray(size**2 * np.sqrt(2.0 * np.pi) * scale * np.exp(-0.5 * (scale * w) ** 2))
 
 
-def _variance(log_parameters: Floats) -> Floats:
+def _variance(log_parameters: FloatArray) -> FloatArray:
     constant, short, short_scale, long, long_scale, size, scale_t, scale_r = np.exp(log_parameters)
     of_t = _frequencies(_OF_T)
     alone = _density(short, short_scale, of_t) + _density(long, long_scale, of_t)

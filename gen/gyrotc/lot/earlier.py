@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.earlier import EarlierUse
 from ..results.lot import KnownMap
@@ -35,7 +35,6 @@ __all__ = [
     "widened",
 ]
 
-Floats = NDArray[np.float64]
 
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
 _SHAPE = (
@@ -93,7 +92,7 @@ class EarlierPrior(MapPrior):
         return Given(found, [], "the earlier model still holds", prior=use, known=known_map(posterior))
 
 
-def stated_sigma_dph(rows: Floats, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
+def stated_sigma_dph(rows: FloatArray, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
     """1 sigma of a map as its table states it, RMS over the means of its calibration, deg/h.
 
     Args:

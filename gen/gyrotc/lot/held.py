@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfc, ndtri
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.earlier import CheckedCell, MapChange
 from ..train.means import UnitMeans
@@ -24,7 +25,6 @@ from .surprise import FALSE_ALARM
 
 __all__ = ["Held", "held"]
 
-Floats = NDArray[np.float64]
 Span = tuple[float, float]
 
 _CENTERS = 17  # of regions over the run's temperatures: half of the narrowest one's width apart
@@ -60,7 +60,7 @@ class _Shape:
     kind: str
     temperature_c: Span
     slope_c_per_min: Span
-    values: Floats
+    values: FloatArray
 
 
 def held(expected: MapPosterior, run: UnitMeans) -> Held:
@@ -128,17 +128,17 @@ def _branches(run: UnitMeans) -> Iterator[NDArray[np.bool_]]:
             yield part
 
 
-def _range(x: Floats) -> Span:
+def _range(x: FloatArray) -> Span:
     return float(x.min()), float(x.max())
 
 
-def _prices(shapes: list[_Shape]) -> Floats:
+def _prices(shapes: list[_Shape]) -> FloatArray:
     """What a region has to explain more than a simple shape: there are many to choose from."""
     regions = sum(s.kind == "local" for s in shapes)
     return np.array([2.0 * np.log(max(regions, 1)) if s.kind == "local" else 0.0 for s in shapes])
 
 
-def _p_value(statistic: float, columns: Floats, price: Floats) -> float:
+def _p_value(statistic: float, columns: FloatArray, price: FloatArray) -> float:
     """Share of unchanged units whose largest size, its price paid, is as large."""
     values, vectors = np.linalg.eigh(columns.T @ columns)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -151,7 +151,7 @@ def _p_value(statistic: float, columns: Floats, price: Floats) -> float:
     return min(bound, 1.0 / _DRAWS)
 
 
-def _cells(run: UnitMeans, left: Floats, covariance: Floats) -> Iterator[CheckedCell]:
+def _cells(run: UnitMeans, left: FloatArray, covariance: FloatArray) -> Iterator[CheckedCell]:
     t, r = run.temperature_c, run.slope_c_per_min
     low, high = float(t.min()), float(t.max())
     edges = np.linspace(low, high, _CELLS + 1)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..results.base import read_result
@@ -26,8 +26,6 @@ from .use import prior_of
 
 __all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
 
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
 
 _CELLS = (
     33,
@@ -208,7 +206,7 @@ def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, .
     )
 
 
-def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> Floats:
+def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> FloatArray:
     """Share of time in cells of the envelope; every unit counts the same."""
     edges = [
         np.linspace(low, max(high, low + 1e-9), n + 1)

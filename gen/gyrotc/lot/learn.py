@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray, Progress
 from ..train.means import UnitMeans
 from .basis import LotBasis
 from .model import LotState, UnitSums, evidence, fitted, predictive
@@ -15,8 +16,6 @@ from .surprise import FALSE_ALARM, inflation, p_value, scores
 
 __all__ = ["LEAST_UNITS", "Envelope", "Learned", "folds_of", "learn", "sums_of", "that_count"]
 
-Floats = NDArray[np.float64]
-Progress = Callable[[str], None]
 Envelope = tuple[tuple[float, float], tuple[float, float]]
 
 LEAST_UNITS = 3  # with two there is no telling what is shared
@@ -54,7 +53,7 @@ class Learned:
     unit_dph: float
     scale: float
     inside: NDArray[np.bool_]
-    p_values: Floats
+    p_values: FloatArray
     left_out_dph: tuple[float, float]
 
 
@@ -102,7 +101,7 @@ def sums_of(units: Sequence[UnitMeans], basis: LotBasis, center: float, unit: fl
     return UnitSums(np.array(precision), np.array(moment))
 
 
-def that_count(sums: UnitSums, variance: Floats) -> NDArray[np.bool_]:
+def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:
     """Which functions of a process with these variances recordings say anything of."""
     most = np.diagonal(sums.precision, axis1=1, axis2=2).max(axis=0)
     used = variance * most > _COUNTS
@@ -210,11 +209,11 @@ def _told(cluster: NDArray[np.int64]) -> float:
     return -float(np.sum(np.log(share[cluster])))
 
 
-def _left_out(sums: UnitSums, state: LotState) -> tuple[Floats, float, NDArray[np.bool_]]:
+def _left_out(sums: UnitSums, state: LotState) -> tuple[FloatArray, float, NDArray[np.bool_]]:
     """p-value of each unit under the lot without its fold, the inflation that they ask for, and who stands apart."""
     n = len(sums)
     folds = np.arange(n) % folds_of(n)
-    found: list[tuple[Floats, Floats]] = [(np.zeros(0), np.zeros(0))] * n
+    found: list[tuple[FloatArray, FloatArray]] = [(np.zeros(0), np.zeros(0))] * n
     for fold in range(int(folds.max()) + 1):
         rest = folds != fold
         _, cluster = np.unique(state.cluster[rest], return_inverse=True)

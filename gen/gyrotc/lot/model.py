@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .surprise import freedom_of
 
 __all__ = ["LotState", "UnitSums", "evidence", "fitted", "predictive"]
 
-Floats = NDArray[np.float64]
 
 _EVERY = 4  # rounds between two fits of the processes' parameters: each is a search
 
@@ -34,8 +34,8 @@ class UnitSums:
         moment: b, shape (units, n).
     """
 
-    precision: Floats
-    moment: Floats
+    precision: FloatArray
+    moment: FloatArray
 
     def __len__(self) -> int:
         return len(self.moment)
@@ -63,12 +63,12 @@ class LotState:
     """
 
     basis: LotBasis
-    directions: Floats
-    rest: Floats
-    of_mean: Floats
+    directions: FloatArray
+    rest: FloatArray
+    of_mean: FloatArray
     cluster: NDArray[np.int64]
-    means: Floats
-    covariances: Floats
+    means: FloatArray
+    covariances: FloatArray
     evidence: float
 
     @property
@@ -80,7 +80,7 @@ class LotState:
         """Degrees of freedom of the spread."""
         return freedom_of(len(self.cluster), len(self.means), self.rank)
 
-    def spread(self) -> Floats:
+    def spread(self) -> FloatArray:
         """Covariance of units about the mean of their cluster, shape (n, n)."""
         return np.asarray(np.diag(self.basis.variance(self.rest)) + self.directions @ self.directions.T)
 
@@ -132,7 +132,7 @@ def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotStat
     return replace(state, directions=directions, rest=rest, of_mean=of_mean)
 
 
-def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, Floats, Floats]:
+def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, FloatArray, FloatArray]:
     """The clusters' means, and of each unit the covariance of its coefficients and their deviation from the mean.
 
     With S the spread, G the precision of a unit and P = (S⁻¹ + G)⁻¹ its posterior covariance, what a unit says of its
@@ -142,7 +142,7 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, Floats, Fl
     spread = state.spread()
     inverse = np.linalg.inv(spread)
     told = inverse + units.precision
-    posterior: Floats = np.asarray(np.linalg.inv(told), dtype=np.float64)
+    posterior: FloatArray = np.asarray(np.linalg.inv(told), dtype=np.float64)
     alone = _times(posterior, units.moment)
     known = state.basis.variance(state.of_mean)
     groups = [state.cluster == c for c in range(int(state.cluster.max()) + 1)]
@@ -154,7 +154,7 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, Floats, Fl
     return replace(state, means=means, covariances=covariances), posterior, np.asarray(moved)
 
 
-def _weighed(units: UnitSums, state: LotState, posterior: Floats) -> LotState:
+def _weighed(units: UnitSums, state: LotState, posterior: FloatArray) -> LotState:
     """The state with its log evidence, which no round of a fit asks for: a determinant for each unit."""
     spread, known = state.spread(), state.basis.variance(state.of_mean)
     totals = np.linalg.solve(state.covariances, state.means[..., None])[..., 0]
@@ -167,18 +167,18 @@ def _weighed(units: UnitSums, state: LotState, posterior: Floats) -> LotState:
     return replace(state, evidence=value)
 
 
-def _times(matrices: Floats, vectors: Floats) -> Floats:
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     """A matrix of each unit times its vector, shape (units, n)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
-def predictive(state: LotState, scale: float = 1.0) -> list[tuple[Floats, Floats]]:
+def predictive(state: LotState, scale: float = 1.0) -> list[tuple[FloatArray, FloatArray]]:
     """Mean and covariance of the coefficients of a unit that was not seen, one for each cluster."""
     spread = scale * state.spread()
     return [(m, spread + scale * c) for m, c in zip(state.means, state.covariances, strict=True)]
 
 
-def evidence(units: UnitSums, mean: Floats, covariance: Floats) -> Floats:
+def evidence(units: UnitSums, mean: FloatArray, covariance: FloatArray) -> FloatArray:
     """Log evidence of each unit's recordings where w ~ N(mean, covariance), up to the constant of the recordings."""
     precision = np.linalg.inv(covariance) + units.precision
     moment = units.moment - units.precision @ mean

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.lot import LotProcess
 from ..train.evidence import Asked
@@ -26,7 +26,6 @@ __all__ = [
     "triangle",
 ]
 
-Floats = NDArray[np.float64]
 
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
@@ -51,10 +50,10 @@ class MapPrior:
     unit_dph: float
     temperature_c: tuple[float, float]
     slope_c_per_min: tuple[float, float]
-    means: Floats
-    covariances: Floats
-    share: Floats
-    rest: Floats
+    means: FloatArray
+    covariances: FloatArray
+    share: FloatArray
+    rest: FloatArray
     asked: Asked
     freedom: float
 
@@ -92,17 +91,17 @@ class MapPosterior:
     """
 
     prior: MapPrior
-    mean: Floats
-    covariance: Floats
+    mean: FloatArray
+    covariance: FloatArray
     cluster: int
     p_value: float
 
-    def mean_dph(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+    def mean_dph(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Mean map, deg/h."""
         values = self.prior.basis.values(temperature_c, slope_c_per_min)
         return np.asarray(self.prior.center_dph + self.prior.unit_dph * (values @ self.mean))
 
-    def variance_dph2(self, temperature_c: Floats, slope_c_per_min: Floats) -> Floats:
+    def variance_dph2(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Its variance, (deg/h)²."""
         values = self.prior.basis.values(temperature_c, slope_c_per_min)
         return np.asarray(self.prior.unit_dph**2 * np.sum((values @ self.covariance) * values, axis=1))
@@ -114,29 +113,29 @@ class MapPosterior:
         return float(np.sqrt(np.average(variance, weights=asked.share)))
 
 
-def _mixed(found: list[tuple[Floats, Floats]], weight: Floats) -> tuple[Floats, Floats]:
+def _mixed(found: list[tuple[FloatArray, FloatArray]], weight: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean and covariance of a mixture."""
     mean = np.einsum("c,ci->i", weight, np.array([m for m, _ in found]))
     spread = [w * (v + np.outer(m - mean, m - mean)) for w, (m, v) in zip(weight, found, strict=True)]
     return np.asarray(mean), np.asarray(np.sum(spread, axis=0))
 
 
-def processed(process: LotProcess) -> Floats:
+def processed(process: LotProcess) -> FloatArray:
     """Log parameters of a process as a file holds it."""
     return np.asarray(np.log([getattr(process, name) for name in PARAMETERS]))
 
 
-def process_told(log_parameters: Floats) -> LotProcess:
+def process_told(log_parameters: FloatArray) -> LotProcess:
     """The same the other way round."""
     return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
 
 
-def rounded(values: Floats) -> tuple[float, ...]:
+def rounded(values: FloatArray) -> tuple[float, ...]:
     """Numbers as a file tells them."""
     return tuple(float(f"{v:.{_DIGITS}g}") for v in values)
 
 
-def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:
+def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> FloatArray:
     """The lower triangle that a file holds row by row, shape (n, n).
 
     Raises:
@@ -150,7 +149,7 @@ def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> Floats:
     return lower
 
 
-def check_positive(covariance: Floats, where: str) -> None:
+def check_positive(covariance: FloatArray, where: str) -> None:
     """Refuses what is no covariance.
 
     Raises:

@@ -8,12 +8,12 @@ by what runs can tell of each; the sum is, for a unit of the lot, a sum of weigh
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
+
+from ..common.arrays import FloatArray
 
 __all__ = ["FALSE_ALARM", "freedom_of", "inflation", "of_few", "p_value", "scores"]
 
-Floats = NDArray[np.float64]
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
 _STRANGE = (
@@ -33,7 +33,9 @@ def of_few(freedom: float) -> float:
     return freedom / (freedom - 2.0) if np.isfinite(freedom) else 1.0
 
 
-def scores(precision: Floats, moment: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+def scores(
+    precision: FloatArray, moment: FloatArray, mean: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Signal-to-noise ratios of the independent directions, and the squared scores in them: 1 on average.
 
     Args:
@@ -48,7 +50,7 @@ def scores(precision: Floats, moment: Floats, mean: Floats, covariance: Floats) 
     return ratio, np.asarray(moved**2 / (ratio * (1.0 + ratio)))
 
 
-def p_value(ratio: Floats, squares: Floats, freedom: float = np.inf) -> float:
+def p_value(ratio: FloatArray, squares: FloatArray, freedom: float = np.inf) -> float:
     """Probability that a unit of the lot lies as far from it (moments of the sum matched by a gamma distribution).
 
     Args:
@@ -64,7 +66,7 @@ def p_value(ratio: Floats, squares: Floats, freedom: float = np.inf) -> float:
     return float(gammaincc(mean**2 / variance, statistic * mean / variance))
 
 
-def inflation(found: list[tuple[Floats, Floats]]) -> float:
+def inflation(found: list[tuple[FloatArray, FloatArray]]) -> float:
     """By what the covariance of a lot is to be multiplied, from units that it was not made of; 1 at least."""
     ratio = np.concatenate([r[r > _TELLING] for r, _ in found]) if found else np.zeros(0)
     squares = np.concatenate([s[r > _TELLING] for r, s in found]) if found else np.zeros(0)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.lot import KnownMap, Lot, LotUse, UnitCurve
 from ..train.data import Bins, Scaling, TrainingData, average
@@ -27,7 +27,6 @@ from .surprise import FALSE_ALARM, freedom_of, of_few
 
 __all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
 
-Floats = NDArray[np.float64]
 _CURVE = 41  # points of the picture
 _KEPT_DIGITS = 6  # of its numbers
 
@@ -46,7 +45,7 @@ class _PosteriorMap:
     evaluations: int = 0
 
     @property
-    def log_parameters(self) -> Floats:
+    def log_parameters(self) -> FloatArray:
         """As of the evidence model: what a unit differs by has the scales of the lot's rest."""
         _, short, short_scale, long, long_scale, coupled, scale_t, scale_r = np.exp(self.posterior.prior.rest)
         basis = self.posterior.prior.basis
@@ -55,13 +54,13 @@ class _PosteriorMap:
         of_both = coupled, scale_t * of_t, scale_r * of_r
         return np.log([short, short_scale * of_t, long, long_scale * of_t, *of_both, self.sigma])
 
-    def mean(self, t: Floats, r: Floats) -> Floats:
+    def mean(self, t: FloatArray, r: FloatArray) -> FloatArray:
         return (self.posterior.mean_dph(*self._physical(t, r)) - self.center) / self.spread
 
-    def variance(self, t: Floats, r: Floats) -> Floats:
+    def variance(self, t: FloatArray, r: FloatArray) -> FloatArray:
         return self.posterior.variance_dph2(*self._physical(t, r)) / self.spread**2
 
-    def _physical(self, t: Floats, r: Floats) -> tuple[Floats, Floats]:
+    def _physical(self, t: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         s = self.scaling
         return s.center_c + s.half_range_c * np.asarray(t), s.half_range_c_per_min * np.asarray(r)
 
@@ -151,7 +150,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     )
 
 
-def _of_clusters(lot: Lot, scale: float, rest: Floats, where: str) -> tuple[Floats, Floats]:
+def _of_clusters(lot: Lot, scale: float, rest: FloatArray, where: str) -> tuple[FloatArray, FloatArray]:
     """Means and covariances of a new unit's coefficients, one for each cluster."""
     n = len(lot.functions.kept)
     means, covariances = [], []
@@ -179,7 +178,7 @@ def _asked(lot: Lot, where: str) -> Asked:
     return Asked(t[there], r[there], shares[there] / shares.sum(), lot.between_dph)
 
 
-def _centers(span: tuple[float, float], n: int) -> Floats:
+def _centers(span: tuple[float, float], n: int) -> FloatArray:
     return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
 
 
@@ -308,7 +307,7 @@ def curve_of(alone: MapPosterior, posterior: MapPosterior, scaling: Scaling) -> 
     t = np.linspace(*scaling.temperature_c, _CURVE)
     still = np.zeros(_CURVE)
 
-    def rounded(values: Floats) -> tuple[float, ...]:
+    def rounded(values: FloatArray) -> tuple[float, ...]:
         return tuple(float(f"{v:.{_KEPT_DIGITS}g}") for v in values)
 
     return UnitCurve(

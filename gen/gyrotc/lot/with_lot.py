@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.lot import Lot
 from ..results.lot_plan import ChamberStep, LotPlan, LotProgramme
@@ -30,7 +30,6 @@ __all__ = [
     "programme_csv", "programme_text",
 ]  # fmt: skip
 
-Floats = NDArray[np.float64]
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end
@@ -45,14 +44,14 @@ class MapQuestion:
     """What a programme is judged by: covariance before it, functions, noise of a mean, and where corrections count."""
 
     basis: LotBasis
-    covariance: Floats
+    covariance: FloatArray
     sigma: float
     mean_s: float
-    asked: Floats
-    share: Floats
+    asked: FloatArray
+    share: FloatArray
     unit_dph: float
 
-    def sigma_dph(self, temperature_c: Floats, slope_c_per_min: Floats) -> float:
+    def sigma_dph(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> float:
         """1 sigma of the map after these temperatures, RMS over where units are, deg/h."""
         values = self.basis.values(temperature_c, slope_c_per_min)
         precision = values.T @ values / self.sigma**2
@@ -172,7 +171,7 @@ def _corners(start_c: float, steps: Sequence[ChamberStep]) -> tuple[list[float],
 
 def inputs_of(
     plan: Scenario, start_c: float, steps: Sequence[ChamberStep], mean_s: float
-) -> tuple[Floats, Floats]:
+) -> tuple[FloatArray, FloatArray]:
     """What the sensor will show in means: T in C and dT/dt in C/min."""
     corner_min, corner_c = _corners(start_c, steps)
     time_s = np.arange(0.0, 60.0 * corner_min[-1], _GRID_S)

@@ -12,10 +12,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from ..causes import CATALOGUE
+from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from ..common.texts import picture_text
 from ..diagnose.attribution import Attribution
@@ -31,7 +31,6 @@ from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 
 __all__ = ["draw"]
 
-Array = NDArray[np.float64]
 
 _SMOOTH_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
 _LEVEL = 0.01  # familywise level of the search (docs/diagnosis.md)
@@ -88,7 +87,7 @@ def _events(records: Records, events: Sequence[FoundEvent]) -> str | None:
         return svg(figure)
 
 
-def _residual_over_time(records: Records, ensemble: Ensemble, term: Array | None) -> str:
+def _residual_over_time(records: Records, ensemble: Ensemble, term: FloatArray | None) -> str:
     """Half-hour means of every run's residual over the band of the simulated ones, and the fitted causes."""
     width = max(round(_SMOOTH_S / records.block_s), 1)
     with mpl.rc_context(STYLE):
@@ -135,7 +134,7 @@ def _cycle_over_time(records: Records, cycle: Cycle) -> str:
         return svg(figure)
 
 
-def _beyond_the_map(static: Array, causes: Sequence[Refined]) -> Array:
+def _beyond_the_map(static: FloatArray, causes: Sequence[Refined]) -> FloatArray:
     """What the causes add that no map holds: what a residual of the map shows of them, deg/h, shape (N,)."""
     total = np.sum([c.contribution for c in causes], axis=0)
     return np.asarray(total - static @ (static.T @ total))
@@ -151,7 +150,7 @@ def _grid(count: int) -> tuple[Figure, list[Axes]]:
     return figure, list(axes.flat[:count])
 
 
-def _smooth(values: Array, width: int) -> Array:
+def _smooth(values: FloatArray, width: int) -> FloatArray:
     """Running mean over `width` blocks, shorter at the ends."""
     total = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
     n = len(values)
@@ -194,7 +193,7 @@ def _signed_root(x: float) -> float:
     return float(np.sign(x) * min(abs(x), np.sqrt(abs(x))))
 
 
-def _over_inputs(records: Records, ensemble: Ensemble, term: Array | None) -> str:
+def _over_inputs(records: Records, ensemble: Ensemble, term: FloatArray | None) -> str:
     """Residual over T (heating, cooling), dT/dt, time since power-on and date; the causes as lines."""
     residual = ensemble.residual
     line = np.zeros(records.size) if term is None else term
@@ -220,7 +219,7 @@ def _over_inputs(records: Records, ensemble: Ensemble, term: Array | None) -> st
         return svg(figure)
 
 
-def _binned(ax: Axes, x: Array, y: Array, term: Array, colour: str, label: str) -> None:
+def _binned(ax: Axes, x: FloatArray, y: FloatArray, term: FloatArray, colour: str, label: str) -> None:
     """Means of y in 24 cells with their standard errors, and of the fitted causes as a line."""
     edges = np.linspace(x.min(), x.max() + 1e-9, 25)
     cell = np.digitize(x, edges) - 1
@@ -236,7 +235,7 @@ def _binned(ax: Axes, x: Array, y: Array, term: Array, colour: str, label: str) 
         ax.plot(place, line, color=colour, linewidth=1.3)
 
 
-def _over_power_on(ax: Axes, records: Records, residual: Array) -> None:
+def _over_power_on(ax: Axes, records: Records, residual: FloatArray) -> None:
     """Half-hour means of every run, and their mean at equal time since power-on."""
     ax.set_xlabel("h since power-on")
     width = max(round(_SMOOTH_S / records.block_s), 1)
@@ -254,7 +253,7 @@ def _over_power_on(ax: Axes, records: Records, residual: Array) -> None:
     _binned(ax, at, value, np.zeros_like(at), BEFORE, "")
 
 
-def _over_date(ax: Axes, records: Records, residual: Array) -> None:
+def _over_date(ax: Axes, records: Records, residual: FloatArray) -> None:
     dated = all(run.history.day is not None for run in records.runs)
     ax.set_xlabel("day" if dated else "number of the run (not all are dated)")
     for number, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import average, statistics
 from ..pages.published import ENVIRONMENTS, NEURONS
 from ..recordings.load import load
@@ -34,7 +34,6 @@ __all__ = [
     "groups_of",
 ]
 
-Array = NDArray[np.float64]
 
 AVERAGE_S = 100.0  # the paper's means
 LITERAL_RHO = 3.0e-4  # the paper's "sum of errors", taken as 1 - sum of the error reductions: eq. (16)
@@ -74,13 +73,13 @@ class Cell:
         moved: `after` with the temperature of set 2 moved onto that of set 1, by the difference of their medians.
     """
 
-    before: Array
-    after: Array
+    before: FloatArray
+    after: FloatArray
     centers: int
-    moved: Array
+    moved: FloatArray
 
     @property
-    def predicted(self) -> Array:
+    def predicted(self) -> FloatArray:
         """The model's bias, deg/h."""
         return self.before - self.after
 
@@ -109,7 +108,7 @@ class Experiment:
         return {"floor_dph": self.floor_dph, "before": before, "after": after}
 
 
-def _figures(values: Array) -> dict[str, Any]:
+def _figures(values: FloatArray) -> dict[str, Any]:
     found = statistics(values)
     return {name: found[name] for name in ("mean_dph", "std_dph", "rms_dph")}
 
@@ -172,7 +171,7 @@ def _cell(group: PaperGroup, fitted: Fit) -> Cell:
     return Cell(before, after, fitted.n_centers, moved)
 
 
-def _means(group: PaperGroup, predicted: Array) -> tuple[Array, Array]:
+def _means(group: PaperGroup, predicted: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measured and compensated bias of set 2 as means over 100 s."""
     exam = group.exam
     means = average(

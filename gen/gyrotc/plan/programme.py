@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes.base import History
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..diagnose.blocks import Record, Records
 from ..diagnose.colours import Declared
@@ -20,7 +20,6 @@ from ..simulate.signals import Thermometer
 
 __all__ = ["NodeTemperatures", "Programme", "library", "node_temperatures", "programme_of"]
 
-Array = NDArray[np.float64]
 
 _BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
 """What of a scenario is left out where the map alone is asked about."""
@@ -92,7 +91,7 @@ class NodeTemperatures:
         there: Nodes that have a further thermometer.
     """
 
-    runs: tuple[dict[str, Array], ...]
+    runs: tuple[dict[str, FloatArray], ...]
     sensor: str
     there: frozenset[str]
 
@@ -150,5 +149,5 @@ def _records(plan: Scenario, seed: int) -> Iterator[Record]:
         yield Record(name, history, _rows(made.bias_dph[:n]), np.ones(time_s.size, dtype=bool), name)
 
 
-def _rows(values: Array) -> Array:
+def _rows(values: FloatArray) -> FloatArray:
     return np.asarray(values.reshape(-1, _ROW_CELLS).mean(axis=1))

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..diagnose.cache import bank_of
 from ..diagnose.candidates import Candidate, planned
 from ..diagnose.colours import COLOURS, Colour
@@ -23,7 +23,6 @@ from .programme import Programme
 
 __all__ = ["Sensitivity"]
 
-Array = NDArray[np.float64]
 
 _RIDGE = 1e-9  # of the strongest map function: what a choice of runs does not visit stays undetermined
 
@@ -60,7 +59,7 @@ class Sensitivity:
             points.setdefault(candidate.id, []).append((candidate, max(amount, 0.0)))
         return {id: limit_of(id, p) for id, p in points.items()}
 
-    def _energies(self, runs: Sequence[int]) -> Array:
+    def _energies(self, runs: Sequence[int]) -> FloatArray:
         """d² of every column at unit amplitude after the map is taken out, shape (K,)."""
         gram = self._gram(runs)
         m = self.bank.map.shape[1]
@@ -68,7 +67,7 @@ class Sensitivity:
         held = np.linalg.solve(inner + _RIDGE * np.diag(inner).max() * np.eye(m), cross)
         return np.asarray(np.diag(gram)[m:] - (cross * held).sum(axis=0))
 
-    def _gram(self, runs: Sequence[int]) -> Array:
+    def _gram(self, runs: Sequence[int]) -> FloatArray:
         return np.asarray(self.grams[list(runs)].sum(axis=0))
 
     def map_error(self, runs: Sequence[int]) -> float:
@@ -93,7 +92,7 @@ def _scaled(colour: Colour, factor: float) -> Colour:
     )
 
 
-def _columns(search: Search) -> tuple[list[Candidate], Array, list[slice]]:
+def _columns(search: Search) -> tuple[list[Candidate], FloatArray, list[slice]]:
     """Signatures at unit amplitude (for changed inputs: the change of the map), and where each candidate's lie."""
     bank = search.bank
     raw = bank.signatures * bank.scale + bank.map @ (bank.on_map * bank.scale)

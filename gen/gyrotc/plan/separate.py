@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.orthonormal import orthonormal
 from ..diagnose.blocks import singled_out
@@ -25,7 +25,6 @@ from .sensitivity import Sensitivity
 
 __all__ = ["Row", "additions", "separability"]
 
-Array = NDArray[np.float64]
 
 _D_LIMIT = 6.0  # about where most causes are found (`terms.search.SearchRule.needed_d`)
 _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
@@ -84,7 +83,7 @@ def _shown(sensitivity: Sensitivity) -> Iterator[Candidate]:
             yield min(same, key=lambda c: abs(c.values[parameter.name] - value))
 
 
-def _fitted(sensitivity: Sensitivity, candidate: Candidate, gains: Gains) -> Array:
+def _fitted(sensitivity: Sensitivity, candidate: Candidate, gains: Gains) -> FloatArray:
     """Map of the simulated gyro with the cause at d = 6, shape (N,); a changed input as it is."""
     search = sensitivity.search
     if candidate.role == "input":
@@ -97,20 +96,20 @@ def _fitted(sensitivity: Sensitivity, candidate: Candidate, gains: Gains) -> Arr
     return np.asarray(_static(sensitivity) + signature * (_D_LIMIT * gains.scale / np.linalg.norm(own)))
 
 
-def _static(sensitivity: Sensitivity) -> Array:
+def _static(sensitivity: Sensitivity) -> FloatArray:
     """The simulated gyro's map as the search's own map holds it, shape (N,)."""
     search = sensitivity.search
     return np.asarray(search.bank.map @ search.map_weights())
 
 
-def _by_columns(gains: Gains, own: Array, energy: Array) -> Iterator[tuple[str, Array]]:
+def _by_columns(gains: Gains, own: FloatArray, energy: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Share of each signature that every candidate with columns of its own holds."""
     for candidate, at in (*gains.plain, *gains.random):
         q = orthonormal(gains.plain_columns(at))
         yield candidate.id, ((q.T @ own) ** 2).sum(axis=0) / energy
 
 
-def _by_inputs(gains: Gains, total: Array, energy: Array) -> Iterator[tuple[str, Array]]:
+def _by_inputs(gains: Gains, total: FloatArray, energy: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """The same for the map of other inputs."""
     bank = gains.search.bank
     seen: Counter[str] = Counter()

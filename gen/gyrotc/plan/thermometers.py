@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common.errors import InputError
 from ..common.orthonormal import orthonormal
@@ -21,7 +20,6 @@ from .sensitivity import Sensitivity
 
 __all__ = ["Place", "places"]
 
-Array = NDArray[np.float64]
 
 _D_FOUND = 6.0  # about where most causes are found, as in `separate`
 _LEAST_C = 1e-4  # no thermometer tells less than this

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..common.arrays import FloatArray
 from ..common.cells import cell_means, noise_of
 from ..common.quantiles import CHI2_95_ONE, NORMAL_95
 
 __all__ = ["Drift", "drifts_of"]
 
-Floats = NDArray[np.float64]
 
 FALSE_ALARMS = 0.005  # records of which one has a drift by chance: half of what steps are given
 _HALVES_S = (1200.0, 3600.0)  # half windows: a drift is slow, and shorter than a hold
@@ -51,7 +50,7 @@ class Drift:
     sigmas: float
 
 
-def drifts_of(runs: Sequence[tuple[Floats, Floats, Floats]]) -> list[Drift]:
+def drifts_of(runs: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> list[Drift]:
     """Drifts of all runs, by run in order of time.
 
     Args:
@@ -98,16 +97,18 @@ class _Kinks:
 
     run: int
     half_s: float
-    t: Floats
-    y: Floats
-    before: Floats
-    after: Floats
-    z: Floats
+    t: FloatArray
+    y: FloatArray
+    before: FloatArray
+    after: FloatArray
+    z: FloatArray
     spread: float
     places: float
 
     @staticmethod
-    def of(run: int, time: Floats, temperature: Floats, rate: Floats, half_s: float) -> _Kinks | None:
+    def of(
+        run: int, time: FloatArray, temperature: FloatArray, rate: FloatArray, half_s: float
+    ) -> _Kinks | None:
         """None where the run has no window in which the temperature stands still."""
         if len(time) < 4 or time[-1] - time[0] < 2.0 * half_s:
             return None
@@ -143,13 +144,13 @@ class _Kinks:
             far[np.abs(middle - middle[k]) <= 2.0 * self.half_s] = 0.0
 
 
-def _sides(width: int) -> Floats:
+def _sides(width: int) -> FloatArray:
     """Columns level, slope before, slope behind the middle of a window, for each cell, shape (2 width, 3)."""
     u = np.arange(2 * width) - (width - 0.5)
     return np.column_stack([np.ones(2 * width), np.minimum(u, 0.0), np.maximum(u, 0.0)])
 
 
-def _begins(t: Floats, y: Floats) -> tuple[float, float, float]:
+def _begins(t: FloatArray, y: FloatArray) -> tuple[float, float, float]:
     """Where two straight lines that meet leave least of a window, and the times between which that lies."""
     u = (t - t[0]) / (t[-1] - t[0])
     inside = np.arange(3, len(u) - 3)

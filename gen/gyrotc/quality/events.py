@@ -22,7 +22,6 @@ from .screen import departing_rows
 
 __all__ = ["Event", "accepted", "events_of"]
 
-Floats = NDArray[np.float64]
 Limits = tuple[float, float, float]
 
 _BURST_ROWS = 10  # fewer are outliers

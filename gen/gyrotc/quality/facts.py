@@ -9,8 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
-from ..recordings.records import EarthRate, Floats, Rows, Run
+from ..recordings.records import EarthRate, Rows, Run
 
 __all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
 
@@ -29,8 +30,6 @@ _OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
 # Widths of counters in the processors and FPGAs that read gyros out
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _PART = 2**16  # rows that are looked at together
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +101,9 @@ class RunFacts:
     temperature_c: tuple[float, float]
     temperature_step_c: float
     jumps: tuple[Jump, ...]
-    slopes_c_per_min: Floats
-    temperatures_c: Floats
-    rates_dph: Floats
+    slopes_c_per_min: FloatArray
+    temperatures_c: FloatArray
+    rates_dph: FloatArray
     hold_share: float
     mean_dph: float
     largest_dph: float
@@ -165,17 +164,17 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:  # long: one line for each fact
     )
 
 
-def _those(values: Floats, chosen: Mask) -> Floats:
+def _those(values: FloatArray, chosen: BoolArray) -> FloatArray:
     """The chosen values; the same array where that is all of them."""
     return values if chosen.all() else values[chosen]
 
 
-def _changes(values: Floats) -> NDArray[np.int64]:
+def _changes(values: FloatArray) -> NDArray[np.int64]:
     """Rows that differ from the one before, and the first row."""
     return np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
 
 
-def _robust_sigma(values: Floats) -> float:
+def _robust_sigma(values: FloatArray) -> float:
     """Standard deviation about 0 from the median magnitude, or the RMS where more than half are 0.
 
     `values` are lost: they make room for the magnitudes.
@@ -186,7 +185,9 @@ def _robust_sigma(values: Floats) -> float:
     return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
 
 
-def _cells(time: Floats, temperature: Floats, rate: Floats, period_s: float) -> tuple[Floats, Floats, Floats]:
+def _cells(
+    time: FloatArray, temperature: FloatArray, rate: FloatArray, period_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean temperature of cells, its rate (C/min) by central differences, mean rate; empty for fewer than three."""
     length = max(_CELL_S, _CELL_ROWS * period_s)
     number = (time - time[0]) / length
@@ -201,7 +202,7 @@ def _cells(time: Floats, temperature: Floats, rate: Floats, period_s: float) -> 
     return mean_t, np.gradient(mean_t, mean_s) * 60.0, mean_rate
 
 
-def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, ...]:
+def _jumps(time: FloatArray, temperature: FloatArray, resolution: float) -> tuple[Jump, ...]:
     """Steps that stand out from the steps around them, by noise, by resolution and by rate.
 
     A thermometer that is slower than the rows holds its value; its step has had that time to grow.
@@ -222,7 +223,7 @@ def _jumps(time: Floats, temperature: Floats, resolution: float) -> tuple[Jump, 
     )
 
 
-def _departures(step: Floats) -> Floats:
+def _departures(step: FloatArray) -> FloatArray:
     """Magnitudes of the differences from the median of the two before, the value itself, and the two after."""
     padded = np.pad(step, 2, mode="reflect")
     result = np.empty_like(step)
@@ -233,7 +234,7 @@ def _departures(step: Floats) -> Floats:
     return result
 
 
-def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
+def _outliers(time: FloatArray, rate: FloatArray) -> tuple[int, Outlier | None]:
     """Rows between two steps of opposite sign, each beyond 8 times the noise, and the largest of them.
 
     At the ends of the record the two next rows stand for the missing neighbour. Where most rows repeat the one before,
@@ -255,7 +256,7 @@ def _outliers(time: Floats, rate: Floats) -> tuple[int, Outlier | None]:
     return int(np.sum(last - first)), Outlier(float(time[k]), float(rate[k]), float(step[k]))
 
 
-def _follows(pair: Mask) -> Mask:
+def _follows(pair: BoolArray) -> BoolArray:
     """Pairs that share their first step with the pair before: every other one of a chain."""
     chain = np.zeros(len(pair), dtype=bool)
     for k in np.flatnonzero(pair):
@@ -263,7 +264,7 @@ def _follows(pair: Mask) -> Mask:
     return chain
 
 
-def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[float, int, int] | None:
+def _wrapped(rows: Rows, finite: BoolArray, weight_arcsec: float | None) -> tuple[float, int, int] | None:
     """Places where counted pulses step by a whole range of a counter (2^8 ... 2^32) and hardly by anything else."""
     if weight_arcsec is None or len(rows) < 4:
         return None
@@ -283,14 +284,14 @@ def _wrapped(rows: Rows, finite: Mask, weight_arcsec: float | None) -> tuple[flo
     return None
 
 
-def _longest_stretch(values: Floats) -> int:
+def _longest_stretch(values: FloatArray) -> int:
     """Number of rows in the longest stretch of one identical value."""
     if len(values) == 0:
         return 0
     return int(np.diff(np.r_[_changes(values), len(values)]).max())
 
 
-def _constant(rows: Rows, inside: Mask, rate: Floats) -> tuple[str, ...]:
+def _constant(rows: Rows, inside: BoolArray, rate: FloatArray) -> tuple[str, ...]:
     columns = {"temperature": _those(rows.temperature_c, inside), "rate": rate}
     columns |= {f"channel {name}": _those(values, inside) for name, values in rows.channels.items()}
     return tuple(name for name, values in columns.items() if len(values) and np.ptp(values) == 0.0)

@@ -18,13 +18,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..common.arrays import FloatArray
 from ..common.cells import cell_means, noise_of
 from ..common.quantiles import NORMAL_95
 from .passages import Rows, curve_elsewhere
 
 __all__ = ["Step", "steps_of"]
 
-Floats = NDArray[np.float64]
 
 FALSE_ALARMS = 0.005  # records of which one has a step by chance: with drifts one in a hundred has an event
 _HALVES_S = (120.0, 600.0, 3000.0)  # half windows: short ones place a large step, long ones find a small one
@@ -108,22 +108,24 @@ class _Windows:
 
     run: int
     half_s: float
-    rows: tuple[Floats, Floats]
-    cells: tuple[Floats, Floats, Floats]
+    rows: tuple[FloatArray, FloatArray]
+    cells: tuple[FloatArray, FloatArray, FloatArray]
     cell_s: float
     width: int
-    size: Floats
-    spread: Floats
-    z: Floats
+    size: FloatArray
+    spread: FloatArray
+    z: FloatArray
     windows: float
 
     @property
-    def t(self) -> Floats:
+    def t(self) -> FloatArray:
         """Times of the cells, s."""
         return self.cells[0]
 
     @staticmethod
-    def of(run: int, time: Floats, temperature: Floats, rate: Floats, half_s: float) -> _Windows | None:
+    def of(
+        run: int, time: FloatArray, temperature: FloatArray, rate: FloatArray, half_s: float
+    ) -> _Windows | None:
         """None where the run is too short to show what noise makes of such windows."""
         if len(time) <= 4 * _CELLS:
             return None
@@ -233,10 +235,10 @@ class _Windows:
 class _Fit:
     """Cells of one window: times, rates, length; `q`: an orthonormal basis of what stands beside a step."""
 
-    t: Floats
-    y: Floats
+    t: FloatArray
+    y: FloatArray
     cell_s: float
-    q: Floats
+    q: FloatArray
 
     def step(self, first_s: float) -> tuple[float, float]:
         """Size of a step from a time on, and the error that white noise of size 1 makes of it.
@@ -248,18 +250,18 @@ class _Fit:
         energy = max(float(rest @ rest), _LEAST_ENERGY * len(self.t) * 0.25)
         return float(rest @ self.y) / energy, float(1.0 / np.sqrt(energy))
 
-    def without_step(self, first_s: float, time_s: Floats) -> Floats:
+    def without_step(self, first_s: float, time_s: FloatArray) -> FloatArray:
         """What the fit says at some times less its step from a time on, deg/h."""
         left = self.y - self.step(first_s)[0] * self._behind(first_s)
         return np.asarray(np.interp(time_s, self.t, self.q @ (self.q.T @ left)))
 
-    def _behind(self, first_s: float) -> Floats:
+    def _behind(self, first_s: float) -> FloatArray:
         return np.asarray(np.clip((self.t - first_s) / self.cell_s + 0.5, 0.0, 1.0))
 
 
 def _fitted(
-    t: Floats, x: Floats, y: Floats, width: int, known: Floats | None = None
-) -> tuple[Floats, Floats]:
+    t: FloatArray, x: FloatArray, y: FloatArray, width: int, known: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Step at the middle of every window and the error that white noise of size 1 makes of it, shape (places,).
 
     `known` is a further column beside the step, shape (cells,).
@@ -276,7 +278,7 @@ def _fitted(
     return np.sum(rest_step * rest_y, axis=1) / energy, 1.0 / np.sqrt(energy)
 
 
-def _beside(t: Floats, x: Floats, width: int) -> list[Floats]:
+def _beside(t: FloatArray, x: FloatArray, width: int) -> list[FloatArray]:
     """What is fitted beside a step in every window, less its mean: a drift, temperature, its rate, their products."""
     slope = np.gradient(x, t)
     smooth = np.convolve(np.pad(slope, width // 4, mode="edge"), np.ones(2 * (width // 4) + 1), "valid")
@@ -285,13 +287,13 @@ def _beside(t: Floats, x: Floats, width: int) -> list[Floats]:
     return [tau / scale, x_, r_, _centred(x_**2), _centred(x_ * r_), _centred(r_**2)]
 
 
-def _centred(columns: Floats) -> Floats:
+def _centred(columns: FloatArray) -> FloatArray:
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
-def _orthogonal(columns: list[Floats]) -> list[Floats]:
+def _orthogonal(columns: list[FloatArray]) -> list[FloatArray]:
     """The columns of every window, orthonormal one after the other; those that hardly vary on their own drop out."""
-    done: list[Floats] = []
+    done: list[FloatArray] = []
     for column in columns:
         size = np.linalg.norm(column, axis=1, keepdims=True)
         rest = column.copy()

@@ -12,15 +12,14 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark
 
 __all__ = ["orientation_findings"]
 
 Finding = dict[str, Any]
-Floats = NDArray[np.float64]
 
 _NEXT = (
     "Look at mounting and wiring; where only the columns are exchanged or turned over, write them right or name them "
@@ -54,7 +53,7 @@ class _Way:
         """Columns that are exchanged, and signs that are reversed."""
         return sum(c != k for k, c in enumerate(self.column)) + sum(s < 0 for s in self.sign)
 
-    def of(self, rates: Floats) -> Floats:
+    def of(self, rates: FloatArray) -> FloatArray:
         return np.asarray(rates[:, list(self.column)] * np.array(self.sign))
 
     def words(self, axes: Sequence[str]) -> str:
@@ -94,7 +93,7 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     """The way that makes the run one of the others, which agree with one another."""
     if len(others) < _LEAST_OTHERS:
         return None
-    known: dict[float, list[Floats]] = {}
+    known: dict[float, list[FloatArray]] = {}
     for other in others:
         for t, rates in zip(other.temperature_c.tolist(), other.rates_dph - _earth(other), strict=True):
             known.setdefault(t, []).append(rates)
@@ -117,7 +116,7 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     )
 
 
-def _earth(curve: Curve) -> Floats:
+def _earth(curve: Curve) -> FloatArray:
     return np.zeros(curve.rates_dph.shape[1]) if curve.earth_dph is None else np.array(curve.earth_dph)
 
 
@@ -180,7 +179,7 @@ def _within(way: _Way, columns: Sequence[int], stated: _Way) -> _Way:
     return _Way(tuple(column), tuple(sign))
 
 
-def _best(rates: Floats, usual: Floats, tolerance: float = 0.0) -> tuple[_Way, float, float] | None:
+def _best(rates: FloatArray, usual: FloatArray, tolerance: float = 0.0) -> tuple[_Way, float, float] | None:
     """The simplest of the ways that fit best, what it leaves (RMS), and what the stated way leaves; None: the stated.
 
     Args:

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
+
 __all__ = ["Rows", "curve_elsewhere"]
 
-Floats = NDArray[np.float64]
-Rows = tuple[Floats, Floats, Floats]
+Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
 
 _BINS = 48  # over the temperatures of a window, which has 24 to 40 cells: a quick passage is as sharp as in its cells
@@ -19,8 +20,8 @@ _LEAST_C = 0.3  # what a chamber's ripple moves is no passage
 
 
 def curve_elsewhere(
-    runs: Sequence[Rows], run: int, window_s: tuple[float, float], temperature: Floats
-) -> Floats | None:
+    runs: Sequence[Rows], run: int, window_s: tuple[float, float], temperature: FloatArray
+) -> FloatArray | None:
     """Mean rate over temperature of all passages but a run's own window, less each one's mean, shape (n,).
 
     Args:
@@ -45,7 +46,9 @@ def curve_elsewhere(
     return np.interp(temperature, 0.5 * (edges[1:] + edges[:-1]), np.mean(curves, axis=0))
 
 
-def _curves(x: Floats, y: Floats, counts: NDArray[np.bool_], edges: Floats) -> Iterator[Floats]:
+def _curves(
+    x: FloatArray, y: FloatArray, counts: NDArray[np.bool_], edges: FloatArray
+) -> Iterator[FloatArray]:
     """Of every stretch of rows that count and cover most of the bins: mean rate of each, less the mean of all."""
     at = np.flatnonzero(counts)
     middle = 0.5 * (edges[1:] + edges[:-1])

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.reading import open_file
 from ..recordings.records import Curve, Dataset, Mark
@@ -18,7 +19,6 @@ from .facts import RunFacts
 
 __all__ = ["Columned", "Compared", "Covered", "Seen", "Strip", "pictured"]
 
-Floats = NDArray[np.float64]
 Span = tuple[float, float]
 
 _POINTS = 600  # of a strip; a picture has about as many columns
@@ -34,9 +34,9 @@ _COVERED = ("envelope_not_reached", "envelope_coverage", "mostly_holds", "no_tem
 class Strip:
     """Times (s) with the lowest and highest value of rate (deg/h) and temperature (C) about each; shape (n,)."""
 
-    time_s: Floats
-    rate_dph: tuple[Floats, Floats]
-    temperature_c: tuple[Floats, Floats]
+    time_s: FloatArray
+    rate_dph: tuple[FloatArray, FloatArray]
+    temperature_c: tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class Columned:
     title: str
     column: str
     rows: NDArray[np.int64]
-    values: Floats
+    values: FloatArray
     wrong: int
 
 
@@ -72,8 +72,8 @@ class Compared:
 class Covered:
     """Temperatures (C) and their rates (C/min) of the training runs, minute by minute."""
 
-    temperature_c: Floats
-    slope_c_per_min: Floats
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
 
 
 Picture = Seen | Columned | Compared | Covered
@@ -162,10 +162,10 @@ def _rows(dataset: Dataset, marks: Sequence[Mark]) -> Iterator[Seen]:
     yield Seen(title, _strip(*columns), near, spans)
 
 
-def _strip(time: Floats, rate: Floats, temperature: Floats) -> Strip:
+def _strip(time: FloatArray, rate: FloatArray, temperature: FloatArray) -> Strip:
     starts = np.unique(np.linspace(0, len(time), min(_POINTS, len(time)), endpoint=False).astype(np.int64))
 
-    def ends(values: Floats) -> tuple[Floats, Floats]:
+    def ends(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
 
     return Strip(time[starts], ends(rate), ends(temperature))

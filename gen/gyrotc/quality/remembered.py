@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order, play
 
 __all__ = ["evidence_beside_memories"]
 
-Floats = NDArray[np.float64]
 
 _WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `terms.hysteresis` looks through
 _LAGS_S = (200.0, 600.0, 1800.0, 5400.0)  # over what its lags look through, by factors of three
@@ -21,7 +21,10 @@ _RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play 
 
 
 def evidence_beside_memories(
-    means: tuple[Floats, Floats, Floats], used: NDArray[np.bool_], change: Floats, known: Floats
+    means: tuple[FloatArray, FloatArray, FloatArray],
+    used: NDArray[np.bool_],
+    change: FloatArray,
+    known: FloatArray,
 ) -> float:
     """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
 
@@ -49,7 +52,7 @@ def evidence_beside_memories(
     return min(found)
 
 
-def _left(columns: Floats, y: Floats) -> tuple[float, int, float]:
+def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
     """Squares that a fit leaves, its rank, and the correlation of neighbours in what it leaves, 0 at least."""
     q, size, _ = np.linalg.svd(
         columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False

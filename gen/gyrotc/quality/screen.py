@@ -15,6 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["departing", "departing_rows"]
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 T = TypeVar("T", bound=np.generic)
 
 _SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
@@ -45,7 +44,7 @@ def departing_rows(rows: Rows, run: Run, rows_per_block: int) -> NDArray[np.int6
     return np.asarray(at[departing(rows.rate_dph[at], rows_per_block)])
 
 
-def departing(rate: Floats, rows_per_block: int) -> Mask:
+def departing(rate: FloatArray, rows_per_block: int) -> BoolArray:
     """Which rows of a rate (finite, in order of time, shape (n,)) are spikes or parts of bursts."""
     n = min(rows_per_block, max(len(rate) // (2 * _AROUND), 1))
     whole = len(rate) // n * n
@@ -69,7 +68,7 @@ def departing(rate: Floats, rows_per_block: int) -> Mask:
     return np.asarray(wild | _spread((share > _BURST) & (n >= _BURST_ROWS), n, len(rate)))
 
 
-def _running(values: Floats) -> Floats:
+def _running(values: FloatArray) -> FloatArray:
     """Median of each value and its four neighbours; at the ends of those that there are, mirrored."""
     half = _AROUND // 2
     if len(values) <= half:
@@ -78,7 +77,7 @@ def _running(values: Floats) -> Floats:
     return middle_of_five(*windows.T)
 
 
-def _largest_around(values: Floats) -> Floats:
+def _largest_around(values: FloatArray) -> FloatArray:
     """Largest of each value and its four neighbours."""
     windows = sliding_window_view(np.pad(values, _AROUND // 2, mode="edge"), _AROUND)
     return np.asarray(windows.max(axis=1))
@@ -90,7 +89,7 @@ def _spread(of_blocks: NDArray[T], n: int, rows: int) -> NDArray[T]:
     return np.concatenate([each, np.repeat(of_blocks[-1:], rows - len(each))]) if rows > len(each) else each
 
 
-def _scale(rate: Floats, rest: Floats, n: int) -> Floats:
+def _scale(rate: FloatArray, rest: FloatArray, n: int) -> FloatArray:
     """Standard deviation of a row about the level, for each row; robust, and never far below that of the whole."""
     step = np.abs(np.diff(rate, prepend=rate[:1]))
     moved = step[step > 0.0]
@@ -105,7 +104,7 @@ def _scale(rate: Floats, rest: Floats, n: int) -> Floats:
     return np.asarray(_spread(sigma, group, len(rate)), dtype=np.float64)
 
 
-def _beyond_neighbours(rate: Floats) -> Floats:
+def _beyond_neighbours(rate: FloatArray) -> FloatArray:
     """How far each row lies outside the range of the two rows before and the two after."""
     padded = np.pad(rate, 2, mode="reflect")
     around = np.delete(sliding_window_view(padded, 5), 2, axis=1)

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 
 __all__ = ["thermometer_findings"]
 
-Floats = NDArray[np.float64]
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
 _CELL_S = 60.0  # of a mean: below it the lags of thermometers themselves show
@@ -35,9 +34,9 @@ class _Followed:
     """One run: means, and what it says alone; lag None where its temperature hardly changes."""
 
     run: Run
-    own_c: Floats
-    rate: Floats  # C/s
-    apart_c: Floats
+    own_c: FloatArray
+    rate: FloatArray  # C/s
+    apart_c: FloatArray
     lag_s: float | None
 
 
@@ -77,11 +76,11 @@ def _followed(run: Run, rows: Rows, name: str) -> _Followed | None:
     return _Followed(run, own, rate, apart, lag)
 
 
-def _columns(own: Floats, rate: Floats, center: float) -> Floats:
+def _columns(own: FloatArray, rate: FloatArray, center: float) -> FloatArray:
     return np.stack([np.ones(len(own)), own - center, rate], axis=1)
 
 
-def _fit(own: Floats, rate: Floats, apart: Floats) -> Floats:
+def _fit(own: FloatArray, rate: FloatArray, apart: FloatArray) -> FloatArray:
     """Offset at the mean temperature, share, and less the lag."""
     return np.asarray(np.linalg.lstsq(_columns(own, rate, float(own.mean())), apart, rcond=None)[0])
 
@@ -96,7 +95,7 @@ def _odd_ones(name: str, runs: list[_Followed]) -> Iterator[dict[str, Any]]:
         center = float(own.mean())
         found = np.linalg.lstsq(_columns(own, rate, center), apart, rcond=None)[0]
 
-        def mean_left(o: _Followed, found: Floats = found, center: float = center) -> float:
+        def mean_left(o: _Followed, found: FloatArray = found, center: float = center) -> float:
             return float(np.mean(o.apart_c - _columns(o.own_c, o.rate, center) @ found))
 
         shift = mean_left(one)

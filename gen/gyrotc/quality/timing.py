@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..recordings.records import Mark, Rows, Run
 
 __all__ = ["time_findings"]
 
 Finding = dict[str, Any]
-Floats = NDArray[np.float64]
 
 _GAP = 1.5  # row periods
 _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
@@ -55,14 +55,14 @@ def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     yield from _drift(run, time, at, np.where(usual, step, np.nan))
 
 
-def _marks(run: Run, time: Floats, at: NDArray[np.int64], places: list[int]) -> tuple[Mark, ...]:
+def _marks(run: Run, time: FloatArray, at: NDArray[np.int64], places: list[int]) -> tuple[Mark, ...]:
     return tuple(
         Mark(run.file, (int(at[k]) + 1, int(at[k + 1]) + 1), (float(time[k]), float(time[k + 1])))
         for k in places[:_TOLD]
     )
 
 
-def _gaps(run: Run, time: Floats, at: NDArray[np.int64], gaps: NDArray[np.int64]) -> Finding:
+def _gaps(run: Run, time: FloatArray, at: NDArray[np.int64], gaps: NDArray[np.int64]) -> Finding:
     step = np.diff(time)[gaps]
     missing = int(np.sum(np.round(step / run.row_period_s) - 1.0))
     longest = int(gaps[np.argmax(step)])
@@ -78,7 +78,7 @@ def _gaps(run: Run, time: Floats, at: NDArray[np.int64], gaps: NDArray[np.int64]
     }
 
 
-def _jumps(run: Run, time: Floats, at: NDArray[np.int64], jumps: list[int]) -> Finding:
+def _jumps(run: Run, time: FloatArray, at: NDArray[np.int64], jumps: list[int]) -> Finding:
     by = time[jumps[0] + 1] - time[jumps[0]] - run.row_period_s
     hours = round(by / _HOUR_S)
     whole = abs(by - hours * _HOUR_S) < 2.0 * run.row_period_s and hours
@@ -95,7 +95,7 @@ def _jumps(run: Run, time: Floats, at: NDArray[np.int64], jumps: list[int]) -> F
     }
 
 
-def _clock_was_set(time: Floats, temperature: Floats, k: int, period_s: float) -> bool:
+def _clock_was_set(time: FloatArray, temperature: FloatArray, k: int, period_s: float) -> bool:
     """Whether the temperature, on a ramp before and behind row k, did not move in the time that seems to pass."""
     rows = max(_AROUND_ROWS, min(round(_AROUND_S / period_s), 3000))
     before, after = slice(max(k + 1 - rows, 0), k + 1), slice(k + 1, k + 1 + rows)
@@ -114,7 +114,7 @@ def _clock_was_set(time: Floats, temperature: Floats, k: int, period_s: float) -
     return abs(moved - slope * period_s) < min(_UNMOVED * abs(expected), _UNMOVED_SIGMAS * sigma + 0.1)
 
 
-def _line(time: Floats, temperature: Floats) -> tuple[float, float, float] | None:
+def _line(time: FloatArray, temperature: FloatArray) -> tuple[float, float, float] | None:
     """Level at time 0 (C), slope (C/s) and scatter (C) of a straight line; None for too few rows."""
     if len(time) < _AROUND_ROWS:
         return None
@@ -122,7 +122,7 @@ def _line(time: Floats, temperature: Floats) -> tuple[float, float, float] | Non
     return float(level), float(slope), float(np.std(temperature - level - slope * time))
 
 
-def _coarse(run: Run, step: Floats) -> Finding | None:
+def _coarse(run: Run, step: FloatArray) -> Finding | None:
     """Stamps whose own resolution is about the row period: rows seem to be missing, or twice as dense, by turns."""
     some = step[: 2**16]
     short = some[some < 5.5 * run.row_period_s]
@@ -145,7 +145,7 @@ def _coarse(run: Run, step: Floats) -> Finding | None:
     }
 
 
-def _regular(step: Floats, unit: float) -> bool:
+def _regular(step: FloatArray, unit: float) -> bool:
     """Whether stamps are those of even rows, cut to a unit: rows that are really missing leave the line by and by."""
     time = np.cumsum(step)
     size = min(_EVEN_ROWS, len(time))
@@ -156,7 +156,7 @@ def _regular(step: Floats, unit: float) -> bool:
     return float(np.mean(np.abs(rest).max(axis=1) < _EVEN * unit)) > _EVEN_SHARE
 
 
-def _drift(run: Run, time: Floats, at: NDArray[np.int64], step: Floats) -> Iterator[Finding]:
+def _drift(run: Run, time: FloatArray, at: NDArray[np.int64], step: FloatArray) -> Iterator[Finding]:
     """Rows that come ever faster or slower by the stamps: the clock of the rows or that of the stamps drifts.
 
     Args:
@@ -186,7 +186,7 @@ def _drift(run: Run, time: Floats, at: NDArray[np.int64], step: Floats) -> Itera
 
 def _drifting(
     run: Run,
-    time: Floats,
+    time: FloatArray,
     at: NDArray[np.int64],
     span: tuple[int, int],
     every: tuple[float, float],

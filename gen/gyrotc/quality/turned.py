@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..recordings.records import Curve, Dataset
 from .events import Event
@@ -21,7 +20,6 @@ from .turned_within import another_gain_throughout
 
 __all__ = ["turned_runs"]
 
-Floats = NDArray[np.float64]
 
 _LEAST_OTHERS = 2  # of two runs nobody knows which one differs
 _LEAST_PLACES = 12  # temperatures that a run shares with the others: a factor is one parameter of their curve

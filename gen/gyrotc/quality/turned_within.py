@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.cells import cell_means
 from ..common.quantiles import CHI2_95_ONE
 from ..recordings.records import Dataset, Run
@@ -23,8 +24,7 @@ from .remembered import evidence_beside_memories
 
 __all__ = ["another_gain_throughout", "gain_changes"]
 
-Floats = NDArray[np.float64]
-_Means = tuple[Floats, Floats, Floats]
+_Means = tuple[FloatArray, FloatArray, FloatArray]
 
 _LEAST_OTHERS = 2  # of two runs nobody knows which one differs; the others need two others each
 _BLOCK_S = 100.0  # of the means: the noise of a row is no yardstick, and a chamber's cycle is longer
@@ -84,7 +84,7 @@ def _clear_changes(means: Sequence[_Means]) -> Iterator[tuple[int, _Change]]:
             yield k, replace(change, error=change.error * stretch)
 
 
-def _event(number: int, run: Run, change: _Change, time_s: Floats) -> Event:
+def _event(number: int, run: Run, change: _Change, time_s: FloatArray) -> Event:
     first, last = float(time_s[0]), float(time_s[-1]) + _BLOCK_S
     at, low, high = change.time_s
     out = (first - 0.5 * _BLOCK_S, high) if at - first < last - at else (low, last)
@@ -108,7 +108,7 @@ def _means(run: Run) -> _Means:
     return t, x, y
 
 
-def _usual(others: Sequence[_Means]) -> tuple[Floats, Floats]:
+def _usual(others: Sequence[_Means]) -> tuple[FloatArray, FloatArray]:
     """Temperatures and the mean of the other runs' rates there, each without its own mean where two of them have it."""
     curves = []
     for _, x, y in others:
@@ -133,7 +133,7 @@ def another_gain_throughout(runs: Sequence[Run], number: int) -> bool:
     return evidence_beside_memories((t, x, y - curve), used, side, side[:, :0]) > _EVIDENCE
 
 
-def _beside_memories(own: _Means, usual: tuple[Floats, Floats], at_s: float) -> float:
+def _beside_memories(own: _Means, usual: tuple[FloatArray, FloatArray], at_s: float) -> float:
     """Evidence for other levels, factors and rates from a time on, against memories of the run with a slow drift."""
     curve, used, side = _beside(own, usual)
     behind = (own[0] >= at_s)[:, None]
@@ -142,7 +142,9 @@ def _beside_memories(own: _Means, usual: tuple[Floats, Floats], at_s: float) -> 
     return evidence_beside_memories(own, used, np.hstack([side * ~behind, side * behind]), known)
 
 
-def _beside(own: _Means, usual: tuple[Floats, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
+def _beside(
+    own: _Means, usual: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
     """The others' curve at a run's temperatures, where they have one, and columns level, curve, rate."""
     t, x, _ = own
     curve = np.interp(x, *usual)
@@ -153,7 +155,7 @@ def _beside(own: _Means, usual: tuple[Floats, Floats]) -> tuple[Floats, NDArray[
     )
 
 
-def _change(own: _Means, usual: tuple[Floats, Floats]) -> _Change | None:
+def _change(own: _Means, usual: tuple[FloatArray, FloatArray]) -> _Change | None:
     """None where the run or the curve is too short, or swings too little on one side of every time."""
     if len(usual[0]) < _LEAST_BLOCKS:
         return None
@@ -178,7 +180,7 @@ def _change(own: _Means, usual: tuple[Floats, Floats]) -> _Change | None:
 
 
 def _splits(
-    t: Floats, f: Floats, r: Floats, y: Floats
+    t: FloatArray, f: FloatArray, r: FloatArray, y: FloatArray
 ) -> Iterator[tuple[int, float, tuple[float, ...], tuple[float, ...], float]]:
     """Every place: squares that are left, factor with its error on both sides, the smaller swing of the curve."""
     for at in range(_LEAST_BLOCKS, len(t) - _LEAST_BLOCKS + 1):
@@ -188,7 +190,7 @@ def _splits(
             yield at, before[2] + behind[2], before, behind, swing
 
 
-def _line(f: Floats, r: Floats, y: Floats) -> tuple[float, float, float] | None:
+def _line(f: FloatArray, r: FloatArray, y: FloatArray) -> tuple[float, float, float] | None:
     """Factor of y on f beside a level and the temperature's rate r, its standard error, the squares that are left.
 
     None where f is constant. The error counts the correlation of neighbouring residuals, as of a first-order process.

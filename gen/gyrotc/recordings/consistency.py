@@ -8,10 +8,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from .problems import Problems
 from .reading import Recording
-from .records import Applied, Exclusion, Floats, inside
+from .records import Applied, Exclusion, inside
 from .schema import FILE, Description, RunEntry
 
 __all__ = ["check_description", "check_spans", "common_channels", "in_entry", "of_axis", "place_of"]
@@ -22,7 +23,7 @@ def place_of(description: Description, index: int) -> str:
     return f"{FILE}, run {index + 1} ({description.run[index].file})"
 
 
-def in_entry(entry: RunEntry, time_s: Floats) -> NDArray[np.bool_]:
+def in_entry(entry: RunEntry, time_s: FloatArray) -> NDArray[np.bool_]:
     """Which times belong to a run."""
     gaps = tuple(Exclusion(gap.from_s, gap.to_s, gap.reason) for gap in entry.exclude)
     return inside(time_s, entry.from_s, entry.to_s, gaps)

@@ -18,10 +18,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
+from ..common.arrays import FloatArray
 from ..common.ceilings import need_memory, refuse_above
 from ..common.errors import InputError
 from ..common.opening import open_input
-from .records import Floats
 from .source import Prefix, Source
 from .values import Fault
 
@@ -65,7 +65,7 @@ class CsvFile(Source):
         except OSError as error:
             raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
 
-    def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
+    def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
         """As `Source.read`, fast: by pyarrow, a few lines at a time.
 
         pyarrow's own streaming reader reads ahead in threads of its own, which outlive a file given up half-way.
@@ -124,7 +124,7 @@ class CsvFile(Source):
             if rest.strip():
                 yield rest
 
-    def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
+    def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
         """As `Source.scan`, line by line."""
         cells: list[array[float]] = [array("d") for _ in self.names]
         lines = array("q")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..common.arrays import FloatArray
 
 __all__ = ["Evidence"]
 
-Floats = NDArray[np.float64]
 
 _PART = 2**16  # rows that are looked at together
 _MOST_CELLS = 2**12  # even, so that cells can be merged in pairs
@@ -31,7 +31,7 @@ class Evidence:
         self._count = 0
         self._rest = np.empty((0, 2 + rates))
 
-    def add(self, time_s: Floats, temperature_c: Floats, rates_dph: list[Floats]) -> None:
+    def add(self, time_s: FloatArray, temperature_c: FloatArray, rates_dph: list[FloatArray]) -> None:
         """Adds rows; those without a finite value in every column are left out."""
         for start in range(0, len(time_s), _PART):
             part = slice(start, start + _PART)
@@ -39,7 +39,7 @@ class Evidence:
                 np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)])
             )
 
-    def _add(self, block: Floats) -> None:
+    def _add(self, block: FloatArray) -> None:
         whole = np.isfinite(block).all(axis=1)
         block = block if whole.all() else block[whole]
         if len(block) == 0:
@@ -54,7 +54,7 @@ class Evidence:
         self._rest = block
 
     @property
-    def cells(self) -> Floats:
+    def cells(self) -> FloatArray:
         """Means of the cells, shape (n, 2 + rates): time, temperature, rates."""
         return self._cells[: self._count]
 
@@ -63,7 +63,7 @@ class Evidence:
         """Whether most rates repeat the one before: their scatter is that of the resolution."""
         return 2 * self.same > self.rows * (self._cells.shape[1] - 2)
 
-    def _filled(self, block: Floats) -> Floats:
+    def _filled(self, block: FloatArray) -> FloatArray:
         """Takes as many rows as there is room for; the rows that are left."""
         per = self._rows_per_cell
         n = min(len(block) // per, _MOST_CELLS - self._count)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from .problems import Problems
 from .reading import Reader, Recording
-from .records import Floats, Run, SharedRows
+from .records import Run, SharedRows
 from .schema import FILE
 from .shared import windows_in_common, windows_that_repeat
 
@@ -29,7 +30,7 @@ class _Span:
     Two of them are in memory at once, so values are what they are compared as.
     """
 
-    time_s: Floats
+    time_s: FloatArray
     values: tuple[NDArray[np.float32], ...]
 
 
@@ -109,7 +110,7 @@ def _span(run: Run) -> _Span:
     return _Span(rows.time_s, tuple(values))
 
 
-def _times(time_s: Floats, first: int, end: int, period_s: float) -> tuple[float, float]:
+def _times(time_s: FloatArray, first: int, end: int, period_s: float) -> tuple[float, float]:
     """From the first row to the row that follows the last."""
     end = min(end, len(time_s))
     return float(time_s[first]), float(time_s[end] if end < len(time_s) else time_s[-1] + period_s)

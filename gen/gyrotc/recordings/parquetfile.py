@@ -9,10 +9,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..common.arrays import FloatArray
 from ..common.ceilings import ceiling, need_memory, refuse_above
 from ..common.errors import InputError
 from ..common.opening import open_input
-from .records import Floats
 from .source import Source
 from .values import Fault
 
@@ -64,7 +64,7 @@ class ParquetFile(Source):
                     "numbers; `gyrotc import` reads stamps and more",
                 )
 
-    def read(self, columns: Sequence[str]) -> dict[str, Floats]:
+    def read(self, columns: Sequence[str]) -> dict[str, FloatArray]:
         """As `Source.read`, row group by row group; never None."""
         at = 0
         need_memory(
@@ -86,7 +86,7 @@ class ParquetFile(Source):
             raise InputError(self.name, f"is damaged ({_short(error)})", "a whole Parquet file") from error
         return read
 
-    def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
+    def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
         """As `Source.scan`: a Parquet file has no cells that are no numbers."""
         columns = self.read(self.names)
         return columns, list(range(1, self._n_rows + 1)), []

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import median
 from .columns import Layout
 from .earth import EARTH_RATE_DPH
@@ -20,7 +20,6 @@ from .units import Conversion
 
 __all__ = ["Suspicion", "earth_suspicion", "suspicions"]
 
-Floats = NDArray[np.float64]
 
 _HOTTEST_C = 125.0  # upper end of the military range; beyond it are down-hole gyros, whose owners know
 _COLDEST_C = -90.0  # as `values` has it
@@ -125,7 +124,7 @@ def _of_temperature(evidence: Evidence, column: str, units: Mapping[str, Convers
 
 
 def _of_time(
-    time: Floats, temperature: Floats, column: str, units: Mapping[str, Conversion]
+    time: FloatArray, temperature: FloatArray, column: str, units: Mapping[str, Conversion]
 ) -> Iterator[Suspicion]:
     fastest = _sustained(time, temperature)
     if fastest <= _FASTEST_C_PER_MIN:
@@ -143,7 +142,7 @@ def _of_time(
             return
 
 
-def _sustained(time: Floats, temperature: Floats) -> float:
+def _sustained(time: FloatArray, temperature: FloatArray) -> float:
     """Fastest change of temperature that lasts, C/min: six steps of one sign, 5 C or more, no step nearly half of it.
 
     It is sought on every scale: cells are merged in pairs until too few are left. 0 where none is faster than a
@@ -167,13 +166,13 @@ def _sustained(time: Floats, temperature: Floats) -> float:
     return fastest
 
 
-def _of_pairs(values: Floats) -> Floats:
+def _of_pairs(values: FloatArray) -> FloatArray:
     """Means of the first and second value, the third and fourth and so on; an odd last one is left out."""
     half = len(values) // 2 * 2
     return np.asarray((values[:half:2] + values[1:half:2]) / 2.0)
 
 
-def _of_triad(rates: Floats, column: str, units: Mapping[str, Conversion]) -> Suspicion | None:
+def _of_triad(rates: FloatArray, column: str, units: Mapping[str, Conversion]) -> Suspicion | None:
     """Three axes at rest see Earth's rate whole, whichever way they point."""
     norm = float(np.linalg.norm(rates.mean(axis=0)))
     unit = units.get(column)
@@ -188,7 +187,7 @@ def _of_triad(rates: Floats, column: str, units: Mapping[str, Conversion]) -> Su
 
 
 def _of_noise(
-    time: Floats, rate: Floats, column: str, noise: float | None, units: Mapping[str, Conversion]
+    time: FloatArray, rate: FloatArray, column: str, noise: float | None, units: Mapping[str, Conversion]
 ) -> Suspicion | None:
     """Noise below that of every gyro; where noise is declared, nearer to what another unit makes of that."""
     walk = _random_walk(time, rate)
@@ -209,7 +208,7 @@ def _of_noise(
     return None
 
 
-def _random_walk(time: Floats, rate: Floats) -> float:
+def _random_walk(time: FloatArray, rate: FloatArray) -> float:
     """Largest angle random walk, deg/sqrt(h), of Allan deviations of cells up to 100 s (or of the cells as they are).
 
     The largest, because a logger's filter makes neighbouring rows alike: the noise shows on longer means only.

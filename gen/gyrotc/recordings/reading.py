@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import median
 from .columns import Layout, arrange
@@ -15,7 +16,7 @@ from .csv_file import CsvFile
 from .evidence import Evidence
 from .parquetfile import ParquetFile
 from .problems import Problems
-from .records import Applied, EarthRate, Floats, Mark, Rows
+from .records import Applied, EarthRate, Mark, Rows
 from .schema import Columns
 from .shared import Fingerprints, fingerprints_of
 from .source import Source
@@ -48,7 +49,7 @@ class Recording:
     units: dict[str, Conversion]
     evidence: Evidence
     fingerprints: Fingerprints
-    time_s: Floats
+    time_s: FloatArray
     n_rows: int
     row_period_s: float
 
@@ -115,7 +116,9 @@ def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
     return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels)
 
 
-def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[str]) -> dict[str, Floats]:
+def known_rows(
+    columns: dict[str, FloatArray], layout: Layout, channels: Sequence[str]
+) -> dict[str, FloatArray]:
     """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
 
     A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
@@ -129,12 +132,12 @@ def known_rows(columns: dict[str, Floats], layout: Layout, channels: Sequence[st
     return columns if known.all() else {name: values[known] for name, values in columns.items()}
 
 
-def _converted(columns: dict[str, Floats], units: Mapping[str, Conversion]) -> dict[str, Floats]:
+def _converted(columns: dict[str, FloatArray], units: Mapping[str, Conversion]) -> dict[str, FloatArray]:
     """Columns in gyrotc's units."""
     return {name: units[name](values) if name in units else values for name, values in columns.items()}
 
 
-def rate_of_pulses(time_s: Floats, pulses: Floats, weight_arcsec: float) -> Floats:
+def rate_of_pulses(time_s: FloatArray, pulses: FloatArray, weight_arcsec: float) -> FloatArray:
     """Mean rate since the last row, deg/h (1 arcsec/s = 1 deg/h); NaN in the first row."""
     rate = np.full(len(time_s), np.nan)
     rate[1:] = pulses[1:] * weight_arcsec / np.diff(time_s)
@@ -199,7 +202,7 @@ def _checked(
     units: Mapping[str, Conversion],
     pulse_weight_arcsec: float | None,
     problems: Problems,
-) -> tuple[Floats, Evidence, Fingerprints]:  # long: one refusal after the other
+) -> tuple[FloatArray, Evidence, Fingerprints]:  # long: one refusal after the other
     """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
     values = file.columns(file.names)
     lines = None

@@ -11,6 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
+
 __all__ = [
     "Applied",
     "Curve",
@@ -18,7 +20,6 @@ __all__ = [
     "DeclaredNoise",
     "EarthRate",
     "Exclusion",
-    "Floats",
     "Mark",
     "Role",
     "Rows",
@@ -28,7 +29,6 @@ __all__ = [
     "joined_runs",
 ]
 
-Floats = NDArray[np.float64]
 Role = Literal["train", "exam"]
 _OWN = "temperature_c"  # what a difference calls the temperature of the gyro itself, whatever the column is named
 
@@ -45,10 +45,10 @@ class Rows:
         channels: Auxiliary channels by column name, in their own units.
     """
 
-    time_s: Floats
-    temperature_c: Floats
-    rate_dph: Floats
-    channels: dict[str, Floats]
+    time_s: FloatArray
+    temperature_c: FloatArray
+    rate_dph: FloatArray
+    channels: dict[str, FloatArray]
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -57,7 +57,7 @@ class Rows:
         """Whether `channel` knows it."""
         return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
 
-    def channel(self, name: str) -> Floats:
+    def channel(self, name: str) -> FloatArray:
         """A recorded channel, or a difference of two columns by the name "a - b" (or of "temperature_c").
 
         Raises:
@@ -71,7 +71,7 @@ class Rows:
     def _is_column(self, name: str) -> bool:
         return name in self.channels or name == _OWN
 
-    def _column(self, name: str) -> Floats:
+    def _column(self, name: str) -> FloatArray:
         return self.temperature_c if name == _OWN and _OWN not in self.channels else self.channels[name]
 
 
@@ -102,7 +102,7 @@ class Applied:
     """
 
     hash: str
-    correction_dph: Callable[[Rows, float], Floats]
+    correction_dph: Callable[[Rows, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ class Run:
         """
         return self.reader()
 
-    def in_span(self, time_s: Floats) -> NDArray[np.bool_]:
+    def in_span(self, time_s: FloatArray) -> NDArray[np.bool_]:
         """Which times (s on the file's clock) belong to the run: from_s <= t < to_s and not excluded."""
         return inside(time_s, self.from_s, self.to_s, self.exclude)
 
@@ -187,7 +187,7 @@ def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
 
 
 def inside(
-    time_s: Floats, from_s: float | None, to_s: float | None, exclude: tuple[Exclusion, ...]
+    time_s: FloatArray, from_s: float | None, to_s: float | None, exclude: tuple[Exclusion, ...]
 ) -> NDArray[np.bool_]:
     """Which times belong to a span without its exclusions; None: no limit on that side."""
     result = np.ones(np.shape(time_s), dtype=bool)
@@ -261,8 +261,8 @@ class Curve:
 
     file: str
     axes: tuple[str, ...]
-    temperature_c: Floats
-    rates_dph: Floats
+    temperature_c: FloatArray
+    rates_dph: FloatArray
     cells: NDArray[np.int64]
     earth_dph: tuple[float, ...] | None
 

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import Floats, Run
+from ..common.arrays import FloatArray
+from .records import Run
 
 __all__ = ["Fingerprints", "fingerprints_of", "sketch", "windows_in_common", "windows_that_repeat"]
 
@@ -46,8 +47,8 @@ class Fingerprints:
     hash: Words
     first: NDArray[np.int32]
     last: NDArray[np.int32]
-    first_s: Floats
-    last_s: Floats
+    first_s: FloatArray
+    last_s: FloatArray
 
     def within(self, run: Run) -> Fingerprints:
         """Those whose first and last row belong to a run."""
@@ -57,7 +58,9 @@ class Fingerprints:
         )
 
 
-def fingerprints_of(time_s: Floats, temperature_c: Floats, rates: Sequence[Floats]) -> Fingerprints:
+def fingerprints_of(
+    time_s: FloatArray, temperature_c: FloatArray, rates: Sequence[FloatArray]
+) -> Fingerprints:
     """Fingerprints of a recording: times (s), temperatures, rates or pulses of every axis; arrays of shape (n,)."""
     found = []
     for start in range(0, max(len(time_s), 1), _PART):
@@ -90,10 +93,10 @@ class _Rows:
 
     hash: Words
     at: NDArray[np.int64]
-    told: Floats
+    told: FloatArray
 
     @staticmethod
-    def of(temperature_c: Floats, rates: Sequence[Floats]) -> _Rows:
+    def of(temperature_c: FloatArray, rates: Sequence[FloatArray]) -> _Rows:
         rate = np.zeros(len(temperature_c), dtype=np.uint64)
         known = np.ones(len(temperature_c), dtype=bool)
         for values in rates:
@@ -115,7 +118,7 @@ class _Rows:
         return words[kept], self.at[kept], self.at[kept + length - 1]
 
 
-def _bits(values: Floats) -> Words:
+def _bits(values: FloatArray) -> Words:
     """Values as float32, as whole numbers; 0 and -0 are one, and so is all that is beyond float32."""
     with np.errstate(over="ignore"):
         bits = (values.astype(np.float32) + np.float32(0.0)).view(np.uint32)

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.opening import open_input
-from .records import Floats
 from .values import Fault
 
 __all__ = ["Prefix", "Source"]
@@ -45,15 +45,15 @@ class _LastRead:
     """Columns of the files that were read last, `_KEPT_BYTES` at most."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Source, dict[str, Floats]] = OrderedDict()
+        self._kept: OrderedDict[Source, dict[str, FloatArray]] = OrderedDict()
         self._size = 0
         self._lock = Lock()
 
-    def of(self, file: Source) -> dict[str, Floats]:
+    def of(self, file: Source) -> dict[str, FloatArray]:
         with self._lock:
             return self._kept.get(file, {})
 
-    def keep(self, file: Source, columns: dict[str, Floats]) -> None:
+    def keep(self, file: Source, columns: dict[str, FloatArray]) -> None:
         for values in columns.values():
             values.flags.writeable = False
         with self._lock:
@@ -63,7 +63,7 @@ class _LastRead:
                 self._size -= _bytes(self._kept.popitem(last=False)[1])
 
 
-def _bytes(columns: dict[str, Floats]) -> int:
+def _bytes(columns: dict[str, FloatArray]) -> int:
     """Of whole arrays in memory, where columns are parts of larger ones."""
     return sum((values if values.base is None else values.base).nbytes for values in columns.values())
 
@@ -93,7 +93,7 @@ class Source(ABC):
     row_unit: str
 
     @abstractmethod
-    def read(self, columns: Sequence[str]) -> dict[str, Floats] | None:
+    def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
         """Columns as float64, NaN where a value is missing; None if only `scan` can read the file.
 
         Raises:
@@ -101,7 +101,7 @@ class Source(ABC):
         """
 
     @abstractmethod
-    def scan(self) -> tuple[dict[str, Floats], list[int], list[Fault]]:
+    def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
         """Reads what can be read of a file that `read` cannot make numbers of.
 
         Returns:
@@ -113,7 +113,7 @@ class Source(ABC):
     def place(self, row: int) -> int:
         """Place of a row (0 is the first) in the file: number of its line, or of the row counted from 1."""
 
-    def columns(self, names: Sequence[str]) -> dict[str, Floats] | None:
+    def columns(self, names: Sequence[str]) -> dict[str, FloatArray] | None:
         """As `read`; not to write to. Small files that were read last are not read again: a job asks three times."""
         kept = _last_read.of(self)
         if not all(name in kept for name in names):

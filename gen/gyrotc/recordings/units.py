@@ -12,9 +12,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 
 __all__ = [
@@ -29,7 +27,6 @@ __all__ = [
     "kind_of",
 ]
 
-Floats = NDArray[np.float64]
 Kind = Literal["time", "temperature", "rate"]
 
 NATIVE: Mapping[str, str] = {"time": "s", "temperature": "degC", "rate": "deg/h"}
@@ -118,7 +115,7 @@ class Conversion:
         """Whether there is anything to convert."""
         return self.factor != 1.0 or self.offset != 0.0
 
-    def __call__(self, values: Floats) -> Floats:
+    def __call__(self, values: FloatArray) -> FloatArray:
         """Values in gyrotc's own unit; the same array where that is the file's."""
         if not self.changes:
             return values

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .columns import Layout
-from .records import Floats
 
 __all__ = ["MIN_ROWS", "Fault", "faults", "likely_temperature", "rate_faults"]
 
@@ -33,7 +33,7 @@ class Fault:
     expected: str
 
 
-def faults(columns: Mapping[str, Floats], layout: Layout) -> Iterator[Fault]:
+def faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator[Fault]:
     """Faults of the numbers of one file, at most one for each column and kind."""
     good_time = True
     for name, values in columns.items():
@@ -58,12 +58,12 @@ def faults(columns: Mapping[str, Floats], layout: Layout) -> Iterator[Fault]:
             yield from rate_faults(name, columns[name])
 
 
-def rate_faults(name: str, rate: Floats) -> Iterator[Fault]:
+def rate_faults(name: str, rate: FloatArray) -> Iterator[Fault]:
     """Rates that no gyro has, deg/h; NaN passes."""
     yield from _within(name, rate, _RATE_DPH, "deg/h")
 
 
-def _order(name: str, time: Floats) -> Iterator[Fault]:
+def _order(name: str, time: FloatArray) -> Iterator[Fault]:
     if np.all(time[1:] > time[:-1]):
         return
     step = np.diff(time)
@@ -74,7 +74,7 @@ def _order(name: str, time: Floats) -> Iterator[Fault]:
             yield Fault(first, name, int(wrong.sum()), found, "times that strictly increase")
 
 
-def _temperature(name: str, values: Floats) -> Iterator[Fault]:
+def _temperature(name: str, values: FloatArray) -> Iterator[Fault]:
     for fault in _within(name, values, _TEMPERATURE_C, "C"):
         likely = likely_temperature(values)
         word = {"K": "kelvin", "degF": "fahrenheit"}.get(likely or "", "")
@@ -82,7 +82,7 @@ def _temperature(name: str, values: Floats) -> Iterator[Fault]:
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
 
 
-def likely_temperature(values: Floats) -> str | None:
+def likely_temperature(values: FloatArray) -> str | None:
     """The unit in which temperatures beyond the plausible would all be plausible: "K", "degF" or None."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -97,7 +97,7 @@ def likely_temperature(values: Floats) -> str | None:
     )
 
 
-def _within(name: str, values: Floats, limits: tuple[float, float], unit: str) -> Iterator[Fault]:
+def _within(name: str, values: FloatArray, limits: tuple[float, float], unit: str) -> Iterator[Fault]:
     if _lie_within(values, limits):
         return
     wrong = np.isfinite(values) & ((values < limits[0]) | (values > limits[1]))
@@ -105,11 +105,11 @@ def _within(name: str, values: Floats, limits: tuple[float, float], unit: str) -
         yield _fault(name, wrong, values, f"{limits[0]:g} ... {limits[1]:g} {unit}")
 
 
-def _lie_within(values: Floats, limits: tuple[float, float]) -> bool:
+def _lie_within(values: FloatArray, limits: tuple[float, float]) -> bool:
     """Whether all values do; without arrays as long as the recording. NaN does not."""
     return len(values) == 0 or bool(limits[0] <= values.min() and values.max() <= limits[1])
 
 
-def _fault(name: str, wrong: NDArray[np.bool_], values: Floats, expected: str) -> Fault:
+def _fault(name: str, wrong: NDArray[np.bool_], values: FloatArray, expected: str) -> Fault:
     first = int(np.argmax(wrong))
     return Fault(first, name, int(wrong.sum()), f"{values[first]:.10g}", expected)

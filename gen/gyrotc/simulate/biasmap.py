@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+
+from ..common.arrays import FloatArray
 
 __all__ = ["BiasMap", "draw", "made", "shape_over_range"]
 
-Array = NDArray[np.float64]
 
 T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
 R_LIMIT_C_PER_MIN = 2.5  # half of the fastest ramp of a chamber: the cavity follows slowly
@@ -35,7 +35,7 @@ class BiasMap:
     offset_dph: float
     _spline: CubicSpline = field(repr=False)
 
-    def __call__(self, cavity_c: Array, slope_c_per_min: Array) -> Array:
+    def __call__(self, cavity_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Bias in deg/h at cavity temperatures (C) and their rates of change (C/min), broadcast."""
         shape = _shape(self.parameters, self._spline, cavity_c, slope_c_per_min)
         return np.asarray(self.offset_dph + self.scale_dph * shape)
@@ -45,7 +45,7 @@ class BiasMap:
         return {"offset_dph": self.offset_dph, "scale_dph": self.scale_dph, **self.parameters}
 
 
-def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: Array, slope: Array) -> Array:
+def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: FloatArray, slope: FloatArray) -> FloatArray:
     level = spline(cavity_c)
     level = level + p["well"] / (1.0 + ((cavity_c - p["well_c"]) / p["well_width_c"]) ** 2)
     level = level + p["turn"] * np.arctan((cavity_c - p["turn_c"]) / p["turn_width_c"])
@@ -88,7 +88,7 @@ def made(parameters: dict[str, Any], scale_dph: float, offset_dph: float) -> Bia
     return BiasMap(parameters, scale_dph, offset_dph, _spline(parameters))
 
 
-def shape_over_range(parameters: dict[str, Any]) -> Array:
+def shape_over_range(parameters: dict[str, Any]) -> FloatArray:
     """The shape on a grid over the operating range, shape (T, dT/dt)."""
     grid_c, grid_slope = np.meshgrid(
         np.linspace(*T_RANGE_C, 118), np.linspace(-R_LIMIT_C_PER_MIN, R_LIMIT_C_PER_MIN, 25), indexing="ij"

@@ -10,18 +10,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, lfiltic
+
+from ..common.arrays import FloatArray
 
 if TYPE_CHECKING:
     from .scenario import Chamber
 
 __all__ = ["air"]
 
-Array = NDArray[np.float64]
 
-
-def air(chamber: Chamber, programme_c: Array, dt_s: float, rng: np.random.Generator) -> Array:
+def air(chamber: Chamber, programme_c: FloatArray, dt_s: float, rng: np.random.Generator) -> FloatArray:
     """Air temperature for a programme on a grid of `dt_s`, C; starts settled on its first value."""
     offset = rng.normal(0.0, chamber.setpoint_sigma_c)
     phase = rng.uniform(0.0, 2.0 * np.pi)
@@ -31,7 +30,7 @@ def air(chamber: Chamber, programme_c: Array, dt_s: float, rng: np.random.Genera
     return np.asarray(programme_c[0] + settled + offset + ripple)
 
 
-def _follow(chamber: Chamber, departure_c: Array, dt_s: float) -> Array:
+def _follow(chamber: Chamber, departure_c: FloatArray, dt_s: float) -> FloatArray:
     """The loop's answer to a programme that starts at 0, exact for one that is linear between the points."""
     omega = 2.0 * chamber.damping / chamber.lag_s
     plant = ([omega**2], [1.0, 2.0 * chamber.damping * omega, omega**2])

@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
+
+from ..common.arrays import FloatArray
 
 if TYPE_CHECKING:
     from .scenario import Channel
 
-__all__ = ["readings", "true_values"]
-
-Array = NDArray[np.float64]
+__all__ = ["channel_readings", "channel_values"]
 
 
-def true_values(channel: Channel, air_c: Array, dt_s: float, rng: np.random.Generator) -> Array:
+def channel_values(channel: Channel, air_c: FloatArray, dt_s: float, rng: np.random.Generator) -> FloatArray:
     """What the quantity really does: level, a part that goes with the air, a wandering part, steps."""
     points = len(air_c)
     value = channel.level + channel.per_air_c * (air_c - 20.0)
@@ -32,6 +31,6 @@ def true_values(channel: Channel, air_c: Array, dt_s: float, rng: np.random.Gene
     return np.asarray(value)
 
 
-def readings(channel: Channel, true: Array, rng: np.random.Generator) -> Array:
+def channel_readings(channel: Channel, true: FloatArray, rng: np.random.Generator) -> FloatArray:
     """What the recorder reads of it."""
     return np.asarray(true + rng.normal(0.0, channel.noise, len(true)))

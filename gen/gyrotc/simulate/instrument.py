@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..causes.base import Scene
+from ..common.arrays import FloatArray
 from ..common.ceilings import need_memory
 from ..target.operators import first_order
-from . import chamber, channels, noise, profile, thermal
+from . import chamber, noise, profile, thermal
 from .biasmap import BiasMap
+from .channels import channel_readings, channel_values
 from .internal import internal_of, internal_readings
 from .noise import CELL_S
 from .scenario import Gyro, Profile, Scenario, ScenarioCause
@@ -20,7 +21,6 @@ from .thermometers import quantised_c
 
 __all__ = ["SimulatedRecord", "record", "thermal_network"]
 
-Array = NDArray[np.float64]
 _ARRAYS = 24  # of a value a second, besides nodes and channels
 
 
@@ -44,16 +44,16 @@ class SimulatedRecord:
         seeds: For what is finer than a cell.
     """
 
-    reading_c: Array
-    channels: dict[str, Array]
-    states: dict[str, Array]
-    air_c: Array
-    cavity_c: Array
-    bias_dph: Array
-    true_arcsec: Array
-    rough_arcsec: Array
-    angle_arcsec: Array
-    white_arcsec: Array
+    reading_c: FloatArray
+    channels: dict[str, FloatArray]
+    states: dict[str, FloatArray]
+    air_c: FloatArray
+    cavity_c: FloatArray
+    bias_dph: FloatArray
+    true_arcsec: FloatArray
+    rough_arcsec: FloatArray
+    angle_arcsec: FloatArray
+    white_arcsec: FloatArray
     quantum_arcsec: float
     power_on_s: float
     seeds: np.random.SeedSequence
@@ -105,7 +105,7 @@ def _need_room(scenario: Scenario, first: int, cells: int) -> None:
     need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
 
 
-def _of_record(columns: dict[str, Array], inside: slice) -> dict[str, Array]:
+def _of_record(columns: dict[str, FloatArray], inside: slice) -> dict[str, FloatArray]:
     return {name: values[inside][:-1] for name, values in columns.items()}
 
 
@@ -132,12 +132,12 @@ def _cells(minutes: float) -> int:
     return round(60.0 * minutes / CELL_S)
 
 
-def _integral(bias_dph: Array) -> Array:
+def _integral(bias_dph: FloatArray) -> FloatArray:
     steps = 0.5 * CELL_S * (bias_dph[1:] + bias_dph[:-1])
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-def _read_angle(angle: Array, quantum_arcsec: float, seeds: np.random.SeedSequence) -> Array:
+def _read_angle(angle: FloatArray, quantum_arcsec: float, seeds: np.random.SeedSequence) -> FloatArray:
     if not quantum_arcsec:
         return angle
     phase = np.random.default_rng(seeds.spawn(1)[0]).random(len(angle))
@@ -146,10 +146,10 @@ def _read_angle(angle: Array, quantum_arcsec: float, seeds: np.random.SeedSequen
 
 def _scene(
     scenario: Scenario, run: Profile, points: int, day: float, seeds: np.random.SeedSequence
-) -> tuple[Array, dict[str, Array], Scene, dict[str, Array]]:
+) -> tuple[FloatArray, dict[str, FloatArray], Scene, dict[str, FloatArray]]:
     """Air, nodes, what causes see of them, and channels from the start of the programme on."""
     chamber_seeds, channel_seeds = seeds.spawn(2)
-    time_s: Array = CELL_S * np.arange(points, dtype=np.float64)
+    time_s: FloatArray = CELL_S * np.arange(points, dtype=np.float64)
     limit = scenario.chamber.max_c_per_min
     programme = profile.corners(run.steps, run.start_c, float(time_s[-1]), limit)
     programmed = profile.sample(programme, time_s)
@@ -160,7 +160,7 @@ def _scene(
     by_name = dict(zip(network.names, nodes_c, strict=True))
     node_c = by_name[scenario.sensor.node]
     true_channels = {
-        channel.name: channels.true_values(channel, air_c, CELL_S, np.random.default_rng(child))
+        channel.name: channel_values(channel, air_c, CELL_S, np.random.default_rng(child))
         for channel, child in zip(scenario.channel, channel_seeds.spawn(len(scenario.channel)), strict=True)
     }
     scene = Scene(
@@ -178,10 +178,10 @@ def _scene(
 def _bias(
     scenario: Scenario,
     scene: Scene,
-    true_channels: dict[str, Array],
+    true_channels: dict[str, FloatArray],
     bias_map: BiasMap,
     seeds: np.random.SeedSequence,
-) -> tuple[Scene, Array]:
+) -> tuple[Scene, FloatArray]:
     """The scene with what the causes make of it, and the bias in deg/h."""
     causes = [(CATALOGUE[cause.id], cause) for cause in scenario.cause]
     for term, cause in causes:
@@ -198,21 +198,21 @@ def _bias(
     return scene, bias
 
 
-def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, Array]) -> Scene:
+def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, FloatArray]) -> Scene:
     return scene if cause.channel is None else replace(scene, channel=true_channels[cause.channel])
 
 
-def _readings(scenario: Scenario, sensed_c: Array, rng: np.random.Generator) -> Array:
+def _readings(scenario: Scenario, sensed_c: FloatArray, rng: np.random.Generator) -> FloatArray:
     sensor = scenario.sensor
     reading = sensed_c + sensor.offset_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
     return quantised_c(reading, sensor.resolution_c)
 
 
 def _channel_readings(
-    scenario: Scenario, true_channels: dict[str, Array], seeds: np.random.SeedSequence
-) -> dict[str, Array]:
+    scenario: Scenario, true_channels: dict[str, FloatArray], seeds: np.random.SeedSequence
+) -> dict[str, FloatArray]:
     children = seeds.spawn(len(scenario.channel))
     return {
-        channel.name: channels.readings(channel, true_channels[channel.name], np.random.default_rng(child))
+        channel.name: channel_readings(channel, true_channels[channel.name], np.random.default_rng(child))
         for channel, child in zip(scenario.channel, children, strict=True)
     }

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes.base import Scene
-from .channels import true_values
+from ..common.arrays import FloatArray
+from .channels import channel_values
 from .laser import LaserStates, laser_bias, laser_readings, laser_states
 from .noise import CELL_S
 from .scenario import Channel, Scenario
@@ -18,7 +18,6 @@ from .thermometers import thermometer_readings
 
 __all__ = ["Internal", "internal_of", "internal_readings"]
 
-Array = NDArray[np.float64]
 _REFERENCE_C = 20.0  # at which the parameters of a difference hold, as those of the laser
 
 
@@ -33,14 +32,14 @@ class Internal:
         states: What truth keeps; empty where the scenario has neither thermometers nor differences nor laser.
     """
 
-    bias_dph: Array
-    nodes_c: Mapping[str, Array]
+    bias_dph: FloatArray
+    nodes_c: Mapping[str, FloatArray]
     laser: LaserStates | None
-    states: dict[str, Array]
+    states: dict[str, FloatArray]
 
 
 def internal_of(
-    scenario: Scenario, nodes_c: Mapping[str, Array], scene: Scene, rng: np.random.Generator
+    scenario: Scenario, nodes_c: Mapping[str, FloatArray], scene: Scene, rng: np.random.Generator
 ) -> Internal:
     """Differences and laser of a run; `rng` draws what no temperature moves."""
     bias = np.zeros(len(scene.time_s))
@@ -61,20 +60,20 @@ def internal_of(
         nodes_c[laser.gas_node],
         nodes_c[laser.path_node],
         scene.day,
-        true_values(wander, np.zeros(len(bias)), CELL_S, rng),
+        channel_values(wander, np.zeros(len(bias)), CELL_S, rng),
     )
     states |= {"loss_ppm": found.loss_ppm, "gain_ppm": found.gain_ppm, "stroke": found.stroke}
     return Internal(bias + laser_bias(laser, found), nodes_c, found, states)
 
 
-def _difference(one: NodeDifference, x: Array, cavity_c: Array) -> Array:
+def _difference(one: NodeDifference, x: FloatArray, cavity_c: FloatArray) -> FloatArray:
     bent = x / np.sqrt(1.0 + (x / one.saturation_c) ** 2)
     return np.asarray(one.dph_per_c * bent * (1.0 + one.growth_per_c * (cavity_c - _REFERENCE_C)))
 
 
 def internal_readings(
-    scenario: Scenario, internal: Internal, air_c: Array, scene: Scene, seeds: np.random.SeedSequence
-) -> dict[str, Array]:
+    scenario: Scenario, internal: Internal, air_c: FloatArray, scene: Scene, seeds: np.random.SeedSequence
+) -> dict[str, FloatArray]:
     """Readings of further thermometers and of the laser's signals, by column, shape (n,)."""
     of_laser, *children = seeds.spawn(1 + len(scenario.thermometer))
     readings = {

@@ -21,13 +21,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .signals import Laser
 
 __all__ = ["LaserStates", "laser_bias", "laser_readings", "laser_states"]
 
-Array = NDArray[np.float64]
 
 _REFERENCE_C = 20.0  # at which the parameters of a scenario hold
 
@@ -43,14 +42,19 @@ class LaserStates:
         path_c: Temperature of the node whose length counts, C.
     """
 
-    loss_ppm: Array
-    gain_ppm: Array
-    stroke: Array
-    path_c: Array
+    loss_ppm: FloatArray
+    gain_ppm: FloatArray
+    stroke: FloatArray
+    path_c: FloatArray
 
 
 def laser_states(
-    laser: Laser, mirror_c: Array, gas_c: Array, path_c: Array, day: float, contamination_ppm: Array
+    laser: Laser,
+    mirror_c: FloatArray,
+    gas_c: FloatArray,
+    path_c: FloatArray,
+    day: float,
+    contamination_ppm: FloatArray,
 ) -> LaserStates:
     """States of the laser from the true temperatures of its nodes, C, shape (n,).
 
@@ -67,7 +71,7 @@ def laser_states(
     )
 
 
-def _fringes(laser: Laser, mirror_c: Array, path_c: Array) -> Array:
+def _fringes(laser: Laser, mirror_c: FloatArray, path_c: FloatArray) -> FloatArray:
     """How much longer the path is than at 20 C, half wavelengths."""
     warmer = path_c - _REFERENCE_C
     longer = laser.expansion_ppm_per_c * warmer + laser.expansion_ppm_per_c2 * warmer**2
@@ -75,7 +79,7 @@ def _fringes(laser: Laser, mirror_c: Array, path_c: Array) -> Array:
     return np.asarray(path_nm / (0.5 * laser.wavelength_nm))
 
 
-def _stroke(fringes: Array, reset_share: float) -> Array:
+def _stroke(fringes: FloatArray, reset_share: float) -> FloatArray:
     """Fringes less the mode that the control holds; it takes the nearest mode at the start and where it must jump."""
     order = float(np.round(fringes[0]))
     orders = np.empty(len(fringes))
@@ -90,14 +94,14 @@ def _stroke(fringes: Array, reset_share: float) -> Array:
     return fringes - orders
 
 
-def laser_bias(laser: Laser, states: LaserStates) -> Array:
+def laser_bias(laser: Laser, states: LaserStates) -> FloatArray:
     """What losses and mirror add to the bias, deg/h, shape (n,)."""
     growth = 1.0 + laser.null_growth_per_c * (states.path_c - _REFERENCE_C)
     null = laser.null_dph_per_ppm * (states.loss_ppm - laser.loss_ppm) * growth
     return np.asarray(null + laser.stroke_dph * np.sin(np.pi * states.stroke))
 
 
-def laser_readings(laser: Laser, states: LaserStates, rng: np.random.Generator) -> dict[str, Array]:
+def laser_readings(laser: Laser, states: LaserStates, rng: np.random.Generator) -> dict[str, FloatArray]:
     """Readings of intensity and path-length voltage, V, by the names of their columns."""
     n = len(states.stroke)
     above = (states.gain_ppm / states.loss_ppm - 1.0) / (laser.gain_ppm / laser.loss_ppm - 1.0)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.truth import TrueLot
 from ..store.folder import result_folder
@@ -24,7 +24,6 @@ from .scenario import Gyro, Scenario, read
 
 __all__ = ["LotOrder", "draw_lot", "simulate_lot"]
 
-Array = NDArray[np.float64]
 Scores = dict[str, float]
 
 _KNOTS = 7  # as in `draw`
@@ -149,7 +148,7 @@ def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list
     return units
 
 
-def _truth(order: LotOrder, cluster: int, score: Array) -> TrueLot:
+def _truth(order: LotOrder, cluster: int, score: FloatArray) -> TrueLot:
     return TrueLot(
         units=order.units,
         family=order.family,
@@ -160,7 +159,7 @@ def _truth(order: LotOrder, cluster: int, score: Array) -> TrueLot:
     )
 
 
-def _mixing() -> Array:
+def _mixing() -> FloatArray:
     """Factor of the correlation of scores within a unit, shape (scores, scores)."""
     matrix = np.eye(len(SCORES))
     for (one, other), value in _CORRELATED.items():
@@ -169,7 +168,7 @@ def _mixing() -> Array:
     return np.asarray(np.linalg.cholesky(matrix))
 
 
-def _map(gyro: Gyro, scores: Scores, center: Array, family: float) -> BiasMap:
+def _map(gyro: Gyro, scores: Scores, center: FloatArray, family: float) -> BiasMap:
     """The static map: as sensitive as its lot to the extent to which the lot is a family."""
     parameters = _shape_of(scores)
     low, high = gyro.bias_dph

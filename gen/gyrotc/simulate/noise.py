@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
+
+from ..common.arrays import FloatArray
 
 if TYPE_CHECKING:
     from .scenario import NoiseLevels
 
 __all__ = ["CELL_S", "CellNoise", "bridge_arcsec", "cell_noise", "quantised", "white_sigma_arcsec"]
 
-Array = NDArray[np.float64]
 
 CELL_S = 1.0  # s: noise is drawn once a second and bridged between (docs/simulation.md)
 _SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
@@ -35,11 +35,13 @@ class CellNoise:
         white_arcsec: Standard deviation of its white part, shape (cells,).
     """
 
-    angle_arcsec: Array
-    white_arcsec: Array
+    angle_arcsec: FloatArray
+    white_arcsec: FloatArray
 
 
-def white_sigma_arcsec(levels: NoiseLevels, temperature_c: Array, slope_c_per_min: Array) -> Array:
+def white_sigma_arcsec(
+    levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray
+) -> FloatArray:
     """Standard deviation of the angle that the random walk gathers in a cell, arcsec, one for each cell.
 
     Grows by a share for each C below or above 20 C (by its sign) and for each C/min of heating or cooling.
@@ -53,7 +55,7 @@ def white_sigma_arcsec(levels: NoiseLevels, temperature_c: Array, slope_c_per_mi
 
 
 def cell_noise(
-    seeds: np.random.SeedSequence, levels: NoiseLevels, temperature_c: Array, slope_c_per_min: Array
+    seeds: np.random.SeedSequence, levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray
 ) -> CellNoise:
     """Noise of a run whose gyro has these temperatures (C) and rates (C/min), one for each cell."""
     cells = len(temperature_c)
@@ -72,7 +74,7 @@ def cell_noise(
     return CellNoise(angle, sigma)
 
 
-def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: float) -> Array:
+def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: float) -> FloatArray:
     """Flicker noise with spectral density B²/(2π f) (two-sided), a sum of Markov processes, shape (cells,).
 
     Correlation times from a cell to ten times the record, evenly in their logarithm; the variance of each is
@@ -89,7 +91,7 @@ def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: flo
     return total
 
 
-def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: Array) -> Array:
+def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: FloatArray) -> FloatArray:
     """How the white angle departs, at a cell's inner edges, from growing evenly, shape (cells, parts − 1).
 
     A Brownian bridge: with the even growth added it is a random walk with `white_arcsec` for a whole cell.
@@ -100,7 +102,7 @@ def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: Array) -> 
     return np.asarray(walk * (white_arcsec[:, None] / np.sqrt(parts)))
 
 
-def quantised(angle_arcsec: Array, quantum_arcsec: float, phase: Array) -> Array:
+def quantised(angle_arcsec: FloatArray, quantum_arcsec: float, phase: FloatArray) -> FloatArray:
     """Angle as read in steps of the quantum while dither moves it; the known dither is taken off again.
 
     `phase`: dither at the readings, quanta, uniform over 0 ... 1. The error is uniform over one quantum and

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from . import noise
 from .instrument import SimulatedRecord
@@ -19,7 +19,6 @@ from .noise import CELL_S
 
 __all__ = ["RecordingPart", "RowLength", "rows"]
 
-Array = NDArray[np.float64]
 
 _CHUNK_ROWS = 200_000  # at once: 1.6 MB a column
 _MOST = 10_000  # rows a second or seconds a row: faster than any gyro is read, slower than any is logged
@@ -66,10 +65,10 @@ class RecordingPart:
         edge_arcsec: Angle read at the rows' edges, arcsec, shape (n + 1,).
     """
 
-    time_s: Array
-    temperature_c: Array
-    channels: dict[str, Array]
-    edge_arcsec: Array
+    time_s: FloatArray
+    temperature_c: FloatArray
+    channels: dict[str, FloatArray]
+    edge_arcsec: FloatArray
 
 
 def rows(record: SimulatedRecord, length: RowLength) -> Iterator[RecordingPart]:
@@ -90,7 +89,7 @@ def rows(record: SimulatedRecord, length: RowLength) -> Iterator[RecordingPart]:
         )
 
 
-def _held(readings: Array, length: RowLength) -> Array:
+def _held(readings: FloatArray, length: RowLength) -> FloatArray:
     """Mean of the readings in each row; in rows shorter than a cell, the last reading."""
     if length.per_cell > 1:
         return np.repeat(readings, length.per_cell)
@@ -106,7 +105,7 @@ class _Fine:
         self._share = np.arange(1, parts) / parts
         self._bridges, self._phases = (np.random.default_rng(child) for child in record.seeds.spawn(2))
 
-    def edges(self, start: int, stop: int) -> Array:
+    def edges(self, start: int, stop: int) -> FloatArray:
         """Angle at the edges of all rows from cell `start` to cell `stop`, arcsec."""
         record = self._record
         inner = self._smooth(start, stop)
@@ -118,7 +117,7 @@ class _Fine:
         edges[:-1].reshape(-1, self._parts)[:, 1:] = inner
         return edges
 
-    def _smooth(self, start: int, stop: int) -> Array:
+    def _smooth(self, start: int, stop: int) -> FloatArray:
         """Bias linear within the cell, noise grown evenly, shape (cells, parts − 1)."""
         record, share = self._record, self._share
         bias = record.bias_dph[start : stop + 1, None]

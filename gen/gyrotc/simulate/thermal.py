@@ -12,12 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-__all__ = ["ThermalNetwork"]
+from ..common.arrays import FloatArray
 
-Array = NDArray[np.float64]
+__all__ = ["ThermalNetwork"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +32,21 @@ class ThermalNetwork:
     """
 
     names: tuple[str, ...]
-    capacity: Array
-    to_air: Array
-    between: Array
-    power: Array
+    capacity: FloatArray
+    to_air: FloatArray
+    between: FloatArray
+    power: FloatArray
 
-    def laplacian(self) -> Array:
+    def laplacian(self) -> FloatArray:
         """L in C dT/dt = −L T + G_air T_air + P, W/K, shape (n, n)."""
         return np.asarray(np.diag(self.to_air + self.between.sum(axis=1)) - self.between)
 
-    def steady(self, air_c: float, on: bool) -> Array:
+    def steady(self, air_c: float, on: bool) -> FloatArray:
         """Temperatures after a long time at `air_c`, C, shape (n,)."""
         heat = self.to_air * air_c + (self.power if on else 0.0)
         return np.asarray(np.linalg.solve(self.laplacian(), heat))
 
-    def respond(self, air_c: Array, on: Array, dt_s: float) -> Array:
+    def respond(self, air_c: FloatArray, on: FloatArray, dt_s: float) -> FloatArray:
         """Temperatures of all nodes over time, from the steady state at the first air temperature, power off.
 
         Args:
@@ -71,7 +70,7 @@ class ThermalNetwork:
         return np.asarray(out @ np.array(modes))
 
 
-def _mode(step: float, sloped: Array, held: Array, start: float) -> Array:
+def _mode(step: float, sloped: FloatArray, held: FloatArray, start: float) -> FloatArray:
     """dm/dt = sloped + held − m, time in units of the mode's time constant, on a grid of `step`.
 
     `sloped` is linear between the points, `held` constant after each.

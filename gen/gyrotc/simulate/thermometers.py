@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..target.operators import first_order
 from .signals import Thermometer
 
 __all__ = ["quantised_c", "thermometer_readings"]
 
-Array = NDArray[np.float64]
-
 
 def thermometer_readings(
-    one: Thermometer, node_c: Array, air_c: Array, time_s: Array, day: float, rng: np.random.Generator
-) -> Array:
+    one: Thermometer,
+    node_c: FloatArray,
+    air_c: FloatArray,
+    time_s: FloatArray,
+    day: float,
+    rng: np.random.Generator,
+) -> FloatArray:
     """What a thermometer shows, C.
 
     Args:
@@ -33,7 +36,7 @@ def thermometer_readings(
     return quantised_c(shown + rng.normal(0.0, one.noise_c, len(shown)), one.resolution_c)
 
 
-def quantised_c(reading_c: Array, resolution_c: float) -> Array:
+def quantised_c(reading_c: FloatArray, resolution_c: float) -> FloatArray:
     """Readings in whole steps of a converter, C; 0: as they are."""
     if not resolution_c:
         return reading_c

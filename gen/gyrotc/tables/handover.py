@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed
 from ..model import Envelope, Model, Network
 from .gradient import largest_gradient
@@ -26,8 +27,6 @@ __all__ = ["Axis", "handover_error_dph", "regions"]
 # Of T and of dT/dt: the bound is loose by what a share grows within a cell, the time grows with their number
 _CELLS = (256, 128)
 _LOG2E = 1.4426950408889634  # log2(e)
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +40,7 @@ class Axis:
     factor: float
     offset: float
     limits: tuple[float, float]
-    edges: Floats
+    edges: FloatArray
     moved: float
 
 
@@ -54,13 +53,13 @@ class _Ramps:
     """
 
     envelope: tuple[float, float]
-    edges: Floats
+    edges: FloatArray
     rises: NDArray[np.bool_]
     falls: NDArray[np.bool_]
-    near: Floats
-    error: Floats
+    near: FloatArray
+    error: FloatArray
 
-    def shares(self, x: Floats) -> Floats:
+    def shares(self, x: FloatArray) -> FloatArray:
         """The model's shares at coordinates x, shape (n, len(x)); below 0 outside the region."""
         width = self.edges[:, 1] - self.edges[:, 0]
         up = (x[None, :] - self.edges[:, :1]) / width[:, None]
@@ -68,13 +67,13 @@ class _Ramps:
         share = np.where(self.rises[:, None], np.minimum(up, 1.0), 1.0)
         return np.where(self.falls[:, None], np.minimum(down, share), share)
 
-    def lines(self, cells: int) -> Floats:
+    def lines(self, cells: int) -> FloatArray:
         """Coordinates of a grid over the envelope that has every edge among its lines."""
         low, high = self.envelope
         points = np.concatenate([np.linspace(low, high, cells + 1), self.edges.ravel(), self.near.ravel()])
         return np.unique(np.clip(points[np.isfinite(points)], low, high))
 
-    def count(self, x: Floats) -> NDArray[np.bool_]:
+    def count(self, x: FloatArray) -> NDArray[np.bool_]:
         """Whether a network can count between two lines, shape (n, len(x) - 1)."""
         if x.size == 1:
             return (x >= self.near[:, :1]) & (x <= self.near[:, 1:])
@@ -161,7 +160,7 @@ def _ramps(axis: Axis, pairs: list[tuple[float, float]], limits: tuple[float, fl
     )
 
 
-def _over_cells(values: Floats, least: np.ufunc) -> Floats:
+def _over_cells(values: FloatArray, least: np.ufunc) -> FloatArray:
     """`least` (or greatest) of the corners of every cell; a single line is a cell of its own."""
     for axis in (0, 1):
         n = values.shape[axis]
@@ -172,7 +171,9 @@ def _over_cells(values: Floats, least: np.ufunc) -> Floats:
     return values
 
 
-def _apart(model: Model, axes: tuple[Axis, Axis], lines: list[Floats], counts: NDArray[np.bool_]) -> Floats:
+def _apart(
+    model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]
+) -> FloatArray:
     """Bound of how far apart the networks are that count in a cell, deg/h."""
     center, half = model.scale.temperature_c
     inputs = [(x - a.offset) / a.factor for x, a in zip(lines, axes, strict=True)]
@@ -188,7 +189,7 @@ def _apart(model: Model, axes: tuple[Axis, Axis], lines: list[Floats], counts: N
     return np.where(counts.any(axis=0), high - low, 0.0)
 
 
-def _values(model: Model, network: Network, z: list[Floats]) -> tuple[Floats, Floats, float]:
+def _values(model: Model, network: Network, z: list[FloatArray]) -> tuple[FloatArray, FloatArray, float]:
     """A network on the grid, bounds of its slopes in normalised inputs, and of what its parts can make, deg/h."""
     center, half = model.scale.temperature_c
     centers = np.array([((t - center) / half, r / model.scale.slope_c_per_min) for t, r in network.centers])

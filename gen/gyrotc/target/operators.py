@@ -7,15 +7,16 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
+
 __all__ = ["delayed", "first_order", "play"]
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", bound=np.generic)
 
 _UNIFORM = 1e-6  # largest departure of a row period from their mean that still counts as even, relative
 
 
-def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
+def first_order(tau_s: float, time_s: FloatArray, driven: FloatArray) -> FloatArray:
     """tau dz/dt = driven − z, exact for an input linear between the samples; starts at rest on the first one.
 
     Args:
@@ -37,7 +38,7 @@ def first_order(tau_s: float, time_s: Array, driven: Array) -> Array:
     return _affine_scan(np.concatenate(([0.0], 1.0 - lost)), np.concatenate((driven[:1], forced)))
 
 
-def _even_lag(decay: float, offset: Array) -> Array:
+def _even_lag(decay: float, offset: FloatArray) -> FloatArray:
     """z_k = decay z_(k−1) + offset_k, as a triangular band of equations: `scipy.signal` takes 0.7 s to import."""
     from scipy.linalg.lapack import dtbtrs  # which commands that filter nothing need not spend time on
 
@@ -46,7 +47,7 @@ def _even_lag(decay: float, offset: Array) -> Array:
     return np.asarray(dtbtrs(band, offset[:, None], uplo="L", diag="U")[0][:, 0])
 
 
-def _affine_scan(factor: Array, offset: Array) -> Array:
+def _affine_scan(factor: FloatArray, offset: FloatArray) -> FloatArray:
     """z_k = factor_k z_(k−1) + offset_k for all k: affine maps composed over distances 1, 2, 4, ..."""
     step = 1
     while step < len(factor):
@@ -72,6 +73,6 @@ def play(width: Any, temperature: NDArray[Number]) -> NDArray[Number]:
     return np.asarray(np.clip(temperature[0], low, high))
 
 
-def delayed(shift_s: float, time_s: Array, values: Array) -> Array:
+def delayed(shift_s: float, time_s: FloatArray, values: FloatArray) -> FloatArray:
     """values(t − shift), linear between samples; beyond the record its first and last value."""
     return np.interp(time_s - shift_s, time_s, values)

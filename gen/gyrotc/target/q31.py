@@ -11,6 +11,7 @@ from decimal import ROUND_HALF_EVEN, Context, Decimal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import IntArray
 from .numbers import divided
 from .table import ARRAYS, Table, Words
 
@@ -40,8 +41,6 @@ GAUSS_ERROR = 2.9e-8
 _FULL_SHARE = 2**24  # one, in 2^-24
 _LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
 
-Integers = NDArray[np.int64]
-
 
 def exp2_table() -> NDArray[np.uint64]:
     """round(2052389455 · 2^(-i/64)), i = 0 ... 63."""
@@ -65,17 +64,17 @@ def exp2(u: NDArray[np.uint64]) -> NDArray[np.uint64]:
 class Points:
     """Inputs over the envelope, 0 ... 2^16 - 1."""
 
-    x_t: Integers
-    x_r: Integers
+    x_t: IntArray
+    x_r: IntArray
 
 
-def normalise(table: Table, x: Integers) -> Points:
+def normalise(table: Table, x: IntArray) -> Points:
     """What the network sees of inputs (T, slope per block in 2^-16 C) inside the envelope, shape (n, 2)."""
     low_t, _, low_r, _ = (int(v) for v in table.numbers(table.envelope))
     return Points(_position(x[:, 0], low_t, table.scale[0]), _position(x[:, 1], low_r, table.scale[1]))
 
 
-def _position(x: Integers, low: int, gain: int) -> Integers:
+def _position(x: IntArray, low: int, gain: int) -> IntArray:
     offset = (x - low).astype(np.uint64) << np.uint64(5)
     return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
 
@@ -85,11 +84,11 @@ def biases(table: Table, points: Points) -> Words:
     networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
     if len(networks) == 1:
         return _bits(_network(table, networks[0], 0, points))
-    total: Integers = np.zeros_like(points.x_t)
-    shares: Integers = np.zeros_like(points.x_t)
+    total: IntArray = np.zeros_like(points.x_t)
+    shares: IntArray = np.zeros_like(points.x_t)
     first = 0
     for network in networks:
-        share: Integers = np.minimum(_share(network[4:6], points.x_t), _share(network[6:8], points.x_r))
+        share: IntArray = np.minimum(_share(network[4:6], points.x_t), _share(network[6:8], points.x_r))
         total = total + share * _network(table, network, first, points)
         shares = shares + share
         first += int(network[0])
@@ -97,17 +96,17 @@ def biases(table: Table, points: Points) -> Words:
     return _bits(np.where(shares > 0, blended, table.numbers([table.fallback])[0]))
 
 
-def stand_in(table: Table, number: int, points: Points) -> Integers:
+def stand_in(table: Table, number: int, points: Points) -> IntArray:
     """What the network of this number, from 1 on, makes of inputs."""
     networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
     return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
 
 
-def _bits(bias: Integers) -> Words:
+def _bits(bias: IntArray) -> Words:
     return bias.astype(np.int32).view(np.uint32)
 
 
-def _network(table: Table, network: Integers, first: int, points: Points) -> Integers:
+def _network(table: Table, network: IntArray, first: int, points: Points) -> IntArray:
     """One network, whose centers stand from record `first` on; units of the bias."""
     narrow = int(table.scale[2])
     count, w0, linear_t, linear_r = (int(n) for n in network[:4])
@@ -123,7 +122,7 @@ def _network(table: Table, network: Integers, first: int, points: Points) -> Int
     return np.asarray(w0 + (acc >> 29))
 
 
-def _share(region: Integers, x: Integers) -> Integers:
+def _share(region: IntArray, x: IntArray) -> IntArray:
     """Share of a network by one input, in 2^-24, before the blend is divided by their sum."""
     low, high = (int(edge) for edge in region)
     share = np.full_like(x, _FULL_SHARE)
@@ -134,7 +133,7 @@ def _share(region: Integers, x: Integers) -> Integers:
     return share
 
 
-def cells(points: Points, counts: tuple[int, int]) -> Integers:
+def cells(points: Points, counts: tuple[int, int]) -> IntArray:
     """Cells of a grid of so many over the envelope, (T, slope), shape (n, 2)."""
     n_t, n_r = counts
     return np.stack([(points.x_t * n_t) >> 16, (points.x_r * n_r) >> 16], axis=1)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import IntArray
 from . import f32, q31
 from .follow import FALLBACK as FALLEN
 from .follow import MAP, Steps
@@ -23,7 +24,6 @@ from .table import ARRAYS, Table, Words
 __all__ = ["Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
 
 Numbers = NDArray[Any]
-Whole = NDArray[np.int64]
 
 
 class Rule:
@@ -51,8 +51,8 @@ class SigmaEvidence:
     slope: Numbers
     drift: Numbers
     sure: NDArray[np.bool_]
-    age: Whole
-    since: Whole
+    age: IntArray
+    since: IntArray
     low: Numbers
     high: Numbers
     away: tuple[NDArray[np.bool_], ...]
@@ -104,7 +104,9 @@ def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Nu
     return np.concatenate([of.accumulate(part) for part in parts])
 
 
-def _drift(table: Table, steps: Steps, began: Whole, blocks: Whole) -> tuple[NDArray[np.bool_], Numbers]:
+def _drift(
+    table: Table, steps: Steps, began: IntArray, blocks: IntArray
+) -> tuple[NDArray[np.bool_], Numbers]:
     """Whether the slope is known, and it: that of the window, or from the start of the front end on."""
     warming = (steps.remarks & WARMING) != 0
     young = (blocks >= 2) & (blocks < table.slope_blocks)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from .data import Scaling, TrainingData
 from .evidence import fit_process
@@ -23,7 +23,6 @@ from .simple import FLAT
 
 __all__ = ["BesideSmooth", "Bumps", "beside_smooth", "find_bumps"]
 
-Floats = NDArray[np.float64]
 
 _WIDTHS_C = (1.0, 1.4, 2.0)  # tried; one wider bump in the place of two narrow ones would stay there
 _LIMITS_C = (0.6, 3.5)  # refined; blocks of 10 s at 5 C/min are 0.8 C long, wider ones the process follows
@@ -57,7 +56,7 @@ class Bumps:
     heights_dph: tuple[float, ...]
     range_c: tuple[float, float]
 
-    def __call__(self, temperature_c: Floats) -> Floats:
+    def __call__(self, temperature_c: FloatArray) -> FloatArray:
         """Their sum at temperatures, deg/h, same shape."""
         total = np.zeros(np.shape(temperature_c))
         t = np.clip(temperature_c, *self.range_c)
@@ -116,7 +115,7 @@ class BesideSmooth:
     """
 
     def __init__(
-        self, data: TrainingData, weight: Floats, sigma: float, scaling: Scaling, seconds: float
+        self, data: TrainingData, weight: FloatArray, sigma: float, scaling: Scaling, seconds: float
     ) -> None:
         cell = np.floor(data.temperature_c / _CELL_C).astype(np.int64) * 1_000_003
         cell += np.floor(data.slope_c_per_min / _CELL_C_PER_MIN + 0.5).astype(np.int64)
@@ -137,7 +136,7 @@ class BesideSmooth:
         self._smooth = left[:, size > 1e-3 * size[0]]
         self.y = self.rest((y * self.root)[:, None])[:, 0]
 
-    def rest(self, columns: Floats) -> Floats:
+    def rest(self, columns: FloatArray) -> FloatArray:
         """What the splines do not hold of weighted columns, shape (n, k)."""
         return np.asarray(columns - self._smooth @ (self._smooth.T @ columns))
 
@@ -176,18 +175,18 @@ class _Search:
         widths = np.exp(log_widths)
         return Bumps(tuple(centers.tolist()), tuple(widths.tolist()), tuple(heights.tolist()), self.range)
 
-    def _with_next(self, x: Floats) -> Floats:
+    def _with_next(self, x: FloatArray) -> FloatArray:
         """The bump that explains most of what these leave, added to them."""
         held = np.linalg.qr(self._columns(x))[0]
         own = self.candidates - held @ (held.T @ self.candidates)
         power = np.einsum("ij,ij->j", own, own)
         able = power > _OWN * self.energy
-        gain: Floats = np.where(able, (own.T @ self._solved(x)[1]) ** 2 / np.where(able, power, 1.0), 0.0)
+        gain: FloatArray = np.where(able, (own.T @ self._solved(x)[1]) ** 2 / np.where(able, power, 1.0), 0.0)
         center, width = self.tried[:, int(gain.argmax())]
         centers, widths = np.split(x, 2)
         return np.asarray(np.r_[centers, center, widths, np.log(width)])
 
-    def _without_least(self, x: Floats) -> Floats:
+    def _without_least(self, x: FloatArray) -> FloatArray:
         """These bumps without the one whose loss, with the heights of the others fitted anew, is least."""
         columns = self._columns(x)
         q, r = np.linalg.qr(columns)
@@ -196,7 +195,7 @@ class _Search:
         loss = heights**2 / np.einsum("ij,ij->i", inverse, inverse)
         return np.delete(x.reshape(2, -1), int(loss.argmin()), axis=1).reshape(-1)
 
-    def _refined(self, x: Floats) -> tuple[Floats, float]:
+    def _refined(self, x: FloatArray) -> tuple[FloatArray, float]:
         """Places and widths by least squares, and the sum of squares that is left."""
         from scipy.optimize import least_squares
 
@@ -209,21 +208,21 @@ class _Search:
         )
         return np.asarray(solved.x), 2.0 * float(solved.cost)
 
-    def _solved(self, x: Floats) -> tuple[Floats, Floats]:
+    def _solved(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Heights, and what is left of the data."""
         columns = self._columns(x)
         heights = np.linalg.lstsq(columns, self.y, rcond=1e-9)[0] if x.size else np.zeros(0)
         return np.asarray(heights, dtype=np.float64), np.asarray(self.y - columns @ heights)
 
-    def _columns(self, x: Floats) -> Floats:
+    def _columns(self, x: FloatArray) -> FloatArray:
         centers, log_widths = np.split(x, 2)
         return self._rest(self._raw(centers, np.exp(log_widths)))
 
-    def _raw(self, centers: Floats, widths: Floats) -> Floats:
+    def _raw(self, centers: FloatArray, widths: FloatArray) -> FloatArray:
         return np.asarray(np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * self.root[:, None])
 
 
-def _splines(t: Floats, span: tuple[float, float], step_c: float) -> Floats:
+def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatArray:
     """Cubic B-splines over a range with knots about `step_c` apart."""
     from scipy.interpolate import BSpline  # with what it imports: not for diagnoses without a finer map
 

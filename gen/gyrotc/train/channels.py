@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
@@ -36,7 +37,6 @@ from .stand_ins import stand_in_of
 
 __all__ = ["ChannelChoice", "channel_shown", "chosen_channels", "seen_by_target", "with_channels"]
 
-Floats = NDArray[np.float64]
 
 _MOST = 4  # terms of a table: GTC_MAX_TERMS of gtc.h
 _MOST_MISSING = 0.1  # a channel that is away for longer has not been seen beside what it should explain
@@ -64,8 +64,8 @@ class ChannelChoice:
 
     trial: PartsTrial
     shapes: Mapping[str, ChannelShape]
-    added: Floats
-    effects: Mapping[str, Floats]
+    added: FloatArray
+    effects: Mapping[str, FloatArray]
     rows: tuple[ChannelTried, ...]
 
 
@@ -81,7 +81,7 @@ _OPEN = Guarded(  # as of a channel without a guard: every reading passes
 )
 
 
-def channel_shown(blocks: Blocks, column: Floats) -> CourseChannel:
+def channel_shown(blocks: Blocks, column: FloatArray) -> CourseChannel:
     """A channel as the target sees it at every correction; NaN where it shows nothing."""
     readings = with_missing(F32, F32.numbers(column), blocks.stream.position)
     guard = replace(_OPEN, missing_blocks=blocks.settings.guard.missing_blocks)
@@ -89,7 +89,7 @@ def channel_shown(blocks: Blocks, column: Floats) -> CourseChannel:
     return replace(shown, mean=shown.mean.astype(np.float64))
 
 
-def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, Floats]:
+def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, FloatArray]:
     """Recorded channels and differences of thermometers at the training samples of a run, in their units."""
     at = blocks.in_force[blocks.used]
     return {name: channel_shown(blocks, rows.channel(name)).mean[at] for name in _names(dataset)}
@@ -105,7 +105,7 @@ def _names(dataset: Dataset) -> list[str]:
 def chosen_channels(
     dataset: Dataset,
     samples: TrainingData,
-    columns: Mapping[str, Floats],
+    columns: Mapping[str, FloatArray],
     power_on: NDArray[np.int64],
     average_s: float,
 ) -> ChannelChoice | None:
@@ -143,7 +143,7 @@ def chosen_channels(
     return ChannelChoice(trial, shapes, added, effects, tuple(rows))
 
 
-def _shapes(line: ChannelShape, values: Floats, samples: TrainingData) -> tuple[ChannelShape, ...]:
+def _shapes(line: ChannelShape, values: FloatArray, samples: TrainingData) -> tuple[ChannelShape, ...]:
     """The line of a channel and what may take its place."""
     reference = line.values["reference"]
     others = [shape_of(id, values, reference, samples) for id in SHAPES if id != line.id]
@@ -180,7 +180,9 @@ def _bent(
     return replace(trial, chosen=plain.chosen, weights=weights, left_out_rms_dph=path), found
 
 
-def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingData, scaling: Scaling) -> str:
+def _objection(
+    dataset: Dataset, name: str, values: FloatArray, samples: TrainingData, scaling: Scaling
+) -> str:
     """Why a channel must not be an input; empty if it may."""
     if channel_kind(name, dataset.units) == "rate":
         return "it is a rate: it would compensate the gyro with what it measures"
@@ -199,7 +201,7 @@ def _objection(dataset: Dataset, name: str, values: Floats, samples: TrainingDat
     return ""
 
 
-def _common_noise(values: Floats, samples: TrainingData) -> float:
+def _common_noise(values: FloatArray, samples: TrainingData) -> float:
     """Correlation of second differences with those of the rate where it is more than luck; else 0."""
     next_to = (np.diff(samples.run) == 0) & (
         np.diff(samples.time_s) < 1.5 * float(np.median(samples.duration_s))
@@ -212,7 +214,7 @@ def _common_noise(values: Floats, samples: TrainingData) -> float:
     return found if found > max(_CARRIES, _SIGMAS / np.sqrt(len(x))) else 0.0
 
 
-def _less_smooth(values: Floats, samples: TrainingData, scaling: Scaling) -> Floats:
+def _less_smooth(values: FloatArray, samples: TrainingData, scaling: Scaling) -> FloatArray:
     """What no polynomial of temperature and its rate holds of a channel, whatever the noise of the bias is."""
     t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
     columns = [chebval(t, np.eye(k + 1)[k]) * r**power for k in range(_DEGREE + 1) for power in range(3)]
@@ -220,7 +222,7 @@ def _less_smooth(values: Floats, samples: TrainingData, scaling: Scaling) -> Flo
     return np.asarray(values - design @ np.linalg.lstsq(design, values, rcond=1e-9)[0])
 
 
-def _less_map(values: Floats, samples: TrainingData, process: Process, scaling: Scaling) -> Floats:
+def _less_map(values: FloatArray, samples: TrainingData, process: Process, scaling: Scaling) -> FloatArray:
     """What no map of temperature and its rate holds of a channel."""
     t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
     size = float(np.std(values)) / process.spread
@@ -229,7 +231,7 @@ def _less_map(values: Floats, samples: TrainingData, process: Process, scaling: 
 
 
 def _alike(
-    inputs: Mapping[str, Floats], samples: TrainingData, process: Process, scaling: Scaling
+    inputs: Mapping[str, FloatArray], samples: TrainingData, process: Process, scaling: Scaling
 ) -> dict[str, dict[str, float]]:
     """For every candidate those that say beside the map what it says, and their correlation."""
     left = {n: _less_map(v[:, 0], samples, process, scaling) for n, v in inputs.items()}
@@ -245,7 +247,7 @@ def _row(
     name: str,
     trial: PartsTrial,
     shapes: Mapping[str, ChannelShape],
-    parts: Mapping[str, Floats],
+    parts: Mapping[str, FloatArray],
     samples: TrainingData,
     against: str,
     alike: Mapping[str, float],

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import median
 
@@ -25,7 +26,6 @@ __all__ = [
     "weighted_mean",
 ]
 
-Floats = NDArray[np.float64]
 
 # Floors of the scale, so that a constant input is not divided by 0.
 _MIN_HALF_RANGE_C = 1.0
@@ -48,13 +48,13 @@ class TrainingData:
         duration_s: Length of the sample, s.
     """
 
-    temperature_c: Floats
-    slope_c_per_min: Floats
-    bias_dph: Floats
-    weight: Floats
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
+    bias_dph: FloatArray
+    weight: FloatArray
     run: NDArray[np.int64]
-    time_s: Floats
-    duration_s: Floats
+    time_s: FloatArray
+    duration_s: FloatArray
 
     def __len__(self) -> int:
         return len(self.bias_dph)
@@ -74,7 +74,9 @@ class Scaling:
     temperature_c: tuple[float, float]
     slope_c_per_min: tuple[float, float]
 
-    def normalise(self, temperature_c: Floats, slope_c_per_min: Floats) -> tuple[Floats, Floats]:
+    def normalise(
+        self, temperature_c: FloatArray, slope_c_per_min: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """(z_T, z_r) of inputs in C and C/min, not clamped."""
         return (
             temperature_c - self.center_c
@@ -85,10 +87,10 @@ class Scaling:
 class Bins:
     """Samples gathered into cells of the normalised input plane; arrays of shape (bins,)."""
 
-    t: Floats
-    r: Floats
-    count: Floats
-    mean: Floats
+    t: FloatArray
+    r: FloatArray
+    count: FloatArray
+    mean: FloatArray
     within: float
     samples: float
 
@@ -119,7 +121,7 @@ def cleaned(data: TrainingData) -> TrainingData:
     return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
 
 
-def _checked(data: TrainingData) -> dict[str, Floats]:
+def _checked(data: TrainingData) -> dict[str, FloatArray]:
     """Columns by name, after the checks of `cleaned`."""
     columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
@@ -187,10 +189,10 @@ class Cells:
     """
 
     edges: NDArray[np.intp] | None
-    of: Floats
-    weight: Floats
+    of: FloatArray
+    weight: FloatArray
 
-    def mean(self, x: Floats) -> Floats:
+    def mean(self, x: FloatArray) -> FloatArray:
         """Weighted means of what samples have, shape (means,)."""
         if self.edges is None:
             return x
@@ -209,14 +211,14 @@ def cells_of(data: TrainingData, length_s: float) -> Cells:
     return Cells(edges, data.weight, np.add.reduceat(data.weight, edges))
 
 
-def _mostly_above(values: Floats, bound: float) -> bool:
+def _mostly_above(values: FloatArray, bound: float) -> bool:
     """Whether the median is above a bound; most often all values are one."""
     if values.min() > bound:
         return True
     return bool(values.max() > bound and median(values) > bound)
 
 
-def weighted_mean(values: Floats, weight: Floats) -> float:
+def weighted_mean(values: FloatArray, weight: FloatArray) -> float:
     """That of `np.average`, whose checks cost more than it; the weights add up to more than 0."""
     return float((values * weight).sum() / weight.sum())
 
@@ -234,7 +236,7 @@ def _numbered(cell_t: NDArray[np.int64], cell_r: NDArray[np.int64]) -> NDArray[n
     return np.asarray((np.cumsum(there) - 1)[place])
 
 
-def gather(t: Floats, r: Floats, y: Floats, weight: Floats) -> Bins:
+def gather(t: FloatArray, r: FloatArray, y: FloatArray, weight: FloatArray) -> Bins:
     """Gathers samples at normalised inputs into cells of 1/50 of each half range.
 
     `weight` is in units of one sample: the noise variance of a sample of weight w is σ²/w.

@@ -11,19 +11,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .. import _core
+from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData
 from .evidence import MEAN_S
 from .mrbf import fit_mrbf
 
 __all__ = ["RBFNetworkRegressor"]
 
-Floats = NDArray[np.float64]
 
 _WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # times the square root of the number of inputs
 _CANDIDATES = 300  # samples as centers, drawn at random: bounds time and memory of the normal equations
@@ -38,12 +38,12 @@ class _Network:
     """w0 + linear · z + Σ w exp(−Σ ((z − c)/δ)²) at normalised inputs z."""
 
     w0: float
-    linear: Floats
-    centers: Floats
-    widths: Floats
-    weights: Floats
+    linear: FloatArray
+    centers: FloatArray
+    widths: FloatArray
+    weights: FloatArray
 
-    def __call__(self, z: Floats) -> Floats:
+    def __call__(self, z: FloatArray) -> FloatArray:
         value = self.w0 + z @ self.linear
         for center, width, weight in zip(self.centers, self.widths, self.weights, strict=True):
             value = value + weight * np.exp(-np.sum(((z - center) / width) ** 2, axis=1))
@@ -73,8 +73,8 @@ class RBFNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def fit(self, X: ArrayLike, y: ArrayLike) -> RBFNetworkRegressor:
         """Trains on X of shape (n, n_features) and y of shape (n,); raises ValueError for bad input."""
         checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
-        inputs: Floats = checked[0]
-        target: Floats = checked[1].astype(np.float64)
+        inputs: FloatArray = checked[0]
+        target: FloatArray = checked[1].astype(np.float64)
         if self.n_centers is not None and self.n_centers < 0:
             raise ValueError(f"n_centers is {self.n_centers}; expected 0 or more, or None")
         random = check_random_state(self.random_state)
@@ -92,14 +92,14 @@ class RBFNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.intercept_ = self._network.w0
         return self
 
-    def predict(self, X: ArrayLike) -> Floats:
+    def predict(self, X: ArrayLike) -> FloatArray:
         """Values at X of shape (n, n_features); inputs are clamped to their range in training."""
         check_is_fitted(self)
-        inputs: Floats = validate_data(self, X, dtype=np.float64, reset=False)
+        inputs: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
         return self._network(np.clip((inputs - self._middle) / self._half, -1.0, 1.0))
 
 
-def _two_inputs(z: Floats, y: Floats, seed: int, n_centers: int | None) -> _Network:
+def _two_inputs(z: FloatArray, y: FloatArray, seed: int, n_centers: int | None) -> _Network:
     """The default method; samples count as means that are long enough."""
     order = np.lexsort((y, z[:, 1], z[:, 0]))
     t, r, n = z[order, 0], z[order, 1], len(y)
@@ -123,7 +123,7 @@ def _two_inputs(z: Floats, y: Floats, seed: int, n_centers: int | None) -> _Netw
     )
 
 
-def _any_inputs(z: Floats, y: Floats, seed: int, n_centers: int | None) -> _Network:
+def _any_inputs(z: FloatArray, y: FloatArray, seed: int, n_centers: int | None) -> _Network:
     """Orthogonal least squares: constant, linear part, then Gaussians at samples; width and size by BIC."""
     n, d = z.shape
     places = np.unique(z, axis=0)
@@ -145,7 +145,7 @@ def _any_inputs(z: Floats, y: Floats, seed: int, n_centers: int | None) -> _Netw
     return _solved(z, y, base, places[best_chosen], best_width)
 
 
-def _solved(z: Floats, y: Floats, base: Floats, centers: Floats, width: float) -> _Network:
+def _solved(z: FloatArray, y: FloatArray, base: FloatArray, centers: FloatArray, width: float) -> _Network:
     """Weights by least squares with a slight ridge on everything but the constant."""
     n, d = z.shape
     gaussians = np.exp(-np.sum((z[:, None, :] - centers[None, :, :]) ** 2, axis=2) / width**2)

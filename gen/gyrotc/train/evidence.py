@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..common.arrays import FloatArray
 from ..common.errors import GyrotcError
 from ..common.metrics import MAD_TO_SIGMA, median
 from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
@@ -24,7 +25,6 @@ from .residual_noise import difference_sigma
 
 __all__ = ["MEAN_S", "Asked", "MapModel", "Process", "TrainingFailed", "conditioned", "fit_process"]
 
-Floats = NDArray[np.float64]
 
 MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
 _TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
@@ -50,7 +50,7 @@ class MapModel(Protocol):
     """What is asked of a model of the map in standardised units: the evidence model, or a lot with a unit's runs."""
 
     @property
-    def log_parameters(self) -> Floats: ...
+    def log_parameters(self) -> FloatArray: ...
     @property
     def sigma(self) -> float: ...
     @property
@@ -59,8 +59,8 @@ class MapModel(Protocol):
     def value(self) -> float: ...
     @property
     def evaluations(self) -> int: ...
-    def mean(self, t: Floats, r: Floats) -> Floats: ...
-    def variance(self, t: Floats, r: Floats) -> Floats: ...
+    def mean(self, t: FloatArray, r: FloatArray) -> FloatArray: ...
+    def variance(self, t: FloatArray, r: FloatArray) -> FloatArray: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +73,9 @@ class Asked:
         between_dph: Standard deviation of the constant from power-on to power-on, by the lot's units, deg/h.
     """
 
-    temperature_c: Floats
-    slope_c_per_min: Floats
-    share: Floats
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
+    share: FloatArray
     between_dph: float
 
 
@@ -98,10 +98,10 @@ class Process:
 
     model: MapModel
     bins: Bins
-    t: Floats
-    r: Floats
-    y: Floats
-    weight: Floats
+    t: FloatArray
+    r: FloatArray
+    y: FloatArray
+    weight: FloatArray
     run: NDArray[np.int64]
     kept: NDArray[np.bool_]
     center: float
@@ -109,11 +109,11 @@ class Process:
     seconds: float
     asked: Asked | None = None
 
-    def mean_dph(self, t: Floats, r: Floats) -> Floats:
+    def mean_dph(self, t: FloatArray, r: FloatArray) -> FloatArray:
         """Mean at normalised inputs, deg/h."""
         return self.center + self.spread * self.model.mean(t, r)
 
-    def variance_dph2(self, t: Floats, r: Floats) -> Floats:
+    def variance_dph2(self, t: FloatArray, r: FloatArray) -> FloatArray:
         """Variance of the mean at normalised inputs, (deg/h)²."""
         return self.spread**2 * self.model.variance(t, r)
 
@@ -163,7 +163,7 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
     return Process(model, bins, t, r, y, weight, means.run, kept, center, spread, seconds)
 
 
-def _optimised(bins: Bins, least: float, start: Floats | None) -> _core.EvidenceModel:
+def _optimised(bins: Bins, least: float, start: FloatArray | None) -> _core.EvidenceModel:
     """The best process whose σ is at least `least`: searched freely first, for the bound changes a search's path."""
     for bound in (0.0, least):
         model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples, bound)
@@ -182,8 +182,8 @@ def _optimised(bins: Bins, least: float, start: Floats | None) -> _core.Evidence
 
 
 def conditioned(
-    process: Process, t: Floats, r: Floats, bias_dph: Floats, weight: Floats
-) -> Callable[[Floats, Floats], Floats]:
+    process: Process, t: FloatArray, r: FloatArray, bias_dph: FloatArray, weight: FloatArray
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
     """Mean, deg/h, of a process with the same parameters that has seen other means, at normalised inputs.
 
     Raises:

@@ -7,7 +7,7 @@ block, window and limits, and the refits with spans left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages
 from ..model import Model
@@ -53,7 +54,6 @@ __all__ = [
     "units_of",
 ]
 
-Progress = Callable[[str], None]
 _SLOPE_WINDOW_S = 100.0  # as long as the paper's means
 HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
 _MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30

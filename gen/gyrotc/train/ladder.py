@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average, cells_of, weighted_mean
 from .evidence import MEAN_S, Process, TrainingFailed, conditioned
@@ -41,7 +42,6 @@ from .spans import Fold, history_folds
 
 __all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Ladder", "climb", "pieces_of"]
 
-Floats = NDArray[np.float64]
 
 MAPS = ("mrbf_t", "mrbf")
 RUNGS = ("nothing", *SIMPLE, *MAPS)
@@ -66,8 +66,8 @@ class Ladder:
     """
 
     folds: Sequence[Fold]
-    rms_dph: Floats
-    score: Floats
+    rms_dph: FloatArray
+    score: FloatArray
     noise_dph: float
     pieces: NDArray[np.int64]
 
@@ -114,7 +114,7 @@ class Ladder:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
         return t_statistic(of_pieces(self._gains(name), self.pieces))
 
-    def _gains(self, name: str) -> Floats:
+    def _gains(self, name: str) -> FloatArray:
         return np.asarray(self.score[:, RUNGS.index("constant")] - self.score[:, RUNGS.index(name)])
 
     def _clearly_worse(self, k: int, best: int) -> bool:
@@ -274,12 +274,12 @@ def _squares(
 class _Places:
     """Normalised inputs, and their powers: of these are the columns of all simple rungs."""
 
-    t: Floats
-    r: Floats
-    powers: Floats
+    t: FloatArray
+    r: FloatArray
+    powers: FloatArray
 
     @classmethod
-    def of(cls, t: Floats, r: Floats) -> _Places:
+    def of(cls, t: FloatArray, r: FloatArray) -> _Places:
         return cls(t, r, powers_of(t, r))
 
 
@@ -300,7 +300,7 @@ class _Taught:
         self._center = weighted_mean(rest.bias_dph, rest.weight)
         self._simple = all_solved(at.powers, rest.bias_dph - self._center, rest.weight)
 
-    def correction(self, name: str, asked: _Places) -> Floats:
+    def correction(self, name: str, asked: _Places) -> FloatArray:
         """What a rung says at places, deg/h.
 
         Raises:

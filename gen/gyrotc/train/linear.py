@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
 from .result import Outcome, network
 
 __all__ = ["fit_mlr", "fit_poly", "fit_poly_slope"]
 
-Floats = NDArray[np.float64]
 Powers = tuple[int, int]
 
 _PLANE: tuple[Powers, ...] = ((0, 0), (1, 0), (0, 1))  # powers of T and of dT/dt
@@ -71,7 +70,7 @@ def fit_poly(data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
     return _outcome(orders[k], trials[k][1], [bic for bic, _ in trials], time.process_time() - began)
 
 
-def _bic(means: TrainingData, scaling: Scaling, powers: list[Powers]) -> tuple[float, Floats]:
+def _bic(means: TrainingData, scaling: Scaling, powers: list[Powers]) -> tuple[float, FloatArray]:
     """Bayesian information criterion of a weighted least-squares fit, and its weights."""
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
     columns = np.stack([t**a * r**b for a, b in powers], axis=1)
@@ -83,7 +82,7 @@ def _bic(means: TrainingData, scaling: Scaling, powers: list[Powers]) -> tuple[f
     return n * float(np.log(max(rest / n, floor))) + len(powers) * float(np.log(n)), weights
 
 
-def _outcome(powers: list[Powers], weights: Floats, curve: list[float], seconds: float) -> Outcome:
+def _outcome(powers: list[Powers], weights: FloatArray, curve: list[float], seconds: float) -> Outcome:
     by_power = dict(zip(powers, (float(w) for w in weights), strict=True))
     linear = (by_power.pop((1, 0), 0.0), by_power.pop((0, 1), 0.0))
     w0 = by_power.pop((0, 0))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.training import MapMeans
 from .data import Scaling, TrainingData, average, gather
@@ -16,7 +16,6 @@ from .residual_noise import difference_sigma
 
 __all__ = ["UnitMeans", "means_of", "unit_means"]
 
-Floats = NDArray[np.float64]
 
 _GRID = 2.0**30  # of a spread: as many digits as a file holds
 
@@ -31,10 +30,10 @@ class UnitMeans:
         sigma_dph: Noise of a mean of count 1, deg/h.
     """
 
-    temperature_c: Floats
-    slope_c_per_min: Floats
-    bias_dph: Floats
-    count: Floats
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
+    bias_dph: FloatArray
+    count: FloatArray
     sigma_dph: float
 
 

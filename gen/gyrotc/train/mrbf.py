@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
+from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, fit_process
 from .residual_noise import not_white
@@ -25,7 +25,6 @@ from .simple import without_rate
 
 __all__ = ["fit_mrbf", "fit_mrbf_t"]
 
-Floats = NDArray[np.float64]
 
 MAX_CENTERS = 24  # bounds the time of a fit, and its table at 504 bytes
 _DEPARTURE = 0.1  # of the expected squared error: docs/training.md, section 1, step 5
@@ -140,7 +139,7 @@ def _compress(
     return sizes, good[0] if good else len(sizes) - 1, departures
 
 
-def _envelope_grid(scaling: Scaling) -> tuple[Floats, Floats]:
+def _envelope_grid(scaling: Scaling) -> tuple[FloatArray, FloatArray]:
     """Points over the whole envelope: between the samples, too, the network shall follow the process."""
     t, r = np.meshgrid(
         np.linspace(*scaling.temperature_c, _GAP_GRID[0]), np.linspace(*scaling.slope_c_per_min, _GAP_GRID[1])
@@ -148,7 +147,7 @@ def _envelope_grid(scaling: Scaling) -> tuple[Floats, Floats]:
     return scaling.normalise(t.ravel(), r.ravel())
 
 
-def evaluate(network: _core.Network, t: Floats, r: Floats) -> Floats:
+def evaluate(network: _core.Network, t: FloatArray, r: FloatArray) -> FloatArray:
     """A standardised network at normalised inputs."""
     w = network.weights
     value = w[0] + w[1] * t + w[2] * r

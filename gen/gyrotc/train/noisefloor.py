@@ -14,12 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..common.metrics import LEAST_SPAN_C
 from ..results.training import AllanPoint, BiasPlane, NoiseTerms
 
 __all__ = ["allan_variance", "noise_terms", "sensitivities", "stretches"]
 
-Floats = NDArray[np.float64]
 
 _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
@@ -27,13 +27,15 @@ _LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
 _S_PER_H = 3600.0  # s in an hour
 
 
-def stretches(values: Floats, time_s: Floats, run: NDArray[np.int64], step_s: float) -> list[Floats]:
+def stretches(
+    values: FloatArray, time_s: FloatArray, run: NDArray[np.int64], step_s: float
+) -> list[FloatArray]:
     """Values of gap-free stretches: cut where the run changes or a step of time is longer than 1.5 `step_s`."""
     cuts = np.flatnonzero((np.diff(run) != 0) | (np.diff(time_s) > 1.5 * step_s)) + 1
     return list(np.split(values, cuts))
 
 
-def allan_variance(residuals: Sequence[Floats], step_s: float) -> list[AllanPoint]:
+def allan_variance(residuals: Sequence[FloatArray], step_s: float) -> list[AllanPoint]:
     """Overlapping Allan deviation at octaves of the step, pooled over gap-free stretches (NIST SP 1065, eq. 11).
 
     Args:
@@ -56,13 +58,13 @@ def allan_variance(residuals: Sequence[Floats], step_s: float) -> list[AllanPoin
     ]
 
 
-def _differences(rates: Floats, factor: int) -> Floats:
+def _differences(rates: FloatArray, factor: int) -> FloatArray:
     """Every difference of two means over `factor` rates that follow one another: two of sums of sums."""
     angle = np.concatenate([[0.0], np.cumsum(rates - rates.mean())])
     return np.asarray(angle[2 * factor :] - 2.0 * angle[factor:-factor] + angle[: -2 * factor]) / factor
 
 
-def noise_terms(residuals: Sequence[Floats], step_s: float) -> NoiseTerms:
+def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
 
     Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
@@ -97,7 +99,7 @@ def noise_terms(residuals: Sequence[Floats], step_s: float) -> NoiseTerms:
 
 
 def sensitivities(
-    temperature_c: Floats, slope_c_per_min: Floats, bias_dph: Floats, weight: Floats
+    temperature_c: FloatArray, slope_c_per_min: FloatArray, bias_dph: FloatArray, weight: FloatArray
 ) -> BiasPlane:
     """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane."""
     root = np.sqrt(weight)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
@@ -26,7 +27,6 @@ from .result import Outcome, network
 
 __all__ = ["RIDGE", "SIZE_RULES", "fit_ols"]
 
-Floats = NDArray[np.float64]
 Dictionary = Callable[[float], _core.EqualGaussians]
 
 WIDTHS = (0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6)  # half ranges, each 1.5 times the one before
@@ -46,8 +46,8 @@ _EXCESS = 1.02  # of the noise floor: what the default ρ asks for
 class _Problem:
     """Means over `average_s` at normalised inputs, and how the size is to be chosen."""
 
-    t: Floats
-    r: Floats
+    t: FloatArray
+    r: FloatArray
     means: TrainingData
     rule: str
     rho: float
@@ -124,7 +124,7 @@ def _limit(method: str) -> int:
     return _MAX_CENTERS if method == "rbf_ols" else _NODES
 
 
-def _dictionary(method: str, t: Floats, r: Floats, seed: int) -> Dictionary:
+def _dictionary(method: str, t: FloatArray, r: FloatArray, seed: int) -> Dictionary:
     """The method's candidates, for every width the same places."""
     if method == "rbf_ols":
         n_t, n_r = _GRID
@@ -162,7 +162,7 @@ def _choice(problem: _Problem, dictionary: Dictionary, width: float) -> _Choice:
     return _Choice(float(curve[columns - 1]), width, whole, path, columns, [float(x) for x in curve])
 
 
-def _smallest(curve: Floats) -> int:
+def _smallest(curve: FloatArray) -> int:
     """Number of columns of the smallest model whose criterion is within 0.1 % of the least."""
     return int(np.argmax(curve <= curve.min() + _TOLERANCE * abs(curve.min()))) + 1
 
@@ -173,7 +173,7 @@ def _criterion(
     width: float,
     whole: _core.EqualGaussians,
     path: _core.OlsPath,
-) -> Floats:
+) -> FloatArray:
     """Mean squared error that the rule expects of each model on the path."""
     if problem.rule in ("blocks", "runs"):
         return _left_out(problem, dictionary, width, whole, len(path.chosen))
@@ -184,7 +184,7 @@ def _criterion(
     return _press(problem, whole, path) / total
 
 
-def _press(problem: _Problem, whole: _core.EqualGaussians, path: _core.OlsPath) -> Floats:
+def _press(problem: _Problem, whole: _core.EqualGaussians, path: _core.OlsPath) -> FloatArray:
     """Sum of squared errors of every sample left out alone, for each model on the path (Allen 1974)."""
     root = np.sqrt(problem.means.weight)
     places = whole.centers[np.array(path.chosen[1:], dtype=np.int64) - 1]
@@ -202,7 +202,7 @@ def _press(problem: _Problem, whole: _core.EqualGaussians, path: _core.OlsPath) 
 
 def _left_out(
     problem: _Problem, dictionary: Dictionary, width: float, whole: _core.EqualGaussians, columns: int
-) -> Floats:
+) -> FloatArray:
     """Mean squared error on parts that were left out, selection included, for every size."""
     errors, weight = np.zeros(columns), 0.0
     for inside, near in _folds(problem.means, problem.rule):

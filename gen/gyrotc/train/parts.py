@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
 from .evidence import MEAN_S, Process, conditioned, fit_process
 from .ladder import pieces_of
@@ -27,7 +28,6 @@ from .spans import Fold, history_folds
 
 __all__ = ["Parts", "PartsTrial", "bent_parts", "chosen_parts"]
 
-Floats = NDArray[np.float64]
 
 _ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
 
@@ -40,7 +40,7 @@ class Parts:
     `rivals` of a part are never taken beside it.
     """
 
-    columns: Mapping[str, Floats]
+    columns: Mapping[str, FloatArray]
     ridge: Mapping[str, float] = field(default_factory=dict)
     rivals: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
@@ -58,7 +58,7 @@ class PartsTrial:
     """
 
     chosen: tuple[str, ...]
-    weights: dict[str, Floats]
+    weights: dict[str, FloatArray]
     left_out_rms_dph: tuple[float, ...]
     gain_dph2: dict[str, float]
     stretches: int
@@ -68,9 +68,9 @@ class PartsTrial:
 class _Fold:
     """Of a stretch: normal equations of the rest, and what the process leaves of each column on the stretch."""
 
-    normal: Floats  # Uᵀ E U with y as its first column, shape (1 + k, 1 + k)
-    left: Floats  # shape (means, 1 + k)
-    weight: Floats
+    normal: FloatArray  # Uᵀ E U with y as its first column, shape (1 + k, 1 + k)
+    left: FloatArray  # shape (means, 1 + k)
+    weight: FloatArray
 
 
 def chosen_parts(
@@ -164,7 +164,7 @@ class _Course:
     scaling: Scaling
     parts: Parts
     names: tuple[str, ...]
-    table: Floats  # bias and all columns as means, shape (m, 1 + k)
+    table: FloatArray  # bias and all columns as means, shape (m, 1 + k)
     where: Mapping[str, NDArray[np.int64]]  # columns of each part in `table`
     folds: Sequence[Fold]
     pieces: NDArray[np.int64]
@@ -196,7 +196,7 @@ class _Course:
             samples, means, scaling, parts, names, table, where, folds, pieces_of(folds), average_s, noise
         )
 
-    def added(self, weights: Mapping[str, Floats]) -> Floats:
+    def added(self, weights: Mapping[str, FloatArray]) -> FloatArray:
         """What parts add to every sample, deg/h, shape (n,)."""
         total = np.zeros(len(self.samples))
         for name, beta in weights.items():
@@ -213,7 +213,7 @@ class _Course:
 
     def _less_map(
         self, process: Process, rest: NDArray[np.bool_], held: NDArray[np.bool_]
-    ) -> tuple[Floats, Floats]:
+    ) -> tuple[FloatArray, FloatArray]:
         """All columns less the process that has seen them on `rest`, there and on `held`."""
         t, r = self.scaling.normalise(self.means.temperature_c, self.means.slope_c_per_min)
         low, high = (f([t[rest], r[rest]], axis=1) for f in (np.min, np.max))
@@ -227,16 +227,16 @@ class _Course:
             left.append(column[held] - size * mean(*at))
         return np.stack(inside, axis=1), np.stack(left, axis=1)
 
-    def _averaged(self, held: NDArray[np.bool_], columns: Floats) -> Floats:
+    def _averaged(self, held: NDArray[np.bool_], columns: FloatArray) -> FloatArray:
         of = self.means.select(held)
         return np.stack(
             [average(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1
         )
 
-    def _weight(self, held: NDArray[np.bool_]) -> Floats:
+    def _weight(self, held: NDArray[np.bool_]) -> FloatArray:
         return average(self.means.select(held), self.average_s).weight
 
-    def squares(self, folds: Sequence[_Fold], chosen: Sequence[str]) -> Floats:
+    def squares(self, folds: Sequence[_Fold], chosen: Sequence[str]) -> FloatArray:
         """Mean square on every stretch with some parts, (deg/h)², shape (folds,)."""
         return np.array(
             [
@@ -245,7 +245,7 @@ class _Course:
             ]
         )
 
-    def _mix(self, normal: Floats, chosen: Sequence[str]) -> Floats:
+    def _mix(self, normal: FloatArray, chosen: Sequence[str]) -> FloatArray:
         """1 for the bias and −β for the columns, shape (1 + k,)."""
         mix = np.zeros(len(normal))
         mix[0] = 1.0
@@ -257,7 +257,7 @@ class _Course:
             mix[at] = -solved / size
         return mix
 
-    def _ridge(self, chosen: Sequence[str]) -> Floats:
+    def _ridge(self, chosen: Sequence[str]) -> FloatArray:
         return np.concatenate([np.full(len(self.where[n]), self.parts.ridge.get(n, 0.0)) for n in chosen])
 
     def choose(self, folds: Sequence[_Fold], most: int) -> list[str]:
@@ -294,7 +294,7 @@ class _Course:
             chosen.insert(chosen.index(name) + 1, simplest)
         return chosen
 
-    def _earned(self, beside: Floats, without: Floats, tried: int) -> bool:
+    def _earned(self, beside: FloatArray, without: FloatArray, tried: int) -> bool:
         """Of one of as many that are tried; over pieces of history alone: of many, stretches make too many sure."""
         gain = of_pieces(self._score(without) - self._score(beside), self.pieces)
         return self._clearly_worse(without, beside) and surely_above_0(gain, tried)
@@ -304,14 +304,14 @@ class _Course:
         closed = set(taken).union(*(self.parts.rivals.get(name, frozenset()) for name in taken))
         return [name for name in self.names if name not in closed]
 
-    def _score(self, square: Floats) -> Floats:
+    def _score(self, square: FloatArray) -> FloatArray:
         return np.asarray(0.5 * np.log(square + self.noise_dph**2))
 
-    def _clearly_worse(self, square: Floats, best: Floats) -> bool:
+    def _clearly_worse(self, square: FloatArray, best: FloatArray) -> bool:
         """By more than a standard error of the paired difference over stretches, in score and in mean square."""
         return more_than_its_error(self._score(square) - self._score(best), square - best)
 
-    def _surely_better(self, beside: Floats, without: Floats) -> bool:
+    def _surely_better(self, beside: FloatArray, without: FloatArray) -> bool:
         """Over pieces of history, or over all stretches where pieces differ by noise alone."""
         used = self.pieces >= 0
         gain = self._score(without) - self._score(beside)
@@ -320,7 +320,7 @@ class _Course:
             tests.append(gain[used])
         return any(surely_above_0(one) for one in tests)
 
-    def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, Floats]:
+    def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, FloatArray]:
         """Weights of the chosen parts from all means."""
         everything = np.ones(len(self.means), dtype=bool)
         inside, _ = self._less_map(process, everything, everything)

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median
 from .data import TrainingData, average
 
 __all__ = ["difference_sigma", "floor_dph", "not_white"]
 
-Floats = NDArray[np.float64]
 _CLIP = 4.5  # robust σ, as outliers are dropped in training (process.py)
 _SIGNIFICANCE = 1e-3  # of each test: docs/training.md, section 1, step 5
 _LAGS = 10  # of the autocorrelation, Ljung and Box 1978
 _LEAST_DIFFERENCES = 6  # with fewer a median says nothing
 
 
-def robust_sigma(x: Floats) -> float:
+def robust_sigma(x: FloatArray) -> float:
     """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
     if len(x) == 0:
         return 0.0
@@ -29,7 +29,7 @@ def robust_sigma(x: Floats) -> float:
     return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
 
 
-def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
+def floor_dph(data: TrainingData, residual: FloatArray, average_s: float) -> float:
     """Noise of means over `average_s`, deg/h, from first differences of the residual within runs.
 
     Slow structure that the map leaves does not count; samples longer than `average_s` are taken as they are.
@@ -41,7 +41,7 @@ def floor_dph(data: TrainingData, residual: Floats, average_s: float) -> float:
     return robust_sigma(differences) / float(np.sqrt(2.0))
 
 
-def difference_sigma(means: TrainingData, y: Floats, weight: Floats) -> float:
+def difference_sigma(means: TrainingData, y: FloatArray, weight: FloatArray) -> float:
     """σ of y at weight 1 from differences of neighbouring means; 0 where too few of them, or none differ.
 
     First differences count a steady slope as noise, second differences count it as nothing: the smaller of the two.
@@ -59,7 +59,7 @@ def difference_sigma(means: TrainingData, y: Floats, weight: Floats) -> float:
     return min(found, default=0.0)
 
 
-def not_white(residual: Floats, run: NDArray[np.int64], weight: Floats) -> str:
+def not_white(residual: FloatArray, run: NDArray[np.int64], weight: FloatArray) -> str:
     """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
 
     Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box). A

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..common.arrays import FloatArray
 from ..results.earlier import EarlierUse
 from ..results.lot import KnownMap, LotUse
 from .data import Scaling
@@ -16,7 +17,6 @@ from .evidence import Process
 
 __all__ = ["Fit", "Outcome", "network", "networks_dph", "predict", "rescaled", "snapped"]
 
-Floats = NDArray[np.float64]
 Network = Mapping[str, Any]
 
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
@@ -175,7 +175,7 @@ def rescaled(network: Network, old: Mapping[str, Any], new: Mapping[str, Any]) -
     }
 
 
-def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> Floats:
+def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> FloatArray:
     """Bias of the map in deg/h at inputs in C and C/min, clamped to the envelope; shapes broadcast."""
     s = fit.scaling
     t = np.clip(np.asarray(temperature_c, dtype=np.float64), *s.temperature_c)
@@ -189,8 +189,8 @@ def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> F
 
 
 def networks_dph(
-    networks: Sequence[Network], scaling: Scaling, temperature_c: Floats, slope: Floats
-) -> Floats:
+    networks: Sequence[Network], scaling: Scaling, temperature_c: FloatArray, slope: FloatArray
+) -> FloatArray:
     """Networks at inputs that are already clamped, deg/h; over the overlap of their regions blended linearly.
 
     A network's share is the distance to the nearest inner edge of its region, in lengths of the region.
@@ -216,7 +216,9 @@ def networks_dph(
     return np.asarray(total / shares)
 
 
-def _network_dph(network: Network, scaling: Scaling, temperature_c: Floats, slope: Floats) -> Floats:
+def _network_dph(
+    network: Network, scaling: Scaling, temperature_c: FloatArray, slope: FloatArray
+) -> FloatArray:
     """One network (docs/FORMAT.md, section 1), deg/h."""
     t, r = scaling.normalise(temperature_c, slope)
     bias = network["w0"] + network["linear"][0] * t + network["linear"][1] * r

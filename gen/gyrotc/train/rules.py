@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..common.arrays import FloatArray
 from ..target.operators import play
 from .data import TrainingData
 from .evidence import Process
@@ -27,7 +28,6 @@ from .result import Fit, predict
 
 __all__ = ["Known", "rezero_dph", "rules_of", "start_sigma"]
 
-Floats = NDArray[np.float64]
 
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
 _AT_REST_C_PER_MIN = 0.01  # a temperature at rest may go on like this: a tenth of what chambers hold
@@ -43,10 +43,10 @@ class Known:
     samples: TrainingData
     fit: Fit
     process: Process
-    sigma: Floats  # of the map at each sample, deg/h
+    sigma: FloatArray  # of the map at each sample, deg/h
     between: float  # of the constant from power-on to power-on, deg/h
-    covered: tuple[Floats, Floats]  # points where training was: C, C/min
-    added: Floats | float = 0.0  # what terms add to the map at each sample, deg/h
+    covered: tuple[FloatArray, FloatArray]  # points where training was: C, C/min
+    added: FloatArray | float = 0.0  # what terms add to the map at each sample, deg/h
 
 
 def rules_of(known: Known, block_s: float) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def start_sigma(
     parameters: dict[str, float],
     rules: dict[str, Any],
     samples: TrainingData,
-    channel: Floats | None,
+    channel: FloatArray | None,
 ) -> float:
     """What a term does not know of the time before it began, 1 σ: deg/h, for a play deg/h/C.
 
@@ -145,7 +145,7 @@ def _runs(samples: TrainingData) -> list[NDArray[np.int64]]:
     return list(np.split(np.arange(len(samples)), cuts))
 
 
-def _held(known: Known, here: Floats, block_s: float) -> float:
+def _held(known: Known, here: FloatArray, block_s: float) -> float:
     """deg/h for each C by which the input may have gone on at its slope."""
     s = known.samples
     squares, moved, variance = [], [], []
@@ -160,7 +160,7 @@ def _held(known: Known, here: Floats, block_s: float) -> float:
     return _balanced(*(np.concatenate(parts) for parts in (squares, moved, variance)))
 
 
-def _balanced(squares: Floats, x: Floats, variance: Floats) -> float:
+def _balanced(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
     """c with which (squares + variance)/(variance + c² x) is 1 on average; 0 where nothing moved."""
     if squares.size == 0 or not squares.any() or not x.any():
         return 0.0

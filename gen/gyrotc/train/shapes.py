@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..causes.base import Cause, History
+from ..common.arrays import FloatArray
 from ..target.recursion import TableKind
 from .data import TrainingData
 
 __all__ = ["SHAPES", "ChannelShape", "ShapeId", "shape_of"]
 
-Floats = NDArray[np.float64]
 ShapeId = Literal["line", "product", "curve"]
 
 #: The simplest first, and the kind of the record of each.
@@ -52,30 +51,30 @@ class ChannelShape:
     id: ShapeId
     cause: Cause
     values: Mapping[str, float]
-    columns: Floats
-    lost: Floats
+    columns: FloatArray
+    lost: FloatArray
 
     @property
     def is_held(self) -> bool:
         """Whether tables of both arithmetics can hold it."""
         return self.values.get("width", _NARROWEST) >= _NARROWEST
 
-    def parameters(self, weights: Floats) -> dict[str, float]:
+    def parameters(self, weights: FloatArray) -> dict[str, float]:
         """Parameters of the term with these weights."""
         assert self.cause.amplitudes is not None
         return {**self.cause.amplitudes(weights), **self.values}
 
-    def slope(self, added: Floats) -> float:
+    def slope(self, added: FloatArray) -> float:
         """Of the straight line through what it adds at every training sample, deg/h per unit."""
         line = self.columns[:, 0] - self.columns[:, 0].mean()
         return float(line @ added / (line @ line))
 
-    def doubt_dph(self, weights: Floats) -> float:
+    def doubt_dph(self, weights: FloatArray) -> float:
         """RMS over training of what the correction lacks when the channel is lost."""
         return float(np.sqrt(np.mean(((self.columns - self.lost) @ weights) ** 2)))
 
 
-def shape_of(id: ShapeId, values: Floats, reference: float, samples: TrainingData) -> ChannelShape:
+def shape_of(id: ShapeId, values: FloatArray, reference: float, samples: TrainingData) -> ChannelShape:
     """A function of a channel.
 
     Args:
@@ -94,14 +93,16 @@ def shape_of(id: ShapeId, values: Floats, reference: float, samples: TrainingDat
     return ChannelShape(id, cause, fixed, columns, lost)
 
 
-def _columns(cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: Floats) -> Floats:
+def _columns(
+    cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: FloatArray
+) -> FloatArray:
     assert cause.features is not None
     found = cause.features(History(samples.time_s, samples.temperature_c, channel=channel), fixed).columns
     # Of a line alone the reference is no parameter of its column: the constant is the map's.
     return found - fixed["reference"] if found.shape[1] == 1 else found
 
 
-def _fixed(id: ShapeId, values: Floats, reference: float, samples: TrainingData) -> dict[str, float]:
+def _fixed(id: ShapeId, values: FloatArray, reference: float, samples: TrainingData) -> dict[str, float]:
     if id == "product":
         middle_c = 0.5 * float(samples.temperature_c.min() + samples.temperature_c.max())
         return {"reference": reference, "reference_c": middle_c}

@@ -10,15 +10,14 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
 from .residual_noise import floor_dph
 from .result import Network, Outcome, network
 
 __all__ = ["SIMPLE", "all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]
 
-Floats = NDArray[np.float64]
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
@@ -50,13 +49,13 @@ def without_rate(fitted: Network) -> dict[str, Any]:
     }
 
 
-def design(name: str, t: Floats, r: Floats) -> Floats:
+def design(name: str, t: FloatArray, r: FloatArray) -> FloatArray:
     """Columns of a correction at normalised inputs, shape (n, powers)."""
     of_t = np.ones(len(t)), t, t * t, t * t * t
     return np.stack([of_t[a] * r if b else of_t[a] for a, b in SIMPLE[name]], axis=1)
 
 
-def powers_of(t: Floats, r: Floats) -> Floats:
+def powers_of(t: FloatArray, r: FloatArray) -> FloatArray:
     """The powers that corrections are made of, in an order in which those of each come first, shape (n, 5)."""
     columns = np.empty((len(t), 5), order="F")
     columns[:, 0], columns[:, 1], columns[:, 4] = 1.0, t, r
@@ -65,7 +64,7 @@ def powers_of(t: Floats, r: Floats) -> Floats:
     return columns
 
 
-def all_solved(powers: Floats, y: Floats, weight: Floats) -> dict[str, Floats]:
+def all_solved(powers: FloatArray, y: FloatArray, weight: FloatArray) -> dict[str, FloatArray]:
     """Weights of `powers_of`, 0 for those that a correction does without, of each of `SIMPLE`: as `solve` finds them.
 
     One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
@@ -85,7 +84,7 @@ def all_solved(powers: Floats, y: Floats, weight: Floats) -> dict[str, Floats]:
     return found
 
 
-def solve(columns: Floats, y: Floats, weight: Floats) -> Floats:
+def solve(columns: FloatArray, y: FloatArray, weight: FloatArray) -> FloatArray:
     """Weights of columns, shape (n, powers), by weighted least squares; of equally good ones the smallest."""
     root = np.sqrt(weight / weight.max())
     return np.asarray(np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0], dtype=np.float64)
@@ -123,7 +122,9 @@ def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float
     )
 
 
-def _as_gaussians(square: float, cube: float, tolerance: float) -> tuple[Floats, Floats, float, Floats]:
+def _as_gaussians(
+    square: float, cube: float, tolerance: float
+) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     """(constant and linear part, centers, width, weights) of square · z² + cube · z³ over |z| <= 1."""
     z = np.linspace(-1.0, 1.0, _GRID)
     target = square * z**2 + cube * z**3

@@ -19,12 +19,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..recordings.records import Run
 from ..results.training import SpanLeftOut
 
 __all__ = ["Fold", "Span", "history_folds", "training_spans", "turning_points"]
 
-Floats = NDArray[np.float64]
 
 _ENOUGH_RUNS = 3  # docs/recordings.md: fewer are cut into spans
 _EQUAL_PARTS = 5  # docs/training.md, section 2: of a single run without turning points
@@ -43,9 +43,9 @@ class Samples(Protocol):
     """Training samples in order of time within each run; arrays of one length."""
 
     @property
-    def temperature_c(self) -> Floats: ...
+    def temperature_c(self) -> FloatArray: ...
     @property
-    def time_s(self) -> Floats: ...
+    def time_s(self) -> FloatArray: ...
     @property
     def run(self) -> NDArray[np.int64]: ...
 
@@ -68,7 +68,9 @@ class Span:
     kind: Literal["branch", "part"]
     guard_s: float
 
-    def contains(self, run: NDArray[np.int64], time_s: Floats, *, guard: bool = False) -> NDArray[np.bool_]:
+    def contains(
+        self, run: NDArray[np.int64], time_s: FloatArray, *, guard: bool = False
+    ) -> NDArray[np.bool_]:
         """Which samples lie in the span, with `guard` also those in the guard gap around it."""
         gap = self.guard_s if guard else 0.0
         return np.asarray((run == self.run) & (time_s >= self.from_s - gap) & (time_s < self.to_s + gap))
@@ -87,7 +89,7 @@ class Rated(Samples, Protocol):
     """Samples with the rate of temperature."""
 
     @property
-    def slope_c_per_min(self) -> Floats: ...
+    def slope_c_per_min(self) -> FloatArray: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +191,7 @@ def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
     return tuple(spans)
 
 
-def _cut(index: int, file: str, time_s: Floats, temperature_c: Floats) -> list[Span]:
+def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -> list[Span]:
     step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     start, end = float(time_s[0]), float(time_s[-1]) + step
     turns = turning_points(time_s, temperature_c)
@@ -201,7 +203,7 @@ def _cut(index: int, file: str, time_s: Floats, temperature_c: Floats) -> list[S
     return [Span(index, file, a, b, kind, min(_GUARD_S, 0.25 * (b - a))) for a, b in pairwise(edges)]
 
 
-def turning_points(time_s: Floats, temperature_c: Floats) -> list[float]:
+def turning_points(time_s: FloatArray, temperature_c: FloatArray) -> list[float]:
     """Times at which the smoothed temperature turns by more than noise and control make it, s; arrays of shape (n,)."""
     cell = np.floor((time_s - time_s[0]) / _SMOOTHING_S).astype(np.int64)
     _, index = np.unique(cell, return_inverse=True)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import FloatArray
 from ..model import Model
 from .data import TrainingData
 from .evidence import TrainingFailed
@@ -22,7 +23,6 @@ from .uncertainty import of_few
 
 __all__ = ["StandIn", "stand_in_of"]
 
-Floats = NDArray[np.float64]
 
 _METHODS = ("mrbf", "linear", "constant")  # the first whose map keeps to the samples
 
@@ -38,11 +38,11 @@ class StandIn:
     """
 
     network: dict[str, Any]
-    added: Floats
+    added: FloatArray
     sigma_dph: float
 
 
-def stand_in_of(model: Model, samples: TrainingData, effect: Floats) -> StandIn | None:
+def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> StandIn | None:
     """The stand-in of a term; None where nothing can be fitted.
 
     Args:
@@ -68,7 +68,7 @@ def stand_in_of(model: Model, samples: TrainingData, effect: Floats) -> StandIn 
     return None
 
 
-def _next_rms(left: Floats, run: NDArray[np.int64]) -> float:
+def _next_rms(left: FloatArray, run: NDArray[np.int64]) -> float:
     """RMS to expect at the next power-on: spread within the runs, and of their means as few runs show it."""
     _, index, count = np.unique(run, return_inverse=True, return_counts=True)
     mean = np.bincount(index, left) / count

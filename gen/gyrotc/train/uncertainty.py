@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from ..common.arrays import FloatArray
 from .data import TrainingData, cleaned
 from .evidence import Process, fit_process
 from .result import Fit, predict
@@ -25,7 +26,6 @@ from .rules import Known, rules_of
 
 __all__ = ["coverage", "of_few", "uncertainty"]
 
-Floats = NDArray[np.float64]
 
 _POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
 _SPANS = 5  # a single run is cut into so many
@@ -56,7 +56,7 @@ def uncertainty(
     fit: Fit,
     cells: tuple[int, int] = (8, 5),
     block_s: float = 10.0,
-    added: Floats | float = 0.0,
+    added: FloatArray | float = 0.0,
 ) -> dict[str, Any]:
     """`uncertainty_dph` of `model.json`: 1 σ over cells of the envelope, deg/h, and the rules of what comes on top.
 
@@ -98,8 +98,8 @@ def _asked(
     fit: Fit,
     cells: tuple[int, int],
     scale: float,
-    at_samples: Floats,
-) -> tuple[NDArray[np.int64], Floats, Floats]:
+    at_samples: FloatArray,
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Where corrections are asked for, as the samples or a lot's units show: cells, variances, weights."""
     asked = process.asked
     if asked is None:
@@ -108,16 +108,16 @@ def _asked(
     return _cell(fit, cells, t, r), _variance(process, fit, t, r, scale), asked.share
 
 
-def _variance(process: Process, fit: Fit, t: Floats, r: Floats, scale: float) -> Floats:
+def _variance(process: Process, fit: Fit, t: FloatArray, r: FloatArray, scale: float) -> FloatArray:
     """Variance of the map at points, (deg/h)², without that from power-on to power-on."""
     z = fit.scaling.normalise(t, r)
     return scale * process.variance_dph2(*z) + (predict(fit, t, r) - process.mean_dph(*z)) ** 2
 
 
-def _points(fit: Fit) -> tuple[Floats, Floats]:
+def _points(fit: Fit) -> tuple[FloatArray, FloatArray]:
     """A fine grid of points over the envelope, C and C/min."""
 
-    def inner(span: tuple[float, float], n: int) -> Floats:
+    def inner(span: tuple[float, float], n: int) -> FloatArray:
         return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
 
     t, r = np.meshgrid(
@@ -126,22 +126,26 @@ def _points(fit: Fit) -> tuple[Floats, Floats]:
     return t.reshape(-1), r.reshape(-1)
 
 
-def _covered(data: TrainingData, fit: Fit, t: Floats, r: Floats) -> NDArray[np.bool_]:
+def _covered(data: TrainingData, fit: Fit, t: FloatArray, r: FloatArray) -> NDArray[np.bool_]:
     """Whether points lie in cells of the coverage that hold training samples."""
     rows = coverage(data, fit)["rows"]
     seen = np.array([[c == "1" for c in row] for row in rows]).reshape(-1)
     return np.asarray(seen[_cell(fit, (len(rows[0]), len(rows)), t, r)])
 
 
-def _cell(fit: Fit, cells: tuple[int, int], t: Floats, r: Floats) -> NDArray[np.int64]:
+def _cell(fit: Fit, cells: tuple[int, int], t: FloatArray, r: FloatArray) -> NDArray[np.int64]:
     """Number of the cell of each point, T fastest."""
     of_t = _index(t, fit.scaling.temperature_c, cells[0])
     return of_t + cells[0] * _index(r, fit.scaling.slope_c_per_min, cells[1])
 
 
 def _means(
-    cell: NDArray[np.int64], values: Floats, weight: Floats, cells: tuple[int, int], otherwise: Floats
-) -> Floats:
+    cell: NDArray[np.int64],
+    values: FloatArray,
+    weight: FloatArray,
+    cells: tuple[int, int],
+    otherwise: FloatArray,
+) -> FloatArray:
     """Weighted means by cell, a row for each cell of dT/dt; `otherwise` where a cell has none."""
     n = cells[0] * cells[1]
     total = np.bincount(cell, weight, n)
@@ -149,7 +153,7 @@ def _means(
     return np.asarray(np.where(total > 0.0, mean, otherwise.reshape(-1)).reshape(cells[::-1]))
 
 
-def _index(x: Floats, span: tuple[float, float], n: int) -> NDArray[np.int64]:
+def _index(x: FloatArray, span: tuple[float, float], n: int) -> NDArray[np.int64]:
     width = span[1] - span[0]
     if width <= 0.0:
         return np.zeros(len(x), dtype=np.int64)
@@ -189,13 +193,15 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
     return its_scale, float(between) * of_few(len(rows))
 
 
-def _least_deviance(squares: Floats, between: float) -> float:
+def _least_deviance(squares: FloatArray, between: float) -> float:
     """What no deviance lies below for a variance between runs: a square is best explained by itself, or by that."""
     total = np.maximum(squares, between)
     return float(np.sum(squares / total + np.log(total)))
 
 
-def _likeliest(squares: Floats, variance: Floats, noise: Floats, between: float) -> tuple[float, float]:
+def _likeliest(
+    squares: FloatArray, variance: FloatArray, noise: FloatArray, between: float
+) -> tuple[float, float]:
     """Least deviance and its κ² for a variance between runs.
 
     Means over a patch keep more of the noise than white noise would leave: its level is free, else κ² takes the rest.
@@ -211,7 +217,7 @@ def of_few(runs: int) -> float:
     return (runs - 1.0) / max(runs - 3.0, 1.0)
 
 
-def _surprises(process: Process, held: TrainingData, fit: Fit) -> Floats:
+def _surprises(process: Process, held: TrainingData, fit: Fit) -> FloatArray:
     """Of patches of the input plane: squared mean residual, variance of the process, variance by noise."""
     patch = _index(held.temperature_c, fit.scaling.temperature_c, _PATCHES[0])
     patch = patch + _PATCHES[0] * _index(held.slope_c_per_min, fit.scaling.slope_c_per_min, _PATCHES[1])

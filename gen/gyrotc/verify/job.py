@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import numpy as np
 
 from .. import __version__
+from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..recordings.records import Dataset
@@ -44,7 +45,6 @@ from .toolchain import Target, all_targets
 
 __all__ = ["chosen_targets", "file_entries", "verify"]
 
-Progress = Callable[[str], None]
 
 # Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
 _NEXT_PROGRAM_S = 0.05

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ..units import Conversion, conversion
 from .clockparts import form_of_parts, text_of
@@ -21,7 +22,6 @@ from .tables import Chunk, Column, LoggerTable
 
 __all__ = ["Clock"]
 
-Floats = NDArray[np.float64]
 _EPOCH_S = (
     1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
 )
@@ -102,7 +102,7 @@ class Clock:
         dated = self._stamps is not None and self._stamps.dated
         return bool(self._columns) and not self._known_zone and dated
 
-    def __call__(self, chunk: Chunk) -> Floats:
+    def __call__(self, chunk: Chunk) -> FloatArray:
         """Times of the rows of a chunk, s; NaN where there is none.
 
         Raises:
@@ -136,14 +136,14 @@ class Clock:
             raise InputError(where, repr(texts[row].as_py()), hint)
         return ns, good
 
-    def _since(self, ns: NDArray[np.int64], good: NDArray[np.bool_]) -> Floats:
+    def _since(self, ns: NDArray[np.int64], good: NDArray[np.bool_]) -> FloatArray:
         if self.origin is None and good.any():
             self.origin = int(ns[np.argmax(good)])
         result = (ns - int(self.origin or 0)) / 1e9
         result[~good] = np.nan
         return result
 
-    def _counted(self, raw: NDArray[Any]) -> Floats:
+    def _counted(self, raw: NDArray[Any]) -> FloatArray:
         assert self._unit is not None
         raw = self._unwrapped(raw)
         factor = self._unit.factor
@@ -152,7 +152,7 @@ class Clock:
             first = raw[np.argmax(finite)].item()
             self.origin = first if abs(first * factor) > _EPOCH_S else 0
         origin = self.origin or 0
-        since: Floats = (raw - raw.dtype.type(origin)).astype(np.float64)
+        since: FloatArray = (raw - raw.dtype.type(origin)).astype(np.float64)
         whole = round(1.0 / factor) if factor < 1.0 else 0
         return since / whole if whole and abs(whole * factor - 1.0) < 1e-12 else since * factor
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ..columns import Layout
 from ..evidence import Evidence
@@ -21,7 +22,6 @@ from .tables import Chunk, Column, LoggerTable
 
 __all__ = ["NAMES", "ImportedRows", "conversion_of"]
 
-Floats = NDArray[np.float64]
 NAMES = {
     "temperature": "temperature_c",
     "rate": "rate_dph",
@@ -62,7 +62,7 @@ class ImportedRows:
         self.clock = Clock(self.file, plan.main, columns, unit, plan.rate_hz, self.stated)
         self.evidence = Evidence(len(plan.values))
         self.units = {name: one for name, one in self._conversions().items() if one is not None}
-        self._held: tuple[Floats, Floats] | None = None
+        self._held: tuple[FloatArray, FloatArray] | None = None
         self._last: dict[str, float] | None = None
         self._time = np.zeros(0)
 
@@ -75,7 +75,7 @@ class ImportedRows:
         channels = tuple(choice.role for choice in self.plan.channels)
         return Layout("time_s", NAMES["temperature"], value, roles == ["pulses"], axes, channels)
 
-    def chunks(self) -> Iterator[tuple[dict[str, Floats], float]]:
+    def chunks(self) -> Iterator[tuple[dict[str, FloatArray], float]]:
         """Rows by column name, and the share of the file that was read.
 
         Raises:
@@ -112,14 +112,14 @@ class ImportedRows:
         time = self.plan.time[0].unit if self.plan.time else None
         return found | ({"time_s": conversion(time, "time")} if time else {})
 
-    def _native(self, choice: Choice, chunk: Chunk) -> Floats:
+    def _native(self, choice: Choice, chunk: Chunk) -> FloatArray:
         if choice.table is not self.plan.main:
             return self._held_at(choice)
         values = np.asarray(chunk.columns[choice.column.name]).astype(np.float64)
         unit = self.units.get(self.name_of(choice))
         return unit(values) if unit else values
 
-    def _held_at(self, choice: Choice) -> Floats:
+    def _held_at(self, choice: Choice) -> FloatArray:
         """The last reading of another table at the time of each row; NaN before its first."""
         if self._held is None:
             self._held = self._readings(choice)
@@ -131,7 +131,7 @@ class ImportedRows:
         )
         return unit(found) if unit else found
 
-    def _readings(self, choice: Choice) -> tuple[Floats, Floats]:
+    def _readings(self, choice: Choice) -> tuple[FloatArray, FloatArray]:
         table = choice.table
         clock = self._clock_of(table)
         times, values = [np.zeros(0)], [np.zeros(0)]
@@ -156,12 +156,12 @@ class ImportedRows:
         clock.origin = self.clock.origin
         return clock
 
-    def _keep_first(self, chunk: Chunk, columns: dict[str, Floats]) -> None:
+    def _keep_first(self, chunk: Chunk, columns: dict[str, FloatArray]) -> None:
         if not self.raw:
             self.raw = {name: [str(value) for value in values[:3]] for name, values in chunk.columns.items()}
             self.first_rows = {name: [float(v) for v in values[:3]] for name, values in columns.items()}
 
-    def _whole(self, columns: dict[str, Floats]) -> tuple[dict[str, Floats], NDArray[np.int64]]:
+    def _whole(self, columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], NDArray[np.int64]]:
         """Rows without a missing value, and their numbers in the chunk."""
         good = np.ones(len(columns["time_s"]), dtype=bool)
         for name, values in columns.items():
@@ -173,7 +173,9 @@ class ImportedRows:
         rows = np.flatnonzero(good)
         return ({n: v if good.all() else v[good] for n, v in columns.items()}, rows)
 
-    def _in_order(self, kept: dict[str, Floats], rows: NDArray[np.int64], chunk: Chunk) -> dict[str, Floats]:
+    def _in_order(
+        self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk
+    ) -> dict[str, FloatArray]:
         """Without rows that repeat the one before in every value; times must go on.
 
         Raises:
@@ -208,7 +210,7 @@ class ImportedRows:
             )
         raise InputError(where, found, expected)
 
-    def _check(self, kept: dict[str, Floats], rows: NDArray[np.int64], chunk: Chunk) -> None:
+    def _check(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> None:
         """Values that no gyro and no chamber gives.
 
         Raises:

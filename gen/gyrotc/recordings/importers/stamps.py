@@ -15,12 +15,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from ...common.arrays import IntArray
 from ...common.errors import InputError
 from .forms import MONTHS, pattern_of
 
 __all__ = ["Stamps", "zone_of"]
 
-Ints = NDArray[np.int64]
 _DAY_NS = 86_400_000_000_000  # 86,400 s
 
 
@@ -66,7 +66,7 @@ class Stamps:
         self._local = np.iinfo(np.int64).min
         self._last = -1
 
-    def parse(self, texts: Any) -> tuple[Ints, NDArray[np.bool_]]:
+    def parse(self, texts: Any) -> tuple[IntArray, NDArray[np.bool_]]:
         """Nanoseconds since 1970 (since midnight for a form without a date), and which texts were understood."""
         if pa.types.is_null(texts.type):
             texts = texts.cast(pa.string())
@@ -85,7 +85,7 @@ class Stamps:
             ns -= self._ahead(ns, good)
         return ns, good
 
-    def _ahead(self, local: Ints, good: NDArray[np.bool_]) -> Ints:
+    def _ahead(self, local: IntArray, good: NDArray[np.bool_]) -> IntArray:
         """Nanoseconds that local times are ahead of UTC. The hour that comes twice when summer time ends is told from
         the local time going back in it.
         """
@@ -104,12 +104,12 @@ class Stamps:
             self._local = int(local[-1])
         return first
 
-    def _over_midnight(self, ns: Ints, good: NDArray[np.bool_]) -> Ints:
+    def _over_midnight(self, ns: IntArray, good: NDArray[np.bool_]) -> IntArray:
         """Times of day that go on after midnight."""
         chosen = ns[good]
         before = np.r_[self._last if self._last >= 0 else chosen[:1], chosen[:-1]]
         falls = np.cumsum(chosen < before - _DAY_NS // 2)
-        result: Ints = ns.copy()
+        result: IntArray = ns.copy()
         result[good] = chosen + (self._midnights + falls) * _DAY_NS
         if len(chosen):
             self._midnights += int(falls[-1])
@@ -127,7 +127,7 @@ class _Parts:
     def text(self, name: str) -> Any:
         return pc.struct_field(self._parts, name)
 
-    def whole(self, name: str, absent: int = 0) -> Ints:
+    def whole(self, name: str, absent: int = 0) -> IntArray:
         if name not in self._names:
             return np.full(len(self._parts), absent, dtype=np.int64)
         text = self.text(name)
@@ -137,21 +137,21 @@ class _Parts:
     def has(self, name: str) -> bool:
         return name in self._names
 
-    def hours(self) -> Ints:
+    def hours(self) -> IntArray:
         if not self.has("I"):
             return self.whole("H")
         after_noon = pc.equal(pc.utf8_lower(pc.fill_null(self.text("p"), "a")), "p")
-        half: Ints = np.asarray(after_noon.to_numpy(zero_copy_only=False)).astype(np.int64)
+        half: IntArray = np.asarray(after_noon.to_numpy(zero_copy_only=False)).astype(np.int64)
         return self.whole("I") % 12 + 12 * half
 
-    def fraction(self) -> Ints:
+    def fraction(self) -> IntArray:
         """Nanoseconds of the fraction."""
         if not self.has("f"):
             return np.zeros(len(self._parts), dtype=np.int64)
         padded = pc.utf8_rpad(pc.fill_null(self.text("f"), ""), 9, "0")
         return np.asarray(padded.cast(pa.int64()).to_numpy(zero_copy_only=False), dtype=np.int64)
 
-    def offset(self) -> Ints:
+    def offset(self) -> IntArray:
         """Seconds east of UTC."""
         if not self.has("z"):
             return np.zeros(len(self._parts), dtype=np.int64)
@@ -169,7 +169,7 @@ def _offset_s(text: str | None) -> int:
     return zone
 
 
-def _days(get: _Parts) -> tuple[Ints, NDArray[np.bool_]]:
+def _days(get: _Parts) -> tuple[IntArray, NDArray[np.bool_]]:
     """Days since 1970, and which dates there are."""
     n = len(get.whole("M"))
     if not (get.has("d") or get.has("j")):
@@ -193,7 +193,7 @@ def _days(get: _Parts) -> tuple[Ints, NDArray[np.bool_]]:
     return dates.astype(np.int64), np.asarray(fits)
 
 
-def _offsets(ns: Ints, zone: ZoneInfo, good: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+def _offsets(ns: IntArray, zone: ZoneInfo, good: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
     """Nanoseconds that local times are ahead of UTC, the first and the second time that they come.
 
     The zone's rules are asked once for each quarter of an hour.
