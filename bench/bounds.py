@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import Coverage, Model, load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.table import Table
 from gyrotc.verify.bounds import instruction_bounds
-from gyrotc.verify.functions import function_costs
+from gyrotc.verify.sizes import function_costs
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 
 __all__ = ["MODELS", "bounds", "bounds_of", "model_of"]

@@ -20,7 +20,7 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.jobs.build import build_into
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
-from gyrotc.results.budget import Budget
+from gyrotc.results.release import Budget
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay

@@ -12,9 +12,9 @@ from collections import Counter
 from pathlib import Path
 
 from gyrotc.model import load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import NUMERICS
-from gyrotc.verify.functions import function_costs
+from gyrotc.verify.sizes import function_costs
 from gyrotc.verify.toolchain import all_targets, disassembly
 
 __all__ = ["gaussian_instructions"]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from gyrotc.train.means import UnitMeans
 from gyrotc.lot.earlier import posterior_of_means, stated_sigma_dph, widened
-from gyrotc.lot.held import held
+from gyrotc.lot.earlier import held
 from gyrotc.lot.learn import sums_of
-from gyrotc.lot.surprise import FALSE_ALARM
+from gyrotc.lot.learn import FALSE_ALARM
 from gyrotc.lot.use import LotPrior
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.means import unit_means

@@ -2,7 +2,7 @@
 
 Lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 strangers: gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
-lot by one run of 2.5 h. Beside the test of `gyrotc.lot.surprise` stand two that no product can have: one that
+lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
 knows from what distribution strangers are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the strangers of all other draws), and one that knows each stranger's map.
 Without seeds four new ones are drawn.
@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from gyrotc.train.means import UnitMeans
 from gyrotc.lot.learn import sums_of
-from gyrotc.lot.model import UnitSums
-from gyrotc.lot.surprise import FALSE_ALARM
+from gyrotc.lot.learn import UnitSums
+from gyrotc.lot.learn import FALSE_ALARM
 from gyrotc.lot.use import LotPrior
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import draw_lot

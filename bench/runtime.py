@@ -16,7 +16,7 @@ import numpy as np
 from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
 from gyrotc.tables import vectors
-from gyrotc.tables.files import emit, emitted_tables
+from gyrotc.tables.emit import emit, emitted_tables
 from gyrotc.tables.vectors import make_vectors
 from gyrotc.target.history import answers
 from gyrotc.target.maps import evaluate_map

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.verify.toolchain import all_targets, compile_c, run_program
 
 __all__ = ["cost"]

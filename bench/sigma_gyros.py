@@ -15,12 +15,12 @@ from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.arithmetic import FLOAT64
-from gyrotc.target.recursion import TermOutcome, recursion_of
+from gyrotc.target.recursions import TermOutcome, recursion_of
 from gyrotc.target.table import Table
 from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
 from gyrotc.train.methods import fit
-from gyrotc.train.rules import start_sigma
+from gyrotc.train.uncertainty import start_sigma
 from numpy.typing import NDArray
 
 __all__ = ["BLOCK_S", "Gyro", "Recording", "exam_of", "gyro"]

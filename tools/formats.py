@@ -12,29 +12,17 @@ from pathlib import Path
 
 from gyrotc.model import Model
 from gyrotc.results.base import Part
-from gyrotc.results.budget import Budget
-from gyrotc.results.catalogue import CatalogueAnswer
-from gyrotc.results.changes import Changes
-from gyrotc.results.check import Checked
-from gyrotc.results.comparison import Comparison
 from gyrotc.results.describe import schema_text, tables
 from gyrotc.results.diagnosed import Diagnosed
-from gyrotc.results.emission import Emitted
-from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.fleet import FleetEntry, FleetSummary
-from gyrotc.results.imported import ImportedFiles
-from gyrotc.results.limits import HeldLimits
+from gyrotc.results.evaluation import Changes, Comparison, Evaluation
+from gyrotc.results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
+from gyrotc.results.folder import Manifest, MapOnGrid, Marker
 from gyrotc.results.lot import Lot
-from gyrotc.results.lot_plan import LotPlan
-from gyrotc.results.manifest import Manifest
-from gyrotc.results.map import MapOnGrid
-from gyrotc.results.marker import Marker
-from gyrotc.results.next_run import NextRun
-from gyrotc.results.planned import Plan
-from gyrotc.results.release import Release
+from gyrotc.results.planned import LotPlan, NextRun, Plan
+from gyrotc.results.recordings import Checked, ImportedFiles, SimulatedTruth
+from gyrotc.results.release import Budget, HeldLimits, Release
 from gyrotc.results.training import Training
-from gyrotc.results.truth import SimulatedTruth
-from gyrotc.results.verification import JointVerification, Verification
+from gyrotc.results.verification import Emitted, JointVerification, Verification
 from gyrotc.tables.record import EmissionRecord
 from pydantic import BaseModel
 

@@ -23,9 +23,9 @@ from gyrotc.common.metrics import average
 from gyrotc.pages.plots import AFTER, BEFORE, svg
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import axes_of, load
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
+from gyrotc.train.cross_validation import training_spans
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
-from gyrotc.train.spans import training_spans
 from matplotlib.figure import Figure
 from real_peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.refit import Effect
-from gyrotc.diagnose.refitting import Refitting
 from gyrotc.diagnose.single_cycle import cycle_of
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import load

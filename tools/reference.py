@@ -20,7 +20,7 @@ DOCS = ROOT / "docs"
 #: Modules that may be imported by users' programs; what stands in their `__all__`.
 PYTHON = (
     "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
-    "tables.files", "target.maps", "target.history", "verify.job", "assess.evaluate", "diagnose.result",
+    "tables.emit", "target.maps", "target.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",
     "simulate.campaign", "plan.plan", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(

@@ -1,4 +1,3 @@
-# long: one file format; its fields, their checks and the equation are read together
 """The fitted model of one axis of one gyro: frozen in memory, JSON on disk (docs/FORMAT.md, section 1).
 
 Reads and writes `model.json` and evaluates the network's equation in float64; knows nothing of rounding.
@@ -34,12 +33,10 @@ from pydantic import (
 )
 
 from .causes import CATALOGUE
-from .causes.base import Cause
-from .causes.tabled import Tabled
+from .causes.base import Cause, Tabled
 from .common.errors import InputError
-from .common.inputs_texts import read_json
-from .store.files import write_atomically
-from .store.jsontext import digest_of, json_text
+from .common.inputs import read_json
+from .store.files import digest_of, json_text, write_atomically
 
 __all__ = [
     "SCHEMA",

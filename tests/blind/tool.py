@@ -17,7 +17,7 @@ from typing import Any
 
 def main() -> None:
     """Answers until stdin ends."""
-    from gyrotc.diagnose.result import diagnose
+    from gyrotc.diagnose.diagnosis import diagnose
     from gyrotc.recordings.load import load
 
     for line in sys.stdin:

@@ -14,7 +14,7 @@ from typing import Any
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.fingerprint import program_of
+from gyrotc.store.cache import program_of
 from gyrotc.store.marker import faults
 
 from .driver import run

@@ -18,7 +18,7 @@ sys.meta_path = [finder for finder in sys.meta_path if "gyrotc" not in type(find
 import gyrotc  # noqa: E402
 from gyrotc.common.errors import CheckFailed, InputError  # noqa: E402
 from gyrotc.model import load_model  # noqa: E402
-from gyrotc.tables.files import emit  # noqa: E402
+from gyrotc.tables.emit import emit  # noqa: E402
 from gyrotc.tables.quantise import NUMERICS  # noqa: E402
 from gyrotc.verify.job import verify  # noqa: E402
 

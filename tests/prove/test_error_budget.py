@@ -7,9 +7,9 @@ import pytest
 from emitted import GOLDEN
 from gyrotc.model import Model, load_model
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.believe import Guarded
-from gyrotc.target.follow import Settings, follow
-from gyrotc.target.numbers import F32, Q31
+from gyrotc.target.arithmetic import F32, Q31
+from gyrotc.target.front_end import Settings, follow
+from gyrotc.target.samples import Guarded
 from numpy.typing import NDArray
 from results import Results
 

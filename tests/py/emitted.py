@@ -11,7 +11,7 @@ import numpy as np
 from gyrotc.model import Model, load_model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import Target, all_targets, compiler_version
 from recordings import csv_text, toml

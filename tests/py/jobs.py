@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gyrotc.model import load_model
-from gyrotc.tables.files import emitted_tables
+from gyrotc.tables.emit import emitted_tables
 from gyrotc.tables.vectors import make_vectors
 from gyrotc.target.history import answers
 from gyrotc.verify.board import Job

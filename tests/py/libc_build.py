@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.target.follow import period_us
+from gyrotc.target.front_end import period_us
 from gyrotc.target.table import ARRAYS, LAYOUT, Table, Words
 
 ROOT = Path(__file__).resolve().parents[2]

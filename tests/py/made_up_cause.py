@@ -8,18 +8,28 @@ On the target it is a memory with the amplitude −60 b/tau.
 from __future__ import annotations
 
 import numpy as np
-from gyrotc.causes.base import Array, Cause, Features, History, Parameter, Scene, Values
-from gyrotc.causes.memory import RATES, lagged
-from gyrotc.causes.search import SearchRule, geometric
-from gyrotc.causes.tabled import Tabled, memory_gain
-from gyrotc.causes.words import Wording
-from gyrotc.target.operators import first_order
-from gyrotc.target.recursion import TableKind
+from gyrotc.causes.base import (
+    RATES,
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Scene,
+    SearchRule,
+    Tabled,
+    Values,
+    Wording,
+    geometric,
+    lagged,
+    memory_gain,
+)
+from gyrotc.common.arrays import FloatArray
+from gyrotc.target.recursions import TableKind, first_order
 
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> Array:
+def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     z = first_order(values["tau_s"], scene.time_s, scene.node_c)
     return np.asarray(values["slope_dph_min_per_c"] * (scene.node_c - z) * 60.0 / values["tau_s"])
 
@@ -29,7 +39,7 @@ def _features(history: History, values: Values) -> Features:
     return Features(memory.columns[:, 1:], memory.known)
 
 
-def _amplitudes(weights: Array) -> dict[str, float]:
+def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"slope_dph_min_per_c": float(weights[0])}
 
 

@@ -17,34 +17,34 @@ from gyrotc.assess.evaluate import evaluate
 from gyrotc.assess.limits import held_against, load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.common.metrics import average
-from gyrotc.diagnose import cache
-from gyrotc.diagnose.gather import records_of
-from gyrotc.diagnose.result import diagnose
+from gyrotc.diagnose import signature_bank
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.signature_bank import build
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
-from gyrotc.pages.diagnosis_page import write_diagnosis_page
-from gyrotc.pages.plan_page import write_plan_page
+from gyrotc.pages.diagnosis import write_diagnosis_page
+from gyrotc.pages.plan import write_plan_page
 from gyrotc.plan.plan import plan
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.manifest import Manifest
+from gyrotc.results.folder import Manifest
 from gyrotc.results.planned import Plan
 from gyrotc.results.training import DeclaredUnits
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read as read_scenario
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.store import kept
-from gyrotc.tables.files import emit
+from gyrotc.store import cache as kept
+from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
 from gyrotc.tables.record import RECORD, read_options
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.samples import run_blocks
+from gyrotc.verify.board import log_parts
 from gyrotc.verify.board_log import compared_words
 from gyrotc.verify.job import verify
-from gyrotc.verify.logs import log_parts
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet
 
@@ -398,7 +398,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         small = {
             k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1
         }
-        path.write_bytes(kept._packed(cache._content(replace(bank, **small))))
+        path.write_bytes(kept._packed(signature_bank._content(replace(bank, **small))))
     return path.read_bytes()
 
 
@@ -406,7 +406,7 @@ def _bank(seeds: Path, folder: Path) -> Callable[[bytes], None]:
     def read(data: bytes) -> None:
         path = folder / "a.bank"
         path.write_bytes(data)
-        bank = kept._read(path, cache._bank)
+        bank = kept._read(path, signature_bank._bank)
         if data != (seeds / "bank").read_bytes() and bank is not None:
             raise AssertionError("a damaged bank was taken")
         if bank is None:

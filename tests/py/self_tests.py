@@ -10,9 +10,8 @@ from pathlib import Path
 
 import gyrotc
 from gyrotc.model import Model
-from gyrotc.tables.files import emit_texts, quantise_all
-from gyrotc.verify.confined import run_to_end
-from gyrotc.verify.toolchain import Target, link
+from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.verify.toolchain import Target, link, run_to_end
 from models import random_model, random_terms
 
 TABLES = 40

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from gyrotc.diagnose.blocks import Records
-from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from gyrotc.causes.base import History
 from gyrotc.diagnose.blocks import Record, Records
-from gyrotc.diagnose.colours import Colour
+from gyrotc.diagnose.noise import Colour
 from gyrotc.diagnose.search import Search, open_search
 from gyrotc.diagnose.signature_bank import SignatureBank, build
 from numpy.typing import NDArray

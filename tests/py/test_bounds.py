@@ -12,10 +12,9 @@ from emitted import measured
 from gyrotc.common.errors import CheckFailed
 from gyrotc.results.verification import FunctionCost
 from gyrotc.verify import board
-from gyrotc.verify.flow import parse_flows
-from gyrotc.verify.functions import PUBLIC
-from gyrotc.verify.loops import Counts, LoopText
-from gyrotc.verify.paths import Paths, Program
+from gyrotc.verify.bounds import Paths, Program
+from gyrotc.verify.flow import Counts, LoopText, parse_flows
+from gyrotc.verify.sizes import PUBLIC
 from gyrotc.verify.toolchain import all_targets
 
 sys.path.insert(0, str(ROOT))

@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 from conftest import ROOT
-from gyrotc.assess.budget import budget_of
-from gyrotc.assess.instruments import instruments_in, last_day
-from gyrotc.assess.limits import Limits, load_limits
-from gyrotc.assess.stated import combined
+from gyrotc.assess.budget import budget_of, combined
+from gyrotc.assess.limits import Limits, instruments_in, last_day, load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build_into
 from gyrotc.model import load_model
@@ -19,9 +17,8 @@ from gyrotc.pages.report import write_report
 from gyrotc.pages.words import rounded
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_optional, read_result
-from gyrotc.results.budget import Budget
-from gyrotc.results.changes import Changes
-from gyrotc.results.evaluation import Evaluation
+from gyrotc.results.evaluation import Changes, Evaluation
+from gyrotc.results.release import Budget
 from gyrotc.results.training import Training
 from gyrotc.results.verification import Verification
 from gyrotc.simulate.campaign import simulate

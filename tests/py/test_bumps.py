@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.train.bumps import Bumps, find_bumps
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.methods import fit
+from gyrotc.train.mrbf import Bumps, find_bumps
 from gyrotc.train.result import predict
 
 SEED, BLOCK_S, NOISE_DPH = 20261123, 10.0, 3e-3

@@ -11,15 +11,14 @@ import made_up_cause
 import numpy as np
 import pytest
 from gyrotc.causes import CATALOGUE, register, separate_by
-from gyrotc.causes.base import Cause, History, Parameter, Scene
-from gyrotc.causes.search import Reach
-from gyrotc.cli.plan_lines import plan_parts
+from gyrotc.causes.base import Cause, History, Parameter, Reach, Scene
+from gyrotc.cli.plan import plan_parts
 from gyrotc.jobs.build import build
 from gyrotc.model import load_model
-from gyrotc.pages.plan_page import write_plan
+from gyrotc.pages.plan import write_plan
 from gyrotc.plan.plan import plan
 from gyrotc.simulate.campaign import simulate
-from gyrotc.target.recursion import Course, CourseChannel, TermOutcome
+from gyrotc.target.recursions import Course, CourseChannel, TermOutcome
 from gyrotc.train.fitting import FitOptions
 
 PACKAGE = Path(__file__).resolve().parents[2] / "gen" / "gyrotc"

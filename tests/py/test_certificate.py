@@ -10,13 +10,13 @@ from xml.etree import ElementTree
 import pytest
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
-from gyrotc.deliver import printing
+from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate, facts_of
 from gyrotc.jobs.build import build_into
 from gyrotc.pages.words import digits_of
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
-from gyrotc.results.manifest import Manifest
+from gyrotc.results.folder import Manifest
 from gyrotc.store.folder import result_folder
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv

@@ -15,10 +15,9 @@ from gyrotc.recordings.records import Dataset, Rows
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import read_truth
 from gyrotc.tables.applied import applied_of
-from gyrotc.train.channels import chosen_channels
+from gyrotc.train.channels import SHAPES, chosen_channels, shape_of
 from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.shapes import SHAPES, shape_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.assess.changes import earlier_models
-from gyrotc.quality.advice import advice_of
 from gyrotc.quality.check import CheckResult, Doubt, check
-from gyrotc.quality.doubts import __file__ as doubts_file
-from gyrotc.recordings.earth import earth_rate
+from gyrotc.quality.findings import __file__ as doubts_file
+from gyrotc.quality.findings import advice_of
+from gyrotc.recordings.plausibility import earth_rate
 from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
@@ -200,7 +200,7 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
     lines = (folder / "b.csv").read_text().splitlines()
     lines[7] = lines[6]
     (folder / "b.csv").write_text("\n".join(lines))
-    from gyrotc.pages.check_page import write_check_page
+    from gyrotc.pages.check import write_check_page
 
     result = check(folder)
     assert len(result.problems) == 1
@@ -235,7 +235,7 @@ def _entry(name: str, curve: list[float | None]) -> FleetEntry:
 
 @pytest.mark.parametrize("reversed_unit", [None, 3])
 def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
-    from gyrotc.fleet.turned import turned
+    from gyrotc.fleet.outliers import turned
 
     g = np.random.default_rng(1)
     t = np.arange(-60.0, 126.0, 5.0)
@@ -252,7 +252,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
 
 
 def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
-    from gyrotc.fleet.turned import turned
+    from gyrotc.fleet.outliers import turned
 
     g = np.random.default_rng(2)
     for _ in range(200):

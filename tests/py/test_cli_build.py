@@ -17,7 +17,7 @@ from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[3] / "shared/data/real"))

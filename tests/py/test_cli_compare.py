@@ -9,7 +9,7 @@ from conftest import Command
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.methods import METHODS
 

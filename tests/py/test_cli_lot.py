@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
-from gyrotc.diagnose.gather import records_of
-from gyrotc.diagnose.refitting import Refitting
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.lot.job import load_lot, lot_of
+from gyrotc.lot.planning import plan_with_lot
 from gyrotc.lot.use import prior_of
-from gyrotc.lot.with_lot import plan_with_lot
 from gyrotc.model import load_model
 from gyrotc.recordings.load import load
-from gyrotc.results.lot_plan import LotPlan
-from gyrotc.results.next_run import NextRun
-from gyrotc.store.jsontext import json_text
+from gyrotc.results.planned import LotPlan, NextRun
+from gyrotc.store.files import json_text
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from gyrotc.train.result import predict

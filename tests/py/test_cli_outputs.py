@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from conftest import Command, quick_and_slow
 from gyrotc.cli import main
-from gyrotc.store.lock import Lock
+from gyrotc.store.files import Lock
 from gyrotc.store.marker import MARKER, faults
 from recordings import columns, toml, write_csv
 

@@ -6,9 +6,15 @@ import io
 import re
 
 import pytest
-from gyrotc.pages.comparison import comparison_picture, comparison_tables, with_published
-from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
-from gyrotc.results.comparison import Comparison, Group, Method
+from gyrotc.pages.comparison import (
+    AFTER_DPH,
+    BEFORE_DPH,
+    ENVIRONMENTS,
+    comparison_picture,
+    comparison_tables,
+    with_published,
+)
+from gyrotc.results.evaluation import Comparison, Group, Method
 from rich.console import Console
 
 

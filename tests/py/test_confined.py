@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from gyrotc.common.errors import CheckFailed
-from gyrotc.verify.confined import confined, run_to_end
+from gyrotc.verify.toolchain import confined, run_to_end
 
 
 def _python(code: str, folder: Path) -> tuple[int, str]:
@@ -63,7 +63,7 @@ def test_an_argument_is_never_read_by_the_shell(tmp_path: Path) -> None:
 def test_what_does_not_end_is_ended_with_all_its_children(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gyrotc.verify.confined.LIMIT_S", 1)
+    monkeypatch.setattr("gyrotc.verify.toolchain.LIMIT_S", 1)
     command = ["sh", "-c", "sleep 1000 & echo $! > child; sleep 1000"]
     with pytest.raises(CheckFailed, match="the test did not end within 1 s"):
         run_to_end(command, tmp_path, "the test")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.assess.conformity import coverage_factor, decided, worst_of
-from gyrotc.assess.uncertainty import figure_uncertainties
+from gyrotc.assess.evaluate import figure_uncertainties
+from gyrotc.assess.limits import coverage_factor, decided, worst_of
 from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.results.evaluation import EvaluatedRun, FigureUncertainty, RunStatistics, Statistics
 

@@ -16,11 +16,11 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.recordings import source
+from gyrotc.recordings import files
 from gyrotc.recordings.csv_file import CsvFile
-from gyrotc.recordings.earth import EARTH_RATE_DPH, earth_rate
+from gyrotc.recordings.description import Problems
 from gyrotc.recordings.load import axes_of, load, survey
-from gyrotc.recordings.problems import Problems
+from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.records import Applied
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -167,7 +167,7 @@ def test_a_small_file_is_read_once_and_nobody_writes_into_what_was_read(
     first, again = run.rows(), run.rows()
     assert len(calls) == 1 and np.array_equal(first.rate_dph, again.rate_dph)
     assert not again.temperature_c.flags.writeable
-    monkeypatch.setattr(source, "_KEPT_BYTES", 0)
+    monkeypatch.setattr(files, "_KEPT_BYTES", 0)
     large = load(folder_of(tmp_path / "large")).runs[0]
     large.rows()
     assert len(calls) == 3, "what is beyond the limit is read again"

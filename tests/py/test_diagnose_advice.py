@@ -6,8 +6,7 @@ from typing import get_args
 
 import pytest
 from gyrotc.causes import CATALOGUE
-from gyrotc.diagnose.advice import VERDICTS, next_steps
-from gyrotc.diagnose.summary import not_testable
+from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
 from gyrotc.recordings.load import load
 from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
 from gyrotc.train.fitting import FitOptions

@@ -6,19 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.attribution import Attribution, attribute, choose
+from gyrotc.diagnose.attribution import Attribution, attribute, choose, overlap
 from gyrotc.diagnose.candidates import Candidate, columns_of
-from gyrotc.diagnose.contest import contest
-from gyrotc.diagnose.cycle_fits import CycleFits
-from gyrotc.diagnose.gains import Gains, Point
-from gyrotc.diagnose.intervals import parabola_top, profile_interval, random_size
-from gyrotc.diagnose.misfit import misfit
-from gyrotc.diagnose.overlap import overlap
-from gyrotc.diagnose.pairs import best_of, clear_pair, makes_sense
-from gyrotc.diagnose.refine import Refined, model_columns, refine
+from gyrotc.diagnose.gains import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
+from gyrotc.diagnose.misfit import contest, misfit
+from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
 from gyrotc.diagnose.rivals import EQUIVALENT, Rival, near_of, probabilities_of, ranked_rivals
 from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.size_limit import SizeLimit
+from gyrotc.diagnose.single_cycle import CycleFits
 from numpy.typing import NDArray
 from scipy import stats
 from small_campaign import LEVEL_DPH, Campaign, small_campaign

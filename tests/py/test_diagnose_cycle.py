@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.blocks import Records
-from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.blocks import Records, records_of
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.refit import Effect
-from gyrotc.diagnose.refitting import Refitting
-from gyrotc.diagnose.result import diagnose
 from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import joined_runs
-from gyrotc.target.operators import first_order
+from gyrotc.target.recursions import first_order
 from gyrotc.train.fitting import FitOptions
 from single_cycles import NOISE, clean_cycle
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.diagnose.candidates import Candidate, columns_of
-from gyrotc.diagnose.colours import COLOURS
-from gyrotc.diagnose.detection import detect
-from gyrotc.diagnose.detection_limits import detection_limits, limit_of
-from gyrotc.diagnose.joined import JoinedLayout
-from gyrotc.diagnose.project import project
-from gyrotc.diagnose.scores import Projection, ScoredColumns, draw_null, ratio_of, score, variance_ratio_of
-from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.views import residual_log_likelihood
-from gyrotc.diagnose.whitener import Whitener
+from gyrotc.diagnose.detection import detect, detection_limits, limit_of, project
+from gyrotc.diagnose.joined import (
+    JoinedLayout,
+    Projection,
+    ScoredColumns,
+    draw_null,
+    ratio_of,
+    score,
+    variance_ratio_of,
+)
+from gyrotc.diagnose.noise import COLOURS, Whitener
+from gyrotc.diagnose.search import Search, residual_log_likelihood
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import block_diag, null_space

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from gyrotc.diagnose.blocks import Records
 from gyrotc.diagnose.candidates import columns_of
-from gyrotc.diagnose.colours import Declared
-from gyrotc.diagnose.declared_noise import _two_sided, noise_findings
-from gyrotc.diagnose.ensemble import _discrepancy, ensemble_of
-from gyrotc.diagnose.noise_words import NOISE_WORDS
+from gyrotc.diagnose.discrepancy import _discrepancy, _two_sided, ensemble_of, noise_findings
+from gyrotc.diagnose.noise import NOISE_WORDS, Declared
 from gyrotc.diagnose.pipeline import needs_finer, search_of
 from numpy.typing import NDArray
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign

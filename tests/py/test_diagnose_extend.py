@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.extension import extend
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
 from gyrotc.diagnose.gain import gain_of
-from gyrotc.diagnose.gather import records_of
 from gyrotc.diagnose.refit import Effect, known, samples
-from gyrotc.diagnose.refitting import Refitting, folds_of
-from gyrotc.diagnose.result import diagnose
-from gyrotc.diagnose.shipping import shipping
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
-from gyrotc.target.operators import first_order
+from gyrotc.target.recursions import first_order
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from recordings import toml, write_csv

@@ -12,15 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.blocks import Record, Records
-from gyrotc.diagnose.colours import Declared, declared_noise
-from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.blocks import Record, Records, records_of
+from gyrotc.diagnose.detection import project
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.joined import _root
+from gyrotc.diagnose.noise import Declared, declared_noise
 from gyrotc.diagnose.pipeline import Analysis, analyse
-from gyrotc.diagnose.project import project
-from gyrotc.diagnose.result import diagnose
-from gyrotc.diagnose.scores import _root
 from gyrotc.diagnose.search import open_search
-from gyrotc.diagnose.verdict import verdict_of
+from gyrotc.diagnose.summary import verdict_of
 from gyrotc.recordings.load import load
 
 ROOT = Path(__file__).resolve().parents[2]

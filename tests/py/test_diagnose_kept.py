@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 from campaigns import GRADIENT, simulated
-from gyrotc.diagnose.result import Diagnosis
-from gyrotc.jobs import diagnosis, kept_diagnosis
+from gyrotc.diagnose.diagnosis import Diagnosis
+from gyrotc.jobs import diagnosis
+from gyrotc.jobs import diagnosis as kept_diagnosis
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
-from gyrotc.store import kept
+from gyrotc.store import cache
 from gyrotc.train.fitting import FitOptions
 
 _LOADED = """
@@ -83,7 +84,7 @@ class _Counted:
 def counted(data: Path, monkeypatch: pytest.MonkeyPatch) -> _Counted:
     still = load(_still(data.parent / "still"))
     counted = _Counted(diagnosis.diagnose(still))
-    monkeypatch.setattr("gyrotc.diagnose.result.diagnose", counted)
+    monkeypatch.setattr("gyrotc.diagnose.diagnosis.diagnose", counted)
     return counted
 
 
@@ -142,17 +143,17 @@ def test_whatever_a_diagnosis_depends_on_makes_another_one(
 def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, counted: _Counted) -> None:
     recordings = load(data)
     kept_diagnosis.diagnosed(recordings)
-    [path] = kept.folder().glob("*.diagnosis")
+    [path] = cache.folder().glob("*.diagnosis")
     whole = path.read_bytes()
-    content = json.loads(whole[len(kept._packed(b"")) :])
+    content = json.loads(whole[len(cache._packed(b"")) :])
     for damaged in (
         b"",
         whole[:-1],
         whole[:100] + b"0" + whole[101:],
-        kept._packed(b"[]"),
-        kept._packed(json.dumps(content | {"files": {"../report.html": ""}}).encode()),
-        kept._packed(json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
-        kept._packed(json.dumps(content | {"result": {}}).encode()),
+        cache._packed(b"[]"),
+        cache._packed(json.dumps(content | {"files": {"../report.html": ""}}).encode()),
+        cache._packed(json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
+        cache._packed(json.dumps(content | {"result": {}}).encode()),
     ):
         path.write_bytes(damaged)
         before = counted.count

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.common.metrics import MAD_TO_SIGMA
-from gyrotc.common.orthonormal import TOLERANCE, main_directions, orthonormal
-from gyrotc.common.quantiles import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95
+from gyrotc.common.statistics import (
+    CHI2_95_ONE,
+    CHI2_95_TWO,
+    NORMAL_95,
+    TOLERANCE,
+    main_directions,
+    orthonormal,
+)
 from scipy import stats
 from scipy.linalg import subspace_angles
 

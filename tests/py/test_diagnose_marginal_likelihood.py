@@ -8,14 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from gyrotc.causes.base import History
-from gyrotc.common.orthonormal import orthonormal
+from gyrotc.common.statistics import orthonormal
 from gyrotc.diagnose.candidates import columns_of
-from gyrotc.diagnose.gains import Gains
+from gyrotc.diagnose.gains import Gains, best_of
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood, _largest
-from gyrotc.diagnose.pairs import best_of
-from gyrotc.diagnose.rivals import LOOKED_AT, Rival, odds_of, probabilities_of, ranked_rivals
-from gyrotc.diagnose.simulated_odds import calibrated
-from gyrotc.target.operators import delayed, first_order
+from gyrotc.diagnose.rivals import LOOKED_AT, Rival, calibrated, odds_of, probabilities_of, ranked_rivals
+from gyrotc.target.recursions import delayed, first_order
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 from small_campaign import LEVEL_DPH, Campaign, small_campaign

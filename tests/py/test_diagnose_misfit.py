@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from gyrotc.diagnose.attribution import attribute
 from gyrotc.diagnose.candidates import Candidate, columns_of
-from gyrotc.diagnose.colours import Colour
 from gyrotc.diagnose.gains import Gains
 from gyrotc.diagnose.misfit import Misfit, misfit
+from gyrotc.diagnose.noise import Colour, Whitener
 from gyrotc.diagnose.refine import model_columns, refine
 from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.verdict import holds, looks_like
-from gyrotc.diagnose.whitener import Whitener
+from gyrotc.diagnose.summary import holds, looks_like
 from numpy.typing import NDArray
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 

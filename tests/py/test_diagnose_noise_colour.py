@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.colours import COLOURS, Colour, Declared, flicker_row, markov_row
-from gyrotc.diagnose.whitener import Whitener
+from gyrotc.diagnose.noise import COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
 from scipy.integrate import dblquad
 from scipy.linalg import block_diag
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.quality.remembered import evidence_beside_memories
-from gyrotc.target.operators import first_order, play
+from gyrotc.quality.events import evidence_beside_memories
+from gyrotc.target.recursions import first_order, play
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

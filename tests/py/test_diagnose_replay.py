@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.causes import CATALOGUE
-from gyrotc.diagnose.channel_terms import stand_ins_of
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.extension import stand_ins_of
 from gyrotc.diagnose.refit import Effect, Played, added_range, play_runs, samples
-from gyrotc.diagnose.result import diagnose
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Rows, Run

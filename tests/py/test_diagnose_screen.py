@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gyrotc.causes.base import History
-from gyrotc.diagnose.blocks import Record, Records, centred_slope, singled_out
-from gyrotc.diagnose.gather import _bridged, _thinned, block_length
+from gyrotc.diagnose.blocks import (
+    Record,
+    Records,
+    _bridged,
+    _thinned,
+    block_length,
+    centred_slope,
+    singled_out,
+)
 from gyrotc.diagnose.screens import cleaned, screen
 from gyrotc.recordings.records import Rows
 from small_campaign import small_records

@@ -8,16 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gyrotc.causes.base import History
-from gyrotc.diagnose.alternatives import _switch, _two_sided_lag, shapes_of
 from gyrotc.diagnose.blocks import Records, centred_slope
-from gyrotc.diagnose.candidates import Candidate, columns_of, diagnosed, reach_of, searched
+from gyrotc.diagnose.candidates import (
+    Candidate,
+    _switch,
+    _two_sided_lag,
+    columns_of,
+    diagnosed,
+    reach_of,
+    searched,
+    shapes_of,
+)
 from gyrotc.diagnose.candidates import testable as reason_against
-from gyrotc.diagnose.changed_input import proportional_map, replaced_map
-from gyrotc.diagnose.colours import COLOURS
+from gyrotc.diagnose.noise import COLOURS, Whitener
 from gyrotc.diagnose.signature_bank import direction_of
-from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis
-from gyrotc.diagnose.whitener import Whitener
-from gyrotc.target.operators import first_order
+from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis, proportional_map, replaced_map
+from gyrotc.target.recursions import first_order
 from small_campaign import Campaign, small_campaign
 
 

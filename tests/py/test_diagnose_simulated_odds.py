@@ -9,10 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gyrotc.diagnose.candidates import Candidate, columns_of
-from gyrotc.diagnose.gains import Gains, Point
-from gyrotc.diagnose.pairs import best_of
-from gyrotc.diagnose.rivals import kind_of, near_of, odds_of, probabilities_of, ranked_rivals
-from gyrotc.diagnose.simulated_odds import _Place, _points, _Simulated, calibrated
+from gyrotc.diagnose.gains import Gains, Point, best_of
+from gyrotc.diagnose.rivals import (
+    _Place,
+    _points,
+    _Simulated,
+    calibrated,
+    kind_of,
+    near_of,
+    odds_of,
+    probabilities_of,
+    ranked_rivals,
+)
 from numpy.typing import NDArray
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.cli.diagnosis_lines import diagnosis_lines
-from gyrotc.diagnose.advice import VERDICTS, next_steps
-from gyrotc.diagnose.declared_noise import NoiseFinding
+from gyrotc.cli.jobs import diagnosis_lines
+from gyrotc.diagnose.discrepancy import NoiseFinding
 from gyrotc.diagnose.misfit import Misfit
-from gyrotc.diagnose.verdict import verdict_of
+from gyrotc.diagnose.summary import VERDICTS, next_steps, verdict_of
 from gyrotc.results.diagnosed import (
     ConsideredCause,
     Diagnosed,

@@ -9,16 +9,15 @@ import pytest
 from conftest import quick_and_slow
 from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History
-from gyrotc.diagnose.advice import sentence_of, shows_as
 from gyrotc.diagnose.attribution import Attribution, attribute
 from gyrotc.diagnose.blocks import Records
 from gyrotc.diagnose.candidates import columns_of
 from gyrotc.diagnose.gains import Gains
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
 from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.verdict import holds, verdict_of
+from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
 from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
-from gyrotc.target.operators import first_order, play
+from gyrotc.target.recursions import first_order, play
 from numpy.typing import NDArray
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 

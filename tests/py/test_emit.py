@@ -12,7 +12,7 @@ import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.common.errors import InputError
 from gyrotc.model import Guard, Model, Term, load_model
-from gyrotc.tables.files import emit, emit_texts, quantise_all
+from gyrotc.tables.emit import emit, emit_texts, quantise_all
 from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.

@@ -16,11 +16,11 @@ import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
 from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
-from gyrotc.tables.channel_error import channel_error_dph
-from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables.error_bounds import channel_error_dph
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.operations import recursions
-from gyrotc.target.recursion import Course, CourseChannel, Recursion, TermOutcome
+from gyrotc.target.recursions import Course, CourseChannel, Recursion, TermOutcome
 from gyrotc.target.table import Numeric
 from models import bank_of, random_model
 from numpy.typing import NDArray

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.quality import lasting_steps
+from gyrotc.quality import steps as lasting_steps
 from gyrotc.quality.drifts import drifts_of
 from gyrotc.quality.events import Event, accepted, events_of
-from gyrotc.quality.lasting_steps import steps_of
-from gyrotc.quality.turned import turned_runs
-from gyrotc.quality.turned_within import another_gain_throughout, gain_changes
+from gyrotc.quality.sign_and_gain import another_gain_throughout, gain_changes, turned_runs
+from gyrotc.quality.steps import steps_of
 from gyrotc.recordings.load import load
 from recordings import toml, write_csv
 

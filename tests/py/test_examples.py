@@ -14,7 +14,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from gyrotc.model import Model, load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay
 from gyrotc.target.maps import evaluate_map

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.deliver.cubic import Autopilot, Cubic, best_cubic
+from gyrotc.deliver.autopilots import Autopilot, Cubic, best_cubic
 from gyrotc.deliver.export import Exporting, export
 from gyrotc.deliver.grid import csv_text, grid_of
 from gyrotc.model import Model, load_model

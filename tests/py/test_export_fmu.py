@@ -22,10 +22,10 @@ from gyrotc.deliver.export import export
 from gyrotc.jobs.axes import joint_texts
 from gyrotc.model import Model, load_model
 from gyrotc.store.marker import MARKER
-from gyrotc.tables.example import example_period_us
 from gyrotc.tables.quantise import quantise
-from gyrotc.tables.terms import channel_names
-from gyrotc.target.follow import samples_per_block
+from gyrotc.tables.rounding import channel_names
+from gyrotc.tables.text import example_period_us
+from gyrotc.target.front_end import samples_per_block
 from gyrotc.target.history import Replay, replay
 from models import bank_with_channels, random_channels, random_history
 from numpy.typing import NDArray

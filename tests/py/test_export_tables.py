@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import ROOT, Command
-from gyrotc.cli.certificates import address_of, points_of
+from gyrotc.cli.deliver import address_of, points_of
 from gyrotc.common.errors import InputError
 from gyrotc.deliver.export import Exporting, Format, export
 from gyrotc.deliver.grid import grid_of

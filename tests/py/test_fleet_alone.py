@@ -20,14 +20,15 @@ from typing import Any
 import pytest
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
-from gyrotc.fleet import pool, run
+from gyrotc.fleet import run
+from gyrotc.fleet import run as pool
 from gyrotc.fleet import unit as units
 from gyrotc.fleet.manifest import SUMMARY, Fleet, Unit, load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.fingerprint import inputs_of, program_of
-from gyrotc.store.lock import Lock
+from gyrotc.store.cache import inputs_of, program_of
+from gyrotc.store.files import Lock
 from gyrotc.store.marker import MARKER, faults
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from gyrotc.common.metrics import Averages
-from gyrotc.fleet.facts import facts_of, step_in
+from gyrotc.fleet.outliers import facts_of, step_in
 from gyrotc.fleet.page import summary_of
 from gyrotc.fleet.reasons import reasons
 from gyrotc.results.fleet import Copy, FleetEntry, Reason

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from conftest import Command
 from gyrotc.common.errors import InputError
-from gyrotc.fleet import pool as pools
+from gyrotc.fleet import run as pools
 from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
 from gyrotc.fleet.run import run_fleet, tasks_of
 from gyrotc.fleet.shards import Share, gather, mine, run_share, share_of

@@ -14,9 +14,9 @@ from emitted import emitted, recorded
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Model, load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
+from gyrotc.verify.emitted import board_files, checked_sources
 from gyrotc.verify.job import verify
-from gyrotc.verify.source import board_files, checked_sources
 
 FAST = "host-gcc-O2"
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.target.believe import Guarded
-from gyrotc.target.follow import Settings, expand_missed, samples_per_block
-from gyrotc.target.numbers import F32
+from gyrotc.target.arithmetic import F32
+from gyrotc.target.front_end import Settings, expand_missed, samples_per_block
+from gyrotc.target.samples import Guarded
 from gyrotc.train.samples import Blocks, missed_before, run_blocks
 
 

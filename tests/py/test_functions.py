@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT
 from emitted import emitted, measured
 from gyrotc.common.errors import CheckFailed
-from gyrotc.verify.functions import PUBLIC, function_costs, parse_graph
+from gyrotc.verify.sizes import PUBLIC, function_costs, parse_graph
 from gyrotc.verify.toolchain import all_targets
 
 GRAPH = """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gyrotc.cli.results import summary
 from gyrotc.common.metrics import Averages
-from gyrotc.pages.published import ENVIRONMENTS
+from gyrotc.pages.comparison import ENVIRONMENTS
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics
 
 RNG = np.random.default_rng(3)

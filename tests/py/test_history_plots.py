@@ -6,8 +6,8 @@ import re
 from typing import Any
 
 import pytest
-from gyrotc.pages.history_plots import calibrations_over_time
-from gyrotc.results.changes import Calibration
+from gyrotc.pages.plots import calibrations_over_time
+from gyrotc.results.evaluation import Calibration
 
 DAYS = ("2020-01-11", "2021-02-11", "2023-03-11", "2024-04-11")
 

@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import Command
 from gyrotc.recordings.importers.job import ImportOptions, import_files
-from gyrotc.recordings.importers.mapping import Map, load_map
+from gyrotc.recordings.importers.map_file import Map, load_map
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
-from gyrotc.results.imported import ImportedFiles
+from gyrotc.results.recordings import ImportedFiles
 
 Run = Callable[..., tuple[int, str, str]]
 

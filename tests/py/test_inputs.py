@@ -16,11 +16,11 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import Command
 from gyrotc.assess.limits import load_limits
-from gyrotc.common import ceilings
+from gyrotc.common import inputs
 from gyrotc.common.errors import InputError
-from gyrotc.common.inputs_texts import parse_json, parse_toml
-from gyrotc.diagnose import cache
-from gyrotc.diagnose.gather import records_of
+from gyrotc.common.inputs import parse_json, parse_toml
+from gyrotc.diagnose import signature_bank
+from gyrotc.diagnose.blocks import records_of
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages import report
@@ -31,9 +31,9 @@ from gyrotc.results.verification import Verification
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.store import kept
+from gyrotc.store import cache as kept
 from gyrotc.train.samples import run_blocks
-from gyrotc.verify.logs import log_parts
+from gyrotc.verify.board import log_parts
 from recordings import columns, csv_text, described, write_csv
 
 READERS: dict[str, Callable[[Path], Any]] = {
@@ -179,7 +179,7 @@ def test_ceilings_move_by_option_and_environment(tmp_path: Path, gyrotc: Command
 
 def test_every_ceiling_is_documented() -> None:
     text = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text("utf-8")
-    for name, ceiling in ceilings.CEILINGS.items():
+    for name, ceiling in inputs.CEILINGS.items():
         assert f"| `{name}` | {ceiling.default:g} |" in text, name
 
 
@@ -292,18 +292,18 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         write_csv(tmp_path / "RLG-1" / f"{number}.csv", table)
     records = records_of(load(tmp_path / "RLG-1"), "train", block_s=10.0, average_s=100.0)
     said: list[str] = []
-    bank = cache.bank_of(records, 0, said.append)
+    bank = signature_bank.bank_of(records, 0, said.append)
     assert kept.folder().stat().st_mode & 0o777 == 0o700
     [path] = kept.folder().glob("*.bank")
     whole = path.read_bytes()
-    assert np.array_equal(cache.bank_of(records, 0, said.append).signatures, bank.signatures)
+    assert np.array_equal(signature_bank.bank_of(records, 0, said.append).signatures, bank.signatures)
     assert len(said) == 1, "the second came from disk"
     rng = np.random.default_rng(5)
     for _ in range(200):
         damaged = bytearray(whole)
         damaged[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
         path.write_bytes(damaged)
-        assert kept.kept(path.name, cache._bank) is None and not path.exists()
+        assert kept.kept(path.name, signature_bank._bank) is None and not path.exists()
     content = pickle.dumps(_Runs())
     for foreign in (
         b"",
@@ -313,13 +313,13 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         kept._packed(content),
     ):
         path.write_bytes(foreign)
-        assert kept.kept(path.name, cache._bank) is None
+        assert kept.kept(path.name, signature_bank._bank) is None
     assert not Path("/tmp/gyrotc-was-here").exists()
     path.write_bytes(whole[:1000])
-    assert np.array_equal(cache.bank_of(records, 0, said.append).signatures, bank.signatures)
+    assert np.array_equal(signature_bank.bank_of(records, 0, said.append).signatures, bank.signatures)
     assert len(said) == 2
     kept.folder().chmod(0o777)
-    cache.bank_of(records, 0, said.append)
+    signature_bank.bank_of(records, 0, said.append)
     assert len(said) == 3, "others may write there"
 
 

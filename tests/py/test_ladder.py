@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.recordings.load import load
+from gyrotc.train.cross_validation import Fold, history_folds
 from gyrotc.train.data import TrainingData, gather
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.guard import objection
-from gyrotc.train.ladder import RUNGS, Ladder
+from gyrotc.train.guards import objection
 from gyrotc.train.methods import fit
 from gyrotc.train.result import Fit, predict
+from gyrotc.train.selection import RUNGS, Ladder
 from gyrotc.train.simple import SIMPLE, all_solved, design, fit_simple, powers_of, solve
-from gyrotc.train.spans import Fold, history_folds
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 

@@ -14,9 +14,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.lot import basis as lot_basis
 from gyrotc.lot.basis import PRIOR_LOG, LotBasis
 from gyrotc.lot.job import checksum_of, lot_from
-from gyrotc.lot.learn import Learned, learn, sums_of
-from gyrotc.lot.model import evidence, fitted
-from gyrotc.lot.surprise import p_value, scores
+from gyrotc.lot.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
 from gyrotc.lot.use import LotPrior, prior_of
 from gyrotc.results.lot import Lot, LotCluster
 from gyrotc.train.data import TrainingData

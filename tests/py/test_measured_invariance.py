@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.diagnose.gather import records_of
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.refit import Effect
-from gyrotc.diagnose.refitting import Refitting
 from gyrotc.diagnose.single_cycle import cycle_of
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, joined_runs

@@ -9,10 +9,9 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.lot.basis import PRIOR_LOG, LotBasis
 from gyrotc.lot.earlier import widened
-from gyrotc.lot.next_run import Price, next_run
+from gyrotc.lot.planning import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
 from gyrotc.lot.prior import MapPosterior, MapPrior
-from gyrotc.lot.with_lot import HOLDS, RATES, hours_of, inputs_of, programme_text
-from gyrotc.results.lot_plan import ChamberStep
+from gyrotc.results.planned import ChamberStep
 from gyrotc.simulate.scenario import read
 from gyrotc.train.evidence import Asked
 from gyrotc.train.means import UnitMeans

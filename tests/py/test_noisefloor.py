@@ -5,7 +5,7 @@ from __future__ import annotations
 import allantools
 import numpy as np
 import pytest
-from gyrotc.train.noisefloor import allan_variance, noise_terms, sensitivities, stretches
+from gyrotc.train.noise import allan_variance, noise_terms, sensitivities, stretches
 
 SEED = 20260302
 STEP_S = 10.0

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, run_gyrotc
 from gyrotc.common.errors import InputError
-from gyrotc.store.files import write_atomically
-from gyrotc.store.lock import Lock
+from gyrotc.store.files import Lock, write_atomically
 from recordings import columns, toml, write_csv
 
 PACKAGE = ROOT / "gen" / "gyrotc"
@@ -126,7 +125,7 @@ def test_nothing_foreign_is_changed_at_a_name_that_is_opened(
 ) -> None:  # fmt: skip
     """Before: a link called `.R.lock` emptied the file that it led to, and the command ended with 0."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("gyrotc.deliver.printing._BROWSERS", ())
+    monkeypatch.setattr("gyrotc.deliver.certificate._BROWSERS", ())
     work = _fresh(start, tmp_path / "work")
     there = {path.name for path in work.iterdir()}
     traced.clear()
@@ -207,10 +206,10 @@ def test_a_link_to_a_device_is_not_written_to(tmp_path: Path) -> None:
 
 _WRITING = ("write_text", "write_bytes", "touch", "copyfile", "copy2", "copytree", "symlink_to")
 _DOOR = {
-    "store/opening.py",
+    "store/files.py",
     "store/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
     "store/update.py copy2",  # into a folder that the job has just made
-    "cli/release.py copytree",  # likewise
+    "cli/deliver.py copytree",  # likewise
 }
 
 

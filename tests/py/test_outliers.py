@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.quality.check import check
-from gyrotc.quality.screen import departing
+from gyrotc.quality.outliers import departing
 from gyrotc.recordings.load import load
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray

@@ -15,14 +15,12 @@ from typing import Any
 
 import pytest
 from gyrotc.common.errors import GyrotcError, InputError
-from gyrotc.store import exchange as exchanging
 from gyrotc.store import folder as folders
+from gyrotc.store import update as exchanging
 from gyrotc.store import update as updating
-from gyrotc.store.files import write_atomically
+from gyrotc.store.files import json_text, write_atomically
 from gyrotc.store.folder import result_folder, write_result
-from gyrotc.store.jsontext import json_text
-from gyrotc.store.marker import MARKER, faults, read_marker
-from gyrotc.store.places import check_apart
+from gyrotc.store.marker import MARKER, check_apart, faults, read_marker
 
 
 def write(out: Path, text: str, command: str = "build", serial: str = "A", **options: object) -> None:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.causes import CATALOGUE
-from gyrotc.diagnose.gather import records_of
-from gyrotc.diagnose.overtones import overtones_of
-from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, samples, terms_of
-from gyrotc.diagnose.refitting import Refitting
-from gyrotc.diagnose.result import _entries
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.diagnosis import _entries
+from gyrotc.diagnose.extension import Refitting
+from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
 from gyrotc.recordings.load import load
 from gyrotc.train.data import TrainingData, cleaned
 from gyrotc.train.fitting import FitOptions

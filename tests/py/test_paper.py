@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.pages.published import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
+from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from gyrotc.paper.__main__ import page_of, record_of, stale
 from gyrotc.paper.experiment import METHODS
 from gyrotc.paper.figures import FIGURES, draw
-from gyrotc.paper.page import filled
-from gyrotc.paper.record import departures, made_with, measured
+from gyrotc.paper.page import departures, filled, made_with, measured
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "paper.md"

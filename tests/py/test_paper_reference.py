@@ -17,7 +17,7 @@ import numpy as np
 import paper_reference as reference
 import pytest
 from gyrotc import _core
-from gyrotc.pages.published import ENVIRONMENTS, NEURONS
+from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.data import average, scaling_of

@@ -10,12 +10,11 @@ from typing import Any
 import pytest
 from campaigns import scenario, simulated
 from conftest import Command, invoked
-from gyrotc.cli.plan_lines import limits_of, pair_of
+from gyrotc.cli.plan import limits_of, pair_of
 from gyrotc.common.errors import InputError
-from gyrotc.plan.plan import plan
+from gyrotc.plan.plan import plan, shortest
 from gyrotc.plan.programme import programme_of
 from gyrotc.plan.sensitivity import Sensitivity
-from gyrotc.plan.shortest import shortest
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.assess.product_guards import guarded
 from gyrotc.common.errors import InputError
 from gyrotc.model import Guard, Model, Term
-from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay
 from gyrotc.target.status import CHANNEL_LOST, CLAMPED, FALLBACK, HELD

@@ -15,7 +15,6 @@ TOOL = ROOT / "tools" / "promises"
 sys.path.insert(0, str(TOOL))
 
 import analysers  # noqa: E402
-import lengths  # noqa: E402
 import objects  # noqa: E402
 import oldest  # noqa: E402
 import origins  # noqa: E402
@@ -47,7 +46,7 @@ def _append(path: Path, text: str) -> None:
 
 
 def test_cheap_promises_are_kept() -> None:
-    names = ["words", "functions", "cplusplus", "symbols", "writable", "lengths", "origins"]
+    names = ["words", "functions", "cplusplus", "symbols", "writable", "origins"]
     done = subprocess.run([sys.executable, str(TOOL), *names], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines() == [f"{name}: kept" for name in names]
@@ -194,35 +193,6 @@ def test_analysers_see_what_is_wrong_with_a_path(tree: Path, one_file: None) -> 
     )
     assert list(analysers.fanalyzer(tree))
     assert any("null" in f.lower() for f in analysers.tidy(tree))
-
-
-SHORT = "    x = 1\n" * 30
-BODIES = {
-    "as long as it may be": ("def f() -> None:\n" + SHORT, 0),
-    "a line too long": ("def f() -> None:\n" + SHORT + "    y = 2\n", 1),
-    "blank lines, comments, docstring": (
-        'def f() -> None:\n    """Says\n    something."""\n\n    # word\n' + SHORT,
-        0,
-    ),
-    "a head of many lines": (
-        "def f(\n" + "".join(f"    a{k}: int,\n" for k in range(40)) + ") -> None:\n    pass\n",
-        0,
-    ),
-    "with its reason": ("def f() -> None:  # long: one line for each field\n" + SHORT + "    y = 2\n", 0),
-    "with a word instead of a reason": ("def f() -> None:  # long\n" + SHORT + "    y = 2\n", 1),
-    "a method": ("class C:\n    def f(self) -> None:\n" + "        x = 1\n" * 31, 1),
-    "a module": ("def f() -> None:\n    pass\n\n\n" + "x = 1\n" * 249, 1),
-    "a module with its reason": ("# long: one table\ndef f() -> None:\n    pass\n\n\n" + "x = 1\n" * 249, 0),
-    "nothing at all": ("x = 1\n", 1),
-}
-
-
-@pytest.mark.parametrize("case", BODIES)
-def test_a_long_function_or_module_is_found(case: str, tmp_path: Path) -> None:
-    text, broken = BODIES[case]
-    (tmp_path / "gen" / "gyrotc").mkdir(parents=True)
-    (tmp_path / "gen" / "gyrotc" / "a.py").write_text(text)
-    assert len(list(lengths.long_python(tmp_path))) == broken
 
 
 @pytest.mark.parametrize(

@@ -14,14 +14,21 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
-from gyrotc.lot.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
-from gyrotc.lot.held import Held, held
+from gyrotc.lot.earlier import (
+    EarlierPrior,
+    Held,
+    held,
+    known_map,
+    posterior_of_known,
+    posterior_of_means,
+    widened,
+)
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.training import Training
 from gyrotc.results.verification import Verification
-from gyrotc.tables.files import emitted_tables
+from gyrotc.tables.emit import emitted_tables
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.means import UnitMeans, unit_means
 from gyrotc.train.methods import fit

@@ -6,7 +6,7 @@ import re
 import sys
 
 from conftest import ROOT
-from gyrotc.verify.functions import PUBLIC
+from gyrotc.verify.sizes import PUBLIC
 
 sys.path.insert(0, str(ROOT / "tools"))
 

@@ -12,11 +12,11 @@ import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
 from gyrotc.results.base import checked_result
-from gyrotc.results.changes import Apart, At
 from gyrotc.results.describe import tables
+from gyrotc.results.evaluation import Apart, At
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.limits import HeldLimits, Limit
-from gyrotc.results.marker import Marker
+from gyrotc.results.folder import Marker
+from gyrotc.results.release import HeldLimits, Limit
 from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError
 

@@ -16,7 +16,7 @@ import pytest
 from conftest import ROOT
 from gyrotc.model import Model, load_model
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.train.rules import rezero_dph
+from gyrotc.train.uncertainty import rezero_dph
 from libc_build import runtime
 from libc_device import Device
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from gyrotc.model import Term
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.verify.toolchain import all_targets, compile_objects
 from models import random_model
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.model import Model
-from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS
 from gyrotc.target.status import E_ID, E_IMAGE, E_LAYOUT
 from gyrotc.target.table import SERIAL_WORDS, Table, Words

@@ -10,7 +10,7 @@ import pytest
 from conftest import quick_and_slow
 from gyrotc.common.runtime import runtime_folders
 from gyrotc.tables.amalgamate import amalgamate
-from gyrotc.verify.functions import PUBLIC
+from gyrotc.verify.sizes import PUBLIC
 
 ROOT = Path(__file__).resolve().parents[2]
 MINIMAL = ROOT / "examples" / "minimal"

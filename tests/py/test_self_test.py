@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.tables.probes import N_PROBES
-from gyrotc.tables.quantise import quantise
+from gyrotc.tables.quantise import N_PROBES, quantise
 from gyrotc.target.f32 import FUSIBLE, _plus
 from gyrotc.target.maps import evaluate_map
 from self_tests import OK, RIGHT, Verdict, models, native, write_sources

@@ -8,10 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.copies import copies
+from gyrotc.fleet.outliers import copies
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
-from gyrotc.recordings.shared import _occurrences, fingerprints_of, windows_in_common, windows_that_repeat
+from gyrotc.recordings.shared_rows import (
+    _occurrences,
+    fingerprints_of,
+    windows_in_common,
+    windows_that_repeat,
+)
 from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv

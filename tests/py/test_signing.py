@@ -11,7 +11,7 @@ from conftest import Command
 from emitted import GOLDEN, emitted, spoil
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.tables.record import RELEASE, SIGNATURE
 from gyrotc.verify.job import verify
 from gyrotc.verify.signatures import load_private_key, load_public_key

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.simulate import chamber, profile
+from gyrotc.simulate.chamber import ThermalNetwork
 from gyrotc.simulate.instrument import thermal_network
 from gyrotc.simulate.scenario import Chamber, Gyro
-from gyrotc.simulate.thermal import ThermalNetwork
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy.integrate import solve_ivp

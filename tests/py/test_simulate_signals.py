@@ -10,10 +10,8 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import campaign, simulate
-from gyrotc.simulate.laser import laser_bias, laser_readings, laser_states
-from gyrotc.simulate.scenario import Scenario, read
-from gyrotc.simulate.signals import Laser, Thermometer
-from gyrotc.simulate.thermometers import thermometer_readings
+from gyrotc.simulate.gyro import laser_bias, laser_readings, laser_states, thermometer_readings
+from gyrotc.simulate.scenario import Laser, Scenario, Thermometer, read
 from gyrotc.simulate.truth import read_truth
 from numpy.typing import NDArray
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from gyrotc.recordings.records import Run
-from gyrotc.train.spans import Span, training_spans
+from gyrotc.train.cross_validation import Span, training_spans
 
 
 @dataclass

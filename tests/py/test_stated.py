@@ -17,7 +17,7 @@ import pytest
 from conftest import run_gyrotc
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import GyrotcError, InputError
-from gyrotc.deliver import printing
+from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate
 from gyrotc.deliver.export import export
 from gyrotc.jobs.build import build_into

@@ -17,13 +17,12 @@ from typing import Any
 import pytest
 from conftest import Command
 from emitted import emitted
-from gyrotc.cli import stages as stage_module
-from gyrotc.cli.base import folded
+from gyrotc.cli import base as stage_module
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, StageLine, folded, time_left
 from gyrotc.cli.main import _hoisted
-from gyrotc.cli.stages import BUILD, DIAGNOSE, EMIT, FIT, StageLine, time_left
 from gyrotc.model import Model
-from gyrotc.store import kept
-from gyrotc.tables.files import emit
+from gyrotc.store import cache
+from gyrotc.tables.emit import emit
 from recordings import described
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -242,17 +241,17 @@ def test_the_cache_is_told_cleared_and_kept_to_a_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    kept.set_limit(2500)
+    cache.set_limit(2500)
     for k in range(4):
-        (kept.folder() / f"{k}.bank").write_bytes(bytes(1000))
-        os.utime(kept.folder() / f"{k}.bank", (k, k))
-    kept.set_limit(2500)
-    assert sorted(p.name for p in kept.folder().glob("*.bank")) == ["2.bank", "3.bank"], "the oldest go"
-    assert kept.held() == (2, 2000) and kept.limit() == 2500
+        (cache.folder() / f"{k}.bank").write_bytes(bytes(1000))
+        os.utime(cache.folder() / f"{k}.bank", (k, k))
+    cache.set_limit(2500)
+    assert sorted(p.name for p in cache.folder().glob("*.bank")) == ["2.bank", "3.bank"], "the oldest go"
+    assert cache.held() == (2, 2000) and cache.limit() == 2500
     told = subprocess.run([PROGRAM, "cache", "--clear"], capture_output=True, text=True, check=True)
     assert (
         "0 banks of signatures, 0 diagnoses, 0.000 GB of at most 2.5e-06 GB" in told.stdout
-        and kept.held() == (0, 0)
+        and cache.held() == (0, 0)
     )
-    (kept.folder() / "limit_bytes").write_text("much")
-    assert kept.limit() == 2 * 10**9
+    (cache.folder() / "limit_bytes").write_text("much")
+    assert cache.limit() == 2 * 10**9

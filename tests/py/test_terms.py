@@ -11,9 +11,8 @@ import pytest
 from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History, Scene
 from gyrotc.common.errors import InputError
-from gyrotc.simulate.biasmap import draw
-from gyrotc.target.operators import delayed, first_order, play
-from gyrotc.target.recursion import Course, CourseChannel, TermOutcome
+from gyrotc.simulate.gyro import draw
+from gyrotc.target.recursions import Course, CourseChannel, TermOutcome, delayed, first_order, play
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

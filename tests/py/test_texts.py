@@ -22,7 +22,7 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.cli import base
 from gyrotc.cli.results import evaluation_table, verify_table
 from gyrotc.common.errors import InputError
-from gyrotc.common.inputs_texts import checked
+from gyrotc.common.inputs import checked
 from gyrotc.common.texts import (
     C_COMMENT,
     c_code,
@@ -43,20 +43,18 @@ from gyrotc.fleet.page import write_summary
 from gyrotc.jobs.diagnosis import extended_scenario
 from gyrotc.model import Model, table_id
 from gyrotc.pages import report
-from gyrotc.pages.diagnosis_page import write_diagnosis_page as write_page
+from gyrotc.pages.diagnosis import write_diagnosis_page as write_page
 from gyrotc.pages.plots import STYLE, svg
+from gyrotc.recordings.description import Problems, dataset_toml, parse_description
 from gyrotc.recordings.load import load
-from gyrotc.recordings.problems import Problems
-from gyrotc.recordings.schema import parse_description
-from gyrotc.recordings.text import dataset_toml
 from gyrotc.results.base import checked_result
 from gyrotc.results.diagnosed import Diagnosed, Estimate
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.verification import VerifiedTarget
 from gyrotc.simulate import scenario
-from gyrotc.tables.files import emit_texts, quantise_all
+from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.verify.emitted import checked_sources, table_files
 from gyrotc.verify.job import verify
-from gyrotc.verify.source import checked_sources, table_files
 from hostile import hostile_strings
 
 if sys.version_info >= (3, 11):

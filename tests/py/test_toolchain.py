@@ -79,7 +79,7 @@ def test_fault_of_a_bare_target_ends_the_run(tmp_path: Path) -> None:
 
 
 def test_program_that_never_ends_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gyrotc.verify.confined.LIMIT_S", 1)
+    monkeypatch.setattr("gyrotc.verify.toolchain.LIMIT_S", 1)
     compile_c(HOST, [_program(tmp_path, "    for (;;) {\n    }")], tmp_path / "p", include=tmp_path)
     with pytest.raises(CheckFailed, match="did not end"):
         run_program(HOST, tmp_path / "p")

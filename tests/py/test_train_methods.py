@@ -9,7 +9,7 @@ import pytest
 from gyrotc.model import Model
 from gyrotc.train.data import TrainingData, average
 from gyrotc.train.methods import fit
-from gyrotc.train.ols import SIZE_RULES
+from gyrotc.train.paper_methods import SIZE_RULES
 from gyrotc.train.result import predict
 from numpy.typing import NDArray
 from training_data import NOISE_DPH, rms, samples, true_bias

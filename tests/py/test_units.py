@@ -12,8 +12,8 @@ import pytest
 from conftest import Command
 from gyrotc.common.errors import InputError
 from gyrotc.quality.check import check
-from gyrotc.recordings.earth import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.load import load
+from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.units import UnitError, channel_unit, conversion, kind_of
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from recordings import Columns, columns, toml, write_csv
@@ -97,11 +97,11 @@ def test_kinds_and_names_of_channels() -> None:
 
 
 def test_the_bounds_in_other_units_are_those_of_pint() -> None:
-    from gyrotc.recordings import plausible
+    from gyrotc.recordings import plausibility
 
-    for unit, factor in plausible._RATES.items():
+    for unit, factor in plausibility._RATES.items():
         assert conversion(unit, "rate").factor == pytest.approx(factor, rel=1e-15)
-    for unit, factor in plausible._TIMES.items():
+    for unit, factor in plausibility._TIMES.items():
         assert conversion(unit, "time").factor == factor
 
 

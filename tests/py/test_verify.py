@@ -15,7 +15,7 @@ import pytest
 from conftest import Command
 from emitted import emitted, entries, flip, recorded, spoil
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.tables.files import expected_answers
+from gyrotc.tables.emit import expected_answers
 from gyrotc.verify import job as package
 from gyrotc.verify.board_log import compared_words, read_output
 from gyrotc.verify.job import verify

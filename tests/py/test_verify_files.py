@@ -15,7 +15,7 @@ from emitted import GOLDEN, emitted, flip, spoil
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
-from gyrotc.tables.files import emit
+from gyrotc.tables.emit import emit
 from gyrotc.verify.job import verify
 
 Spoil = Callable[[Path], object]

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common.errors import CheckFailed
-from gyrotc.tables.legal import _limits, outside
-from gyrotc.tables.quantise import quantise
+from gyrotc.tables.quantise import _limits, outside, quantise
 from gyrotc.target.table import ARRAYS, Table
 from libc_build import ROOT, runtime
 from models import bank_with_channels, random_model, random_terms

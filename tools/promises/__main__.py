@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import analysers
-import lengths
 import objects
 import oldest
 import origins
@@ -20,7 +19,6 @@ import source
 CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "words": source.forbidden_words,
     "functions": source.long_functions,
-    "lengths": lengths.long_python,
     "origins": origins.unexplained_numbers,
     "oldest": oldest.younger_than_supported,
     "warnings": objects.warnings,

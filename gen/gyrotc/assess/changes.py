@@ -1,4 +1,4 @@
-"""What a build changed against an earlier one of the same gyro: recordings, map, figures, files.
+"""What a build changed against an earlier one of the same gyro, and the unit's state as found.
 
 A gyro that is calibrated again should give nearly the same map. Where it does not, the difference over the
 envelope is the drift of the gyro, of its thermometer or of the procedure, and belongs into the report.
@@ -13,26 +13,93 @@ import numpy as np
 
 from .. import __version__
 from ..common.arrays import FloatArray
-from ..common.errors import InputError
+from ..common.errors import GyrotcError, InputError
 from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
-from ..results.changes import (
+from ..results.evaluation import (
     Apart,
+    AsFound,
     At,
+    Calibration,
     Changes,
     Envelopes,
+    Evaluation,
     FigureChange,
     FileChanges,
     NameChanges,
     TextChange,
 )
-from ..results.evaluation import Evaluation
-from ..results.manifest import Manifest
-from .as_found import as_found, history_of
-from .limits import Limits
+from ..results.folder import Manifest
+from ..results.verification import Verification
+from .evaluate import evaluate
+from .limits import Limits, held_against
 
-__all__ = ["Earlier", "changes_since", "earlier_models", "load_earlier", "started_on"]
+__all__ = [
+    "Earlier",
+    "as_found",
+    "changes_since",
+    "earlier_models",
+    "history_of",
+    "load_earlier",
+    "started_on",
+]
+
+
+def as_found(
+    earlier: Earlier, dataset: Dataset, limits: Limits | None, average_s: float
+) -> tuple[AsFound | None, str]:
+    """The earlier correction on new recordings, by the reference (the same as the compiled code, bit for bit).
+
+    Returns:
+        It, or None and the reason.
+    """
+    seen = {(d.file, d.sha256) for d in earlier.model.data}
+    if any((run.file, run.sha256) in seen for run in dataset.runs):
+        return None, "the earlier correction was made from recordings that are among these"
+    try:
+        found = evaluate(earlier.folder, dataset, average_s=average_s, compiled=False)
+        known = earlier.evaluation  # of its training: the new recordings say nothing about it
+        update = {"generalises": known.generalises, "rows_left_out": known.rows_left_out} if known else {}
+        found = found.model_copy(update=update)
+        verification = read_optional(earlier.folder / "verify.json", Verification)
+        held = held_against(limits, earlier.model, found, verification) if limits else None
+    except (GyrotcError, OSError) as error:
+        return None, str(error)
+    exam = found.exam is not None
+    figures = found.exam or found.train
+    if figures is None:
+        return None, "no sample of the recordings can be judged"
+    return AsFound(judged_on="exam" if exam else "train", figures=figures, limits=held), ""
+
+
+def history_of(
+    earlier: Earlier,
+    model: Model,
+    evaluation: Evaluation,
+    found: AsFound | None,
+    moved: Apart | None,
+    date: str | None,
+) -> tuple[Calibration, ...]:
+    """The earlier result's calibrations, and this one."""
+    known = earlier.history or (_calibration(earlier.model, earlier.evaluation, None, None, earlier.date),)
+    return (*known, _calibration(model, evaluation, found, moved, date))
+
+
+def _calibration(
+    model: Model, evaluation: Evaluation | None, found: AsFound | None, moved: Apart | None, date: str | None
+) -> Calibration:
+    judged = evaluation.judged() if evaluation else None
+    return Calibration(
+        date=date,
+        model_hash=model.hash,
+        as_found_rms_dph=found.figures.after.rms_dph if found else None,
+        as_left_rms_dph=judged[1].after.rms_dph if judged else None,
+        moved_rms_dph=moved.rms_dph if moved else None,
+        moved_mean_dph=moved.mean_dph if moved else None,
+        expanded_uncertainty_dph=moved.expanded_uncertainty_dph if moved else None,
+        significant=moved.significant if moved else None,
+    )
 
 
 _GRID = (61, 25)  # points of T and of dT/dt over the common envelope

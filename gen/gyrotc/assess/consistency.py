@@ -14,15 +14,12 @@ from pydantic import ValidationError
 
 from ..common.errors import InputError
 from ..model import Model
-from ..results.budget import Budget
-from ..results.changes import Changes
-from ..results.evaluation import Evaluation, Pooled
-from ..results.limits import HeldLimits
+from ..results.evaluation import Changes, Evaluation, Pooled
+from ..results.release import Budget, HeldLimits
 from ..results.training import Training
 from ..results.verification import Verification, VerifiedTarget
-from .budget import budget_of
+from .budget import AGEING, budget_of
 from .limits import Limits, held_against
-from .stated import AGEING
 
 __all__ = ["check_budget", "check_figures", "check_limits"]
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..common.metrics import MAD_TO_SIGMA
 from ..model import Model
-from ..quality.data_findings import (
+from ..quality.facts import RunFacts
+from ..quality.recorded import (
     Finding,
     contradiction_findings,
     counter_findings,
@@ -21,10 +22,10 @@ from ..quality.data_findings import (
     finding,
     jump_findings,
     outlier_findings,
+    shared_rows_findings,
+    sign_findings,
     temperature_findings,
 )
-from ..quality.facts import RunFacts
-from ..quality.recorded import shared_rows_findings, sign_findings
 from ..quality.thermometers import thermometer_findings
 from ..recordings.records import Dataset
 from ..results.training import Training

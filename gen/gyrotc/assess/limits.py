@@ -1,4 +1,8 @@
-"""Limits of a product: what a built table must keep to, from a TOML file, held against what was measured.
+"""Limits of a product and statements of conformity (ILAC-G8:09/2019); guards that a product states.
+
+`guard_band` (4.2.3, non-binary): pass up to the acceptance limit AL = limit - w, conditional pass between AL and the
+limit, fail beyond. `guard_band_binary` (4.2.2): pass up to AL, fail beyond. `simple_acceptance` (4.2.1): pass up to
+the limit, w = 0. The guard band is w = U: of what passes at most 2.3 % is beyond its limit.
 
 Where `evaluate` and `verify` say what is, this says whether it is enough. A figure that was not measured does not
 keep a limit.
@@ -7,26 +11,156 @@ keep a limit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import date, timedelta
 from pathlib import Path
+from statistics import NormalDist
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from scipy.special import stdtrit
 
 from .. import __version__
 from ..common.errors import InputError
-from ..common.inputs_texts import parse_toml
-from ..common.opening import read_input
+from ..common.inputs import checked, parse_toml, read_input
 from ..model import Model
-from ..results.evaluation import Evaluation
-from ..results.limits import DecisionRule, HeldLimits, Limit, Value, Verdict
+from ..results.evaluation import Evaluation, FigureUncertainty
+from ..results.release import DecisionRule, HeldLimits, Instrument, Limit, Value, Verdict
 from ..results.verification import Verification
 from ..verify.toolchain import all_targets
-from .conformity import decided, worst_of
-from .instruments import StatedInstrument
 from .product_guards import ProductGuard
 
-__all__ = ["Limits", "held_against", "load_limits"]
+__all__ = [
+    "Limits",
+    "StatedInstrument",
+    "coverage_factor",
+    "decided",
+    "held_against",
+    "instruments_in",
+    "last_day",
+    "load_limits",
+    "worst_of",
+]
+
+_NORMAL = NormalDist()
+_UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
+_ORDER: tuple[Verdict, ...] = ("PASS", "CONDITIONAL PASS", "FAIL")
+
+
+def coverage_factor(freedom: float | None) -> float:
+    """k of 95.45 %: 2, or Student's t where the degrees of freedom are few (JCGM 100:2008, G.3)."""
+    return 2.0 if freedom is None else float(stdtrit(freedom, _UPPER))
+
+
+def decided(
+    name: str,
+    measured: float | None,
+    bound: float,
+    sign: float,
+    rule: DecisionRule,
+    known: FigureUncertainty | str | None,
+) -> Limit:
+    """Holds an amount with its uncertainty against a limit, by a decision rule.
+
+    Args:
+        name: Name of the limit, as in the limits file.
+        measured: What was measured, None if it was not.
+        bound: The limit.
+        sign: 1 for an upper limit, -1 for a lower one.
+        rule: The decision rule.
+        known: The figure's uncertainty; a text: why it has none; None: it is not known, so that a guard band cannot
+            be kept.
+    """
+    if isinstance(known, str):
+        return _bare(name, measured, bound, sign, known)
+    if measured is None or known is None:
+        one = _bare(name, measured, bound, sign, "not measured" if measured is None else "not known")
+        if one.met and rule != "simple_acceptance":
+            met = rule == "guard_band"
+            return one.model_copy(update={"met": met, "verdict": "CONDITIONAL PASS" if met else "FAIL"})
+        return one
+    k = coverage_factor(known.freedom)
+    expanded = k * known.standard
+    band = 0.0 if rule == "simple_acceptance" else expanded
+    verdict = _verdict(sign * (bound - measured), band, rule)
+    beyond = _NORMAL.cdf(sign * (measured - bound) / known.standard) if known.standard else 0.0
+    return Limit(
+        limit=name,
+        measured=measured,
+        bound=bound,
+        met=verdict != "FAIL",
+        verdict=verdict,
+        standard_uncertainty=known.standard,
+        degrees_of_freedom=known.freedom,
+        coverage_factor=k,
+        expanded_uncertainty=expanded,
+        guard_band=band,
+        acceptance_limit=bound - sign * band,
+        false_acceptance=beyond if verdict != "FAIL" else None,
+        uncertainty_from=known.method,
+    )
+
+
+def _bare(name: str, measured: float | None, bound: float, sign: float, why: str) -> Limit:
+    met = measured is not None and sign * (bound - measured) >= 0.0
+    return Limit(
+        limit=name,
+        measured=measured,
+        bound=bound,
+        met=met,
+        verdict="PASS" if met else "FAIL",
+        uncertainty_from=why,
+    )
+
+
+def _verdict(room: float, band: float, rule: DecisionRule) -> Verdict:
+    if room < 0.0:
+        return "FAIL"
+    if room >= band:
+        return "PASS"
+    return "CONDITIONAL PASS" if rule == "guard_band" else "FAIL"
+
+
+def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict | None:
+    """The gravest of several verdicts; None where there is none: nothing was judged."""
+    return max((v for v in verdicts if v), key=_ORDER.index, default=None)
+
+
+class StatedInstrument(Instrument):
+    """The same as a person writes it: a field that is not known is refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+def instruments_in(meta: Mapping[str, Any], others: Sequence[Instrument] = ()) -> tuple[Instrument, ...]:
+    """Those of `[[meta.instrument]]`, and of the limits file those whose names are not among them.
+
+    Raises:
+        InputError: An entry is no table, or a field of it is wrong or not known.
+    """
+    entries = meta.get("instrument", ())
+    if not isinstance(entries, (list, tuple)):
+        raise InputError("dataset.toml, field meta.instrument", "is no list of tables", "[[meta.instrument]]")
+    stated = []
+    for number, entry in enumerate(entries):
+        where = f"dataset.toml, field meta.instrument.{number}"
+        if not isinstance(entry, Mapping):
+            raise InputError(where, repr(entry)[:60], "a table: [[meta.instrument]]")
+        stated.append(checked(StatedInstrument, dict(entry), where))
+    names = {one.name for one in stated}
+    every = (*stated, *(one for one in others if one.name not in names))
+    return tuple(Instrument(**one.model_dump()) for one in every)
+
+
+def last_day(calibrated_on: str | None, days: float | None) -> str | None:
+    """Last day of an interval, ISO 8601; None where the date is not stated as one, or there is no interval."""
+    if calibrated_on is None or days is None:
+        return None
+    try:
+        return (date.fromisoformat(calibrated_on[:10]) + timedelta(days=days)).isoformat()
+    except (ValueError, OverflowError):
+        return None
+
 
 Finding = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",

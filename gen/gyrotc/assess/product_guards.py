@@ -13,8 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from ..common.errors import InputError
 from ..model import Guard, Model
-from ..tables.guards import TEMPERATURE, guard_of
-from ..tables.terms import channel_names
+from ..tables.rounding import TEMPERATURE, channel_names, guard_of
 from ..train.samples import PLAUSIBLE_C
 
 __all__ = ["ProductGuard", "guarded"]
@@ -22,7 +21,7 @@ __all__ = ["ProductGuard", "guarded"]
 _MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 
 
-def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
     if pair[0] >= pair[1]:
         raise ValueError("two numbers, the lower end first")
     return pair
@@ -42,7 +41,7 @@ class ProductGuard(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    range: Annotated[tuple[_Value, _Value], BeforeValidator(_as_tuple), AfterValidator(_ordered)] | None = (
+    range: Annotated[tuple[_Value, _Value], BeforeValidator(_as_tuple), AfterValidator(_ascending)] | None = (
         None
     )
     step: _Change = None  # believed from one reading to the next ...

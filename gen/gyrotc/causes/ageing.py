@@ -11,9 +11,19 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, Features, History, Needs, Parameter, Scene, Values
-from .search import Reach, SearchRule
-from .words import Telling, Wording
+from .base import (
+    Cause,
+    Features,
+    History,
+    Needs,
+    Parameter,
+    Reach,
+    Scene,
+    SearchRule,
+    Telling,
+    Values,
+    Wording,
+)
 
 __all__ = ["CAUSE"]
 

@@ -9,11 +9,21 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Needs, Parameter, Scene, Values
-from .search import SearchRule, anywhere
-from .tabled import Tabled
-from .words import Telling, Wording
+from ..target.recursions import TableKind
+from .base import (
+    Cause,
+    Features,
+    History,
+    Needs,
+    Parameter,
+    Scene,
+    SearchRule,
+    Tabled,
+    Telling,
+    Values,
+    Wording,
+    anywhere,
+)
 
 __all__ = ["CAUSE", "channel_of"]
 

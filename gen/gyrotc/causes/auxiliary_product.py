@@ -8,11 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursion import TableKind
+from ..target.recursions import TableKind
 from .auxiliary import channel_of
-from .base import Cause, Features, History, Needs, Parameter, Scene, Values
-from .tabled import Tabled
-from .words import Telling, Wording
+from .base import Cause, Features, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording
 
 __all__ = ["CAUSE"]
 

@@ -1,4 +1,4 @@
-"""What a cause of the catalogue is: everything that is known of it stands in one `Cause`, in one module.
+"""What a cause of the catalogue is: physics, columns, search, words, and how a table stores it.
 
 - `cavity`, `bias`, `record`: how the cause acts on a simulated instrument (`Scene`), at the simulation's own
   rate;
@@ -12,19 +12,219 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from decimal import Context, Decimal
+from enum import IntEnum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from .search import SearchRule
-from .tabled import Tabled
-from .words import Wording
+from ..target.arithmetic import FLOAT64
+from ..target.recursions import Recursion, TableKind, first_order, recursion_of
 
-__all__ = ["Cause", "Features", "History", "Kind", "Needs", "Parameter", "Scene", "Values"]
+__all__ = [
+    "COLD_STARTS",
+    "CORNERS",
+    "KNOWN_AFTER",
+    "RATES",
+    "Cause",
+    "Features",
+    "History",
+    "Kind",
+    "Needs",
+    "Parameter",
+    "Reach",
+    "Scene",
+    "SearchRule",
+    "SingleCycle",
+    "Tabled",
+    "Telling",
+    "Values",
+    "Wording",
+    "anywhere",
+    "blocks_per_tau",
+    "geometric",
+    "half_block_before",
+    "lagged",
+    "memory_gain",
+    "octaves_per_block",
+    "turns",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """What recordings can show: the range of their temperatures, C, and the length of the longest run, s."""
+
+    span_c: float
+    longest_s: float
+
+    def most(self, unit: str) -> float:
+        """The largest time constant (s) or width (C) of a memory that they can show.
+
+        Half a run: what is slower has not come to rest in it. 0.45 of the range of temperature: a play that
+        is wider hardly moves.
+        """
+        return 0.45 * self.span_c if unit == "C" else 0.5 * self.longest_s
+
+
+@dataclass(frozen=True, slots=True)
+class SingleCycle:
+    """How a memory is looked for in a single chamber cycle.
+
+    Attributes:
+        points: How many the grid over its parameter has.
+        usual: Every package has such a memory: it is preferred to one that does as well and that few have.
+    """
+
+    points: int
+    usual: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRule:
+    """How diagnosis looks for a cause.
+
+    Attributes:
+        price: Free parameters that it adds to the model: its share of the information criterion.
+        grid: Values of the nonlinear parameters: less than 1 % of a signature's energy falls between two points.
+        over: The parameter that is refined between the points of the grid; None: it has none.
+        needed_d: Signal-to-noise ratio that is found in 95 % of cases at a familywise level of 1 % (docs/diagnosis.md).
+        width: About one point of the grid at a value of the parameter, for recordings that span some C.
+        step: Step of the derivative to the parameter, in its unit; None: 2 % of its value.
+        twice: It may be there twice, with parameters far apart.
+        imitates: Whether a cause that is found is compared with it: from which d the two can be told apart.
+        planned: Whether a profile without rates says anything of it.
+        shown: Values of `over` at which it stands for itself in a plan.
+        rival_every: A plan looks at one point in this many of its grid as a rival.
+        cycle: How it is looked for in a single chamber cycle; None: it is not.
+        loops: It stands for every memory with loops that do not depend on the rate, and is judged by them all.
+    """
+
+    price: int
+    grid: Callable[[Reach], list[Mapping[str, float]]]
+    over: str | None = None
+    needed_d: float = 6.3
+    width: Callable[[float, float], float] = lambda here, span_c: 0.2 * abs(here)
+    step: float | None = None
+    twice: bool = False
+    imitates: bool = False
+    planned: bool = True
+    shown: tuple[float, ...] = ()
+    rival_every: int = 1
+    cycle: SingleCycle | None = None
+    loops: bool = False
+
+
+def anywhere(reach: Reach) -> list[Mapping[str, float]]:
+    """The grid of a cause without a parameter to search over."""
+    return [{}]
+
+
+def geometric(parameter: Parameter, points: int) -> Callable[[Reach], list[Mapping[str, float]]]:
+    """A grid that is even in the logarithm, up to what the recordings can show; none where they show less."""
+
+    def grid(reach: Reach) -> list[Mapping[str, float]]:
+        top = min(parameter.high, reach.most(parameter.unit))
+        if top <= parameter.low:
+            return []
+        return [{parameter.name: float(v)} for v in np.geomspace(parameter.low, top, points)]
+
+    return grid
+
+
+@dataclass(frozen=True, slots=True)
+class Tabled:
+    """How a cause stands in a table.
+
+    Attributes:
+        kind: Recursion of the target.
+        parameters: Parameters of the record (docs/FORMAT.md, section 3) from those of the cause and the length
+            of a block in s.
+    """
+
+    kind: TableKind
+    parameters: Callable[[Mapping[str, float], float], list[float]]
+
+    def recursion(self, values: Mapping[str, float], block_s: float) -> Recursion:
+        """The recursion in float64."""
+        return recursion_of(self.kind, FLOAT64, self.parameters(values, block_s))
+
+
+def memory_gain(block_s: float, tau_s: float) -> float:
+    """1 - exp(-block/tau), by decimal arithmetic: the same on every machine."""
+    context = Context(prec=40)
+    ratio = context.divide(Decimal(-block_s), Decimal(tau_s))
+    return float(1 - context.exp(ratio))
+
+
+def half_block_before(block_s: float, tau_s: float) -> float:
+    """exp(block/2τ): what fades with τ was so much larger half a block earlier.
+
+    A memory is known for the end of a block, and in force over the whole of it: its mean is that of the middle. Of a
+    block that is longer than 2τ nothing is left of it, and no factor brings it back: e at most.
+    """
+    context = Context(prec=40)
+    return float(context.exp(min(context.divide(Decimal(block_s), 2 * Decimal(tau_s)), Decimal(1))))
+
+
+def blocks_per_tau(block_s: float, tau_s: float) -> float:
+    """block/tau: what turns T − z into the memory's change in a block."""
+    return block_s / tau_s
+
+
+def octaves_per_block(block_s: float, tau_s: float) -> float:
+    """How many times exp(-t/tau) halves in a block."""
+    return 1.4426950408889634 * block_s / tau_s  # log2(e)
+
+
+def turns(phase_rad: float) -> float:
+    """A phase in turns, -1/2 ... 1/2."""
+    whole = phase_rad / (2.0 * math.pi)
+    return whole - round(whole)
+
+
+class Telling(IntEnum):
+    """How much the experiment of a cause tells: that of the more telling one of a pair is proposed."""
+
+    LITTLE = 0
+    STATIC = 1
+    CHANNEL = 2
+    REPEATS = 3
+    COLD_START = 4
+    DIRECTION = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """The words of a cause in reports.
+
+    Attributes:
+        name: One clause.
+        short: At most eight letters, for the head of a column.
+        signature: How it shows in the residuals.
+        remedy: What to do about it.
+        experiment: What tells it from other causes.
+        telling: How much that tells.
+        beside: The experiment that tells it from one certain cause, by id of that cause.
+        recording: What to record so that it can be tested; empty where any recording will do.
+        advice: What to do when it is found, besides the remedy; a sentence, or empty.
+    """
+
+    name: str
+    short: str
+    signature: str
+    remedy: str
+    experiment: str
+    telling: Telling = Telling.LITTLE
+    beside: Mapping[str, str] = field(default_factory=dict)
+    recording: str = ""
+    advice: str = ""
+
 
 Values = Mapping[str, float]
 
@@ -193,3 +393,18 @@ class Cause:
     def shipped(self) -> bool:
         """Whether an extended model can hold it: as a term, or by a finer map."""
         return self.table is not None or self.finer_map
+
+
+KNOWN_AFTER = 3.0  # time constants after which a record has forgotten what was before it: e^-3 is 5 %
+
+RATES = "ramps at two more rates with holds of an hour after each; a second thermometer at the cavity"
+CORNERS = "steps or 5 C/min corners recorded with 10-s rows; a synchronisation pulse in both recordings"
+COLD_STARTS = "a cold start at a constant chamber temperature, at two temperatures; a hot restart"
+
+
+def lagged(history: History, tau_s: float) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], Features]:
+    """State z of the recorded temperature and, as columns, (z, dz/dt in C/min)."""
+    z = first_order(tau_s, history.time_s, history.temperature_c)
+    slope = (history.temperature_c - z) * (60.0 / tau_s)
+    known = history.time_s - history.time_s[0] >= KNOWN_AFTER * tau_s
+    return z, Features(np.column_stack((z, slope)), known)

@@ -6,13 +6,23 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 from __future__ import annotations
 
 from ..common.arrays import FloatArray
-from ..target.operators import first_order
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Parameter, Scene, Values
-from .memory import RATES, lagged
-from .search import SearchRule, geometric
-from .tabled import Tabled, blocks_per_tau, memory_gain
-from .words import Wording
+from ..target.recursions import TableKind, first_order
+from .base import (
+    RATES,
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Scene,
+    SearchRule,
+    Tabled,
+    Values,
+    Wording,
+    blocks_per_tau,
+    geometric,
+    lagged,
+    memory_gain,
+)
 
 __all__ = ["CAUSE"]
 

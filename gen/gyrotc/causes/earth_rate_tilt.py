@@ -12,9 +12,8 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.operators import first_order
-from .base import Cause, Parameter, Scene, Values
-from .words import Telling, Wording
+from ..target.recursions import first_order
+from .base import Cause, Parameter, Scene, Telling, Values, Wording
 
 __all__ = ["CAUSE", "EARTH_RATE_DPH"]
 

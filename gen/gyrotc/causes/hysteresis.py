@@ -10,12 +10,21 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.operators import play
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Parameter, Scene, Values
-from .search import SearchRule, SingleCycle, geometric
-from .tabled import Tabled
-from .words import Telling, Wording
+from ..target.recursions import TableKind, play
+from .base import (
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Scene,
+    SearchRule,
+    SingleCycle,
+    Tabled,
+    Telling,
+    Values,
+    Wording,
+    geometric,
+)
 
 __all__ = ["CAUSE"]
 

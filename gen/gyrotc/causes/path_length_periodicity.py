@@ -14,11 +14,21 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Parameter, Scene, Values
-from .search import Reach, SearchRule
-from .tabled import Tabled, turns
-from .words import Telling, Wording
+from ..target.recursions import TableKind
+from .base import (
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Reach,
+    Scene,
+    SearchRule,
+    Tabled,
+    Telling,
+    Values,
+    Wording,
+    turns,
+)
 
 __all__ = ["CAUSE"]
 

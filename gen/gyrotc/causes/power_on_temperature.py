@@ -8,9 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, Features, History, Needs, Parameter, Scene, Values
-from .search import SearchRule, anywhere
-from .words import Telling, Wording
+from .base import (
+    Cause,
+    Features,
+    History,
+    Needs,
+    Parameter,
+    Scene,
+    SearchRule,
+    Telling,
+    Values,
+    Wording,
+    anywhere,
+)
 
 __all__ = ["CAUSE"]
 

@@ -8,10 +8,8 @@ a static map absorbs it and nothing in its residual can show it. There is nothin
 from __future__ import annotations
 
 from ..common.arrays import FloatArray
-from ..target.operators import first_order
-from .base import Cause, Parameter, Scene, Values
-from .memory import RATES
-from .words import Wording
+from ..target.recursions import first_order
+from .base import RATES, Cause, Parameter, Scene, Values, Wording
 
 __all__ = ["CAUSE"]
 

@@ -12,13 +12,24 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.operators import first_order
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Parameter, Scene, Values
-from .memory import RATES, lagged
-from .search import SearchRule, SingleCycle, geometric
-from .tabled import Tabled, half_block_before, memory_gain
-from .words import Wording
+from ..target.recursions import TableKind, first_order
+from .base import (
+    RATES,
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Scene,
+    SearchRule,
+    SingleCycle,
+    Tabled,
+    Values,
+    Wording,
+    geometric,
+    half_block_before,
+    lagged,
+    memory_gain,
+)
 
 __all__ = ["CAUSE"]
 

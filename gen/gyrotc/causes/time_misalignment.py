@@ -8,11 +8,20 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.operators import delayed
-from .base import Cause, Features, History, Parameter, Scene, Values
-from .memory import CORNERS, RATES
-from .search import Reach, SearchRule
-from .words import Wording
+from ..target.recursions import delayed
+from .base import (
+    CORNERS,
+    RATES,
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Reach,
+    Scene,
+    SearchRule,
+    Values,
+    Wording,
+)
 
 __all__ = ["CAUSE"]
 

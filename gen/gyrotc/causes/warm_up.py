@@ -8,12 +8,24 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursion import TableKind
-from .base import Cause, Features, History, Needs, Parameter, Scene, Values
-from .memory import COLD_STARTS
-from .search import SearchRule, geometric
-from .tabled import Tabled, half_block_before, octaves_per_block
-from .words import Telling, Wording
+from ..target.recursions import TableKind
+from .base import (
+    COLD_STARTS,
+    Cause,
+    Features,
+    History,
+    Needs,
+    Parameter,
+    Scene,
+    SearchRule,
+    Tabled,
+    Telling,
+    Values,
+    Wording,
+    geometric,
+    half_block_before,
+    octaves_per_block,
+)
 
 __all__ = ["CAUSE"]
 

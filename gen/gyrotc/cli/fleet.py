@@ -1,4 +1,4 @@
-"""The command `fleet`: many serials at once."""
+"""The commands `fleet`, `catalogue` and `lot`: many serials at once."""
 
 from __future__ import annotations
 
@@ -12,8 +12,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from .base import JsonOption, LotOption, OutOption, app, lot_in, progress, tell, write_json
-from .stages import time_left
+from ..store.files import json_text
+from ..store.folder import write_result
+from .base import (
+    LOT,
+    JsonOption,
+    LotOption,
+    OutOption,
+    app,
+    lot_in,
+    progress,
+    tell,
+    time_left,
+    write_json,
+    written_place,
+)
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
@@ -182,3 +195,31 @@ def _tell_entry(entry: FleetEntry) -> None:
     if entry.aside:
         text += f"; its earlier result had been changed and is now {entry.aside}"
     tell(text)
+
+
+@app.command()
+def lot(
+    fleet: Annotated[
+        Path, typer.Argument(help="The folder that gyrotc fleet wrote: fully calibrated units.")
+    ],
+    out: Annotated[Path, typer.Option("--out", callback=written_place, help="File for the lot.")],
+    axis: Annotated[
+        str | None,
+        typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own."),
+    ] = None,
+) -> None:
+    """Learn what units of one type share, so that the next ones need fewer runs (build --lot).
+
+    Example: gyrotc lot fleet --out lot.json
+    """
+    from ..lot.job import lot_of
+
+    with progress(LOT) as say:
+        found = lot_of(fleet, axis=axis, progress=say)
+    write_result(out, json_text(found.content()))
+    checked = found.cross_validation
+    tell(f"{out}: {found.told}")
+    tell(
+        f"a new unit, before any run: {checked.left_rms_dph:.3g} deg/h about the lot's map, "
+        f"{checked.constant_rms_dph:.3g} about its own mean"
+    )

@@ -1,15 +1,67 @@
-"""The command `gyrotc`: the entry point. Commands print in `commands`; only this module exits."""
+"""The command `gyrotc`: the entry point, exit statuses, and what happens when the program itself fails."""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
+import platform
 import signal
 import sys
+import tempfile
+import traceback
 import warnings
+from pathlib import Path
 
+from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..common.texts import terminal_line, terminal_text
+
+__all__ = ["EXIT_STATUS", "crash_line"]
+
+EXIT_STATUS = 70
+"""EX_SOFTWARE of sysexits.h: an internal fault, not one of the input."""
+
+
+def crash_line(error: BaseException) -> str:
+    """Writes the report of an unexpected exception; the line that the user sees, with its id and its place.
+
+    The id follows from where the program failed, so that the same fault has the same id everywhere.
+    """
+    frames = [
+        f"{Path(f.filename).name}:{f.lineno}:{f.name}" for f in traceback.extract_tb(error.__traceback__)
+    ]
+    kind = type(error).__name__
+    number = hashlib.sha256(" ".join([__version__, kind, *frames]).encode()).hexdigest()[:8]
+    text = "\n".join(
+        [
+            f"gyrotc {__version__}, report {number}",
+            f"Python {sys.version.split()[0]}, {platform.platform()}",
+            f"arguments: {sys.argv[1:]!r}",
+            "",
+            *traceback.format_exception(error),
+        ]
+    )
+    found = " ".join(f"{kind}: {error}".split())[:160]
+    found = "".join(c if c.isprintable() else "?" for c in found)
+    return f"internal fault {number} ({found}); {_kept(number, text)}"
+
+
+def _kept(number: str, text: str) -> str:
+    """Where the report is: the user's folder of state, else the one of temporary files."""
+    root = os.environ.get("XDG_STATE_HOME")
+    state = (Path(root) if root else Path.home() / ".local" / "state") / "gyrotc"
+    for folder in (state, Path(tempfile.gettempdir())):
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            handle, name = tempfile.mkstemp(prefix=f"crash-{number}-", suffix=".txt", dir=folder)
+            with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+                file.write(text)
+        except OSError:
+            continue
+        return f"please send {name}"
+    return "its report could not be written"
+
 
 _CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
 
@@ -128,7 +180,7 @@ def run(arguments: list[str]) -> int:
         print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
         return GyrotcError.exit_status
     except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
-        from .crash import EXIT_STATUS, crash_line
+        pass
 
         print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
         return EXIT_STATUS

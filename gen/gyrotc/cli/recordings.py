@@ -1,7 +1,8 @@
-"""Commands about recordings: make them, check them."""
+"""Commands about recordings: import, simulate, check."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,6 +23,141 @@ from .base import (
     write_json,
     written_place,
 )
+
+_ROLES = ("time", "temperature", "rate", "rate_x", "rate_y", "rate_z", "pulses")
+
+
+@app.command(name="import")
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="Files of a logger, each a run.")],
+    out: OutOption,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="The map.toml of an earlier import from this logger.")
+    ] = None,
+    serial: Annotated[str | None, typer.Option("--serial", help="Serial of the gyro.")] = None,
+    rate_unit: Annotated[
+        str | None, typer.Option("--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, ...")
+    ] = None,
+    temperature_unit: Annotated[
+        str | None, typer.Option("--temperature-unit", help="Unit of temperatures: degC, K, degF, ...")
+    ] = None,
+    time_unit: Annotated[
+        str | None, typer.Option("--time-unit", help="Unit of times: s, ms, us, min, 0.01 s, ...")
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column", help="What a column is, e.g. rate=G1, temperature=T2, time=t; may be repeated."
+        ),
+    ] = None,
+    table: Annotated[
+        str | None, typer.Option("--table", help="Which of several tables (topics, groups) of a file.")
+    ] = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times."),
+    ] = None,
+    time_format: Annotated[
+        str | None, typer.Option("--time-format", help='Form of stamps, e.g. "%d/%m/%Y %H:%M:%S.%f".')
+    ] = None,
+    time_zone: Annotated[
+        str | None,
+        typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00."),
+    ] = None,
+    csv: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--csv",
+            help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
+        ),
+    ] = None,
+    format: Annotated[str, typer.Option("--format", help="Format of the runs: parquet or csv.")] = "parquet",
+    pulse_weight: Annotated[
+        float | None,
+        typer.Option(
+            "--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."
+        ),
+    ] = None,
+    trust_units: TrustUnitsOption = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only tell how the files would be read.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Make a data set of any logger's files: CSV of any dialect, MATLAB, HDF5, Parquet, TDMS, PX4, ArduPilot, ROS, MDF.
+
+    Example: gyrotc import chamber.csv --out RLG-0042 --rate-unit deg/s
+    """
+    from ..recordings.importers.job import ImportOptions, import_files
+    from ..recordings.importers.map_file import Map, load_map
+
+    if format not in ("csv", "parquet"):
+        raise InputError("--format", repr(format), "parquet or csv")
+    known = load_map(map_file) if map_file else Map()
+    units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
+    stated = {"rate_hz": rate_hz, "format": time_format, "zone": time_zone}
+    content = known.model_dump()
+    content["csv"] |= _csv(csv or [], content["csv"])
+    content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
+    chosen = _stated(content, units, stated, _columns(column or []), table)
+    options = ImportOptions(serial, format, trust_units, dry_run)  # type: ignore[arg-type]
+    with progress() as say:
+        result = import_files(
+            files, out, Map.model_validate(chosen), options, ask=_ask, say=tell,
+            progress=lambda name, done: say(f"{name} {done:.0%}"),
+        )  # fmt: skip
+    if result is not None:
+        write_json(json_file, result.result().content())
+
+
+def _stated(
+    content: dict[str, Any],
+    units: dict[str, str | None],
+    time_keys: dict[str, Any],
+    columns: dict[str, Any],
+    table: str | None,
+) -> dict[str, Any]:
+    """A map with what options state."""
+    content["units"] |= {kind: unit for kind, unit in units.items() if unit is not None}
+    content["time"] |= {key: value for key, value in time_keys.items() if value is not None}
+    if any(role.startswith(("rate", "pulses")) for role in columns):
+        for role in _ROLES[2:]:
+            content["columns"][role] = None
+    content["columns"] |= columns
+    return content | ({"table": table} if table is not None else {})
+
+
+def _columns(stated: list[str]) -> dict[str, Any]:
+    """`role=name` options; `time` may be given twice, for a date and a time of day."""
+    columns: dict[str, Any] = {}
+    for one in stated:
+        role, _, name = one.partition("=")
+        if role not in _ROLES or not name:
+            raise InputError("--column", repr(one), f"ROLE=NAME with ROLE one of {', '.join(_ROLES)}")
+        columns[role] = (*columns.get("time", ()), name) if role == "time" else name
+    return columns
+
+
+def _csv(stated: list[str], known: dict[str, Any]) -> dict[str, Any]:
+    """`key=value` options as `[csv]` of a map; `missing` and `comment` add to what is there."""
+    keys: dict[str, Any] = {}
+    for one in stated:
+        key, _, value = one.partition("=")
+        if key not in known or not value:
+            raise InputError("--csv", repr(one), f"KEY=VALUE with KEY one of {', '.join(known)}")
+        many = key in ("missing", "comment")
+        keys[key] = (
+            (*keys.get(key, known[key]), value) if many else int(value) if value.isdecimal() else value
+        )
+    return keys
+
+
+def _ask(question: str) -> str | None:
+    """A person's answer; None where there is no terminal."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return None
+    answer: str = typer.prompt(question, default="", show_default=False, err=True)
+    return answer.strip() or None
 
 
 @app.command()
@@ -156,7 +292,7 @@ def check(
             progress=say,
         )
         if plots is not None:
-            from ..pages.check_page import write_check_page
+            from ..pages.check import write_check_page
 
             say("drawing")
             write_check_page(plots, dataset, result)

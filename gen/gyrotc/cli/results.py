@@ -9,10 +9,9 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..pages.published import ENVIRONMENTS
-from ..results.changes import Changes
-from ..results.evaluation import EvaluatedRun, Evaluation, Pooled
-from ..results.limits import HeldLimits
+from ..pages.comparison import ENVIRONMENTS
+from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
+from ..results.release import HeldLimits
 from ..results.training import Training
 from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
 

@@ -1,13 +1,41 @@
-"""What concerns the user's own machine: completion of a shell, and the cache."""
+"""What concerns the user's own machine: completion of a shell, the cache, forms of the results."""
 
 from __future__ import annotations
 
+import json
+from importlib import resources
 from typing import Annotated
 
 import typer
 
 from ..common.errors import InputError
 from .base import app, tell
+
+
+@app.command()
+def schema(
+    name: Annotated[
+        str | None, typer.Argument(help="A result, e.g. limits; without it all, by name.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of a result, or of all of them.
+
+    Example: gyrotc schema limits
+    """
+    shipped = resources.files("gyrotc.results") / "schemas"
+    texts = {
+        file.name.removesuffix(".json"): file.read_text("utf-8")
+        for file in sorted(shipped.iterdir(), key=lambda file: file.name)
+        if file.name.endswith(".json")
+    }
+    if name is None:
+        whole = {known: json.loads(text) for known, text in texts.items()}
+        typer.echo(json.dumps(whole, indent=1))
+    elif name in texts:
+        typer.echo(texts[name], nl=False)
+    else:
+        raise InputError("schema", repr(name), ", ".join(texts))
+
 
 _SHELLS = ("bash", "zsh", "fish")
 
@@ -39,7 +67,7 @@ def cache(
 
     Example: gyrotc cache --limit 0.5
     """
-    from ..store import kept
+    from ..store import cache as kept
 
     if limit_gb is not None:
         kept.set_limit(round(limit_gb * 1e9))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -9,11 +11,14 @@ import typer
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..store.files import write_atomically
+from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
-from ..store.jsontext import json_text
+from ..store.marker import MARKER
 from .base import (
+    EMIT,
     ERR,
+    FIT,
+    VERIFY,
     AgeingOption,
     AppliedOption,
     AverageOption,
@@ -53,8 +58,43 @@ from .results import (
     verify_notes,
     verify_table,
 )
-from .stages import EMIT, FIT, VERIFY
-from .traces import evaluation_folders
+
+__all__ = ["evaluation_folders"]
+
+
+@contextmanager
+def evaluation_folders(
+    folder: Path, trace: Path | None, recordings: Path
+) -> Iterator[tuple[Path, Path | None]]:
+    """Where to write `evaluate.json` and the traces, so that both take their places when the block ends well.
+
+    Args:
+        folder: The result folder, which gets `evaluate.json`.
+        trace: Folder for the traces: inside it, elsewhere, or None.
+        recordings: The data set; the traces are not written into it.
+
+    Raises:
+        InputError: As `result_folder`; or the traces would take the place of another part of the result.
+    """
+    inside = _inside(folder, trace)
+    entries = ("evaluate.json", *([inside.parts[0]] if inside else []))
+    with ExitStack() as stack:
+        stage = stack.enter_context(result_folder(folder, "evaluate", entries=entries))
+        if trace is None or inside:
+            yield stage.folder, stage.folder / inside if inside else None
+            return
+        traces = result_folder(trace, "evaluate", kind="trace", inputs=[recordings])
+        yield stage.folder, stack.enter_context(traces).folder
+
+
+def _inside(folder: Path, trace: Path | None) -> Path | None:
+    """The folder of traces by its path in the result folder; None where it lies elsewhere."""
+    if trace is None or folder.resolve() not in (trace.resolve(), *trace.resolve().parents):
+        return None
+    inside = trace.resolve().relative_to(folder.resolve())
+    if not inside.parts or any((folder / inside.parts[0] / name).exists() for name in ("gtc.h", MARKER)):
+        raise InputError("--trace", f"{trace} is part of the result already", str(folder / "trace"))
+    return inside
 
 
 @app.command()
@@ -125,8 +165,8 @@ def emit(
     Example: gyrotc emit result/model.json --out result
     """
     from ..model import load_model
-    from ..results.emission import Emitted, EmittedTable
-    from ..tables.files import emit as run
+    from ..results.verification import Emitted, EmittedTable
+    from ..tables.emit import emit as run
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
@@ -156,7 +196,7 @@ def emit(
 
 
 @app.command()
-def verify(  # long: the parts of a command in the order in which they are printed
+def verify(
     folder: DirArg,
     target: TargetOption = None,
     dataset: Annotated[
@@ -279,8 +319,8 @@ def report(folder: DirArg) -> None:
 
     Example: gyrotc report result
     """
-    from ..pages.diagnosis_page import is_diagnosis, write_diagnosis_page
-    from ..pages.plan_page import is_plan, write_plan_page
+    from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
+    from ..pages.plan import is_plan, write_plan_page
     from ..pages.report import write_report
 
     with progress() as say:

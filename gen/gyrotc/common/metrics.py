@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import FloatArray
-from .ceilings import need_memory
+from .inputs import need_memory
 
 __all__ = [
     "LEAST_SPAN_C",

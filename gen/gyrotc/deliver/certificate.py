@@ -1,11 +1,18 @@
-"""A certificate of a result folder: facts of the laboratory beside what was measured, on paper and as a DCC.
+"""A certificate of a result folder: on paper, and as a digital calibration certificate (PTB's DCC, schema 3.3).
+
+Both are made of the same rows, so that a figure has the same digits in both.
 
 What is missing is told before anything is written. Figures are those of the page, digit by digit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -14,19 +21,154 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..common.inputs_texts import checked, read_toml
+from ..common.inputs import checked, read_toml
+from ..common.texts import html_environment
 from ..jobs.axes import axes_in
 from ..jobs.release import accepted, unit_of
+from ..pages.report import page_environment
 from ..pages.unit import UnitResults
-from ..results.budget import Budget
-from ..results.manifest import Manifest
-from ..store.files import write_atomically
+from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
+from ..results.folder import Manifest
+from ..results.release import Budget, Limit
+from ..store.files import write_atomically, write_own
 from ..store.folder import result_folder
 from ..store.marker import sha256
-from .pages_certificate import certificate_page, dcc_text
-from .printing import print_to_pdf
+from ..store.scratch import scratch_folder
 
-__all__ = ["Certified", "LaboratoryFacts", "certificate", "facts_of"]
+__all__ = [
+    "Certified",
+    "CertifiedRow",
+    "LaboratoryFacts",
+    "certificate",
+    "certificate_page",
+    "dcc_text",
+    "facts_of",
+    "print_to_pdf",
+    "rows_of",
+]
+
+_CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
+_UNITS = (
+    ("_dph", r"\degree\hour\tothe{-1}"),
+    ("_arcsec", r"\arcsecond"),
+    ("rms_over_floor", r"\one"),
+    ("improvement", r"\one"),
+)
+"""Ends of the names of figures, and their units in D-SI."""
+
+
+@dataclass(frozen=True, slots=True)
+class CertifiedRow:
+    """A result: what it is, its text on the page, and for machines value, U, k and unit (empty: it has no U)."""
+
+    text: str
+    page: str
+    value: str = ""
+    spread: str = ""
+    factor: str = ""
+    unit: str = ""
+    bound: str = ""
+    verdict: str = ""
+
+    @property
+    def conformity(self) -> str:
+        """As the DCC says it; empty without a limit."""
+        return _CONFORMITY.get(self.verdict, "")
+
+
+def rows_of(unit: UnitResults) -> list[CertifiedRow]:
+    """Results of an axis: the bias after compensation, then every limit, those that are not met first."""
+    return [*_bias(unit), *map(_row, unit.held)]
+
+
+def _bias(unit: UnitResults) -> Iterator[CertifiedRow]:
+    budget = unit.budget
+    if budget is not None and budget.expanded_dph > 0.0:
+        found = digits_of(0.0, budget.expanded_dph)
+        yield CertifiedRow(
+            text="bias after compensation, deg/h",
+            page=f"0 ± {rounded(budget.expanded_dph)}",
+            value="0",
+            spread=found.decimal(found.spread),
+            factor=f"{budget.coverage_factor:.2f}",
+            unit=_UNITS[0][1],
+        )
+
+
+def _row(limit: Limit) -> CertifiedRow:
+    verdict = limit.verdict or ("PASS" if limit.met else "FAIL")
+    plain = CertifiedRow(
+        text=limit_words(limit.limit), page=measured_words(limit), bound=bound_words(limit), verdict=verdict
+    )
+    unit = next((unit for end, unit in _UNITS if limit.limit.endswith(end)), "")
+    known = limit.expanded_uncertainty
+    if not unit or not known or not math.isfinite(known) or not isinstance(limit.measured, float):
+        return plain
+    found = digits_of(limit.measured, known)
+    return CertifiedRow(
+        text=plain.text,
+        page=plain.page,
+        value=found.decimal(found.value),
+        spread=found.decimal(found.spread),
+        factor=f"{limit.coverage_factor or 2.0:.2f}",
+        unit=unit,
+        bound=plain.bound,
+        verdict=verdict,
+    )
+
+
+def certificate_page(
+    units: Sequence[UnitResults], facts: Any, missing: Sequence[str], accepted: str | None = None
+) -> str:
+    """The page.
+
+    Args:
+        facts: What the laboratory states.
+        missing: What is missing makes it a draft.
+        accepted: Why the unit is released although a verdict is FAIL.
+    """
+    template = page_environment().get_template("certificate.html.j2")
+    rows = [rows_of(unit) for unit in units]
+    return template.render(units=units, rows=rows, facts=facts, missing=missing, accepted=accepted)
+
+
+def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
+    """The XML of a DCC; arguments as of the page."""
+    environment = html_environment(line=_line, day=lambda text: text[:10], rounded=rounded)
+    text = environment.get_template("dcc.xml.j2").render(
+        units=units, rows=[rows_of(unit) for unit in units], facts=facts, accepted=accepted
+    )
+    return re.sub(r"\n\s*\n+", "\n", text)
+
+
+def _line(value: object) -> str:
+    """Text as a DCC takes it: words with a blank between them, and never none."""
+    return " ".join(str(value).split()) or "-"
+
+
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+_LONGEST_S = 120.0  # a page takes two seconds; a browser that hangs must not hold the job
+
+
+def print_to_pdf(page: Path, pdf: Path) -> bool:
+    """Prints a page of our own; False where no browser is there or it does not do it."""
+    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        return False
+    with scratch_folder() as work:
+        command = [
+            found, "--headless", "--disable-gpu", "--disable-extensions", "--no-first-run",
+            *(["--no-sandbox"] if os.geteuid() == 0 else []),  # which it refuses to have as root
+            f"--user-data-dir={work / 'browser'}", "--no-pdf-header-footer", f"--print-to-pdf={work / 'page.pdf'}",
+            page.resolve().as_uri(),
+        ]  # fmt: skip
+        try:
+            subprocess.run(command, check=True, timeout=_LONGEST_S, capture_output=True)
+            write_own(pdf, (work / "page.pdf").read_bytes())
+        except (OSError, subprocess.SubprocessError):
+            return False
+    return True
+
 
 _EXPECTED = "a facts file (docs/certificate.md)"
 Line = Annotated[str, Field(min_length=1, max_length=300)]

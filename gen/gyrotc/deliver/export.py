@@ -10,14 +10,11 @@ from typing import Literal, cast, get_args
 from ..common.errors import InputError
 from ..jobs.axes import axes_in
 from ..model import Model, load_model
-from ..store.files import check_replaceable, write_atomically
-from ..store.jsontext import json_text
+from ..store.files import check_replaceable, json_text, write_atomically
 from ..store.marker import check_intact
 from ..tables.record import RECORD, read_options
-from .asap2 import a2l_text
-from .autopilots import AXES, parameters
-from .cdf import cdf_text
-from .cubic import Autopilot, best_cubic
+from .asam import a2l_text, cdf_text
+from .autopilots import AXES, Autopilot, best_cubic, parameters
 from .fmu import fmu
 from .grid import GRID, MapGrid, csv_text, grid_of, map_result
 

@@ -19,12 +19,10 @@ from ..common.errors import CheckFailed
 from ..common.texts import c_code, c_environment, toml_comment
 from ..jobs.axes import check_emitted
 from ..model import Model, table_id
-from ..store.opening import write_own
+from ..store.files import write_own
 from ..store.scratch import scratch_folder
-from ..tables.example import example_period_us
-from ..tables.guards import guard_of
-from ..tables.sigma import sigma_cells
-from ..tables.terms import channel_names
+from ..tables.rounding import channel_names, guard_of, sigma_cells
+from ..tables.text import example_period_us
 from ..verify.toolchain import all_targets, compile_c
 
 __all__ = ["fmu"]

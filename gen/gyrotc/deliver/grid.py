@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..common.arrays import FloatArray
 from ..model import Model
-from ..results.map import MapOfAxis, MapOnGrid
+from ..results.folder import MapOfAxis, MapOnGrid
 
 __all__ = ["GRID", "MapGrid", "csv_text", "grid_of", "map_result"]
 

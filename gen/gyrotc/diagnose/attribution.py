@@ -1,4 +1,4 @@
-"""Attribution: which causes, how sure, and is anything left?
+"""Attribution: which causes, alone or in pairs, how sure, and is anything left?
 
 Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, further
 ones while the search finds something beside them. What the chosen causes leave is held against the whole
@@ -13,22 +13,19 @@ import numpy as np
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
+from ..common.statistics import orthonormal
 from .candidates import Candidate, searched
-from .contest import Contest, contest
 from .detection import Found, detect
-from .gains import Gains, Point
+from .gains import Gains, Point, best_of, clear_pair, makes_sense
 from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
-from .misfit import Misfit, explained, misfit
-from .pairs import best_of, clear_pair, makes_sense
+from .misfit import Contest, Misfit, contest, explained, misfit
 from .refine import Refined, model_columns, refine, sized
-from .rivals import Rival, near_of, odds_of, probabilities_of, ranked_rivals
+from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranked_rivals
 from .search import Search
-from .simulated_odds import calibrated
 from .wide_memory import WideMemory, outlasts, rate_independent
 
-__all__ = ["Attribution", "attribute", "choose"]
-
+__all__ = ["Attribution", "attribute", "choose", "overlap"]
 
 _LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
 _WELL = 0.08  # p-value of what is left that a pair must reach,
@@ -283,3 +280,40 @@ def _by_strength(singles: list[Point], chosen: tuple[Candidate, ...]) -> list[in
 def _p_value(found: list[Found], cause: Candidate) -> float:
     same = (f.p_value for f in found if (f.candidate.id, f.candidate.channel) == (cause.id, cause.channel))
     return min(same, default=1.0)
+
+
+_TELLING = 10.0  # d² of the part that the rival cannot mimic: odds of about e^5 for the right one (docs/diagnosis.md)
+_LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
+
+
+def overlap(gains: Gains, cause: Refined, rivals: list[str]) -> dict[str, float]:
+    """d from which a cause can be told from each rival: √(10/(1 − R²)), R² what the rival can mimic of it."""
+    search = gains.search
+    total = gains.whiten(_fitted(gains, cause))
+    own = total - gains.map_q @ (gains.map_q.T @ total)
+    energy = float(own @ own)
+    out = {}
+    for rival in rivals:
+        best = 0.0
+        for candidate, at in (*gains.plain, *gains.random):
+            if candidate.id == rival:
+                best = max(best, _explained(gains.plain_columns(at), own))
+        for base in search.bank.inputs:
+            if base.id == rival:
+                best = max(best, 1.0 - gains.rest_after(base, total) / energy)
+        out[rival] = float(np.sqrt(_TELLING / max(1.0 - best, _LEAST)))
+    return out
+
+
+def _explained(columns: FloatArray, target: FloatArray) -> float:
+    """Share of the energy of `target`, shape (N,), that lies in the span of columns, shape (N, k)."""
+    return float(((orthonormal(columns).T @ target) ** 2).sum() / (target @ target))
+
+
+def _fitted(gains: Gains, cause: Refined) -> FloatArray:
+    """Map and cause as fitted, without noise, deg/h."""
+    bank = gains.search.bank
+    if cause.candidate.role == "input":
+        return np.asarray(cause.columns @ np.linalg.lstsq(cause.columns, gains.search.y, rcond=1e-9)[0])
+    rest = gains.search.y - cause.contribution
+    return np.asarray(bank.map @ (bank.map.T @ rest) + cause.contribution)

@@ -1,22 +1,80 @@
-"""Is there anything? Every candidate with its p-value, its own and adjusted for the whole search."""
+"""Detection: is there anything of the catalogue under any noise colour that the data allow, and what could be hidden?
+
+d is the matched-filter signal-to-noise ratio of a cause after the static map is taken out; the search finds
+`causes.base.SearchRule.needed_d` (6.3 for most causes) in 95 % of cases at a familywise level of 1 %.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
-from ..common.quantiles import CHI2_95_TWO
-from .candidates import Candidate
-from .joined import Held
-from .project import project
-from .scores import Projection, ScoredColumns, draw_null, score
-from .search import Search
-from .views import View, residual_log_likelihood
+from ..common.statistics import CHI2_95_TWO
+from .candidates import Candidate, searched, shape_parameter
+from .joined import Held, Projection, ScoredColumns, draw_null, score
+from .search import Search, View, residual_log_likelihood
 
-__all__ = ["Found", "detect"]
+__all__ = [
+    "CauseLimit",
+    "Found",
+    "amplitude_energy",
+    "detect",
+    "detection_limits",
+    "limit_of",
+    "project",
+]
+
+_RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
+
+
+def project(search: Search, view: View, held: Held) -> Projection:
+    """Everything after the columns of a model are projected out, under the colour of a view.
+
+    Where the map itself is not among them (its input is replaced), candidates get back what the map had taken of
+    them, and other inputs are no candidates any more.
+    """
+    out = search.joined.layout.held(held)
+    if held != "beside":
+        return _project(search, view, view.gram, view.b, out)
+    mix = _without_map(search, len(view.gram))
+    return _project(search, view, mix.T @ view.gram @ mix, mix.T @ view.b, out)
+
+
+def _without_map(search: Search, total: int) -> FloatArray:
+    """From the joined columns to those of a model without the map, shape (P, P)."""
+    joined = search.joined
+    layout = joined.layout
+    mix = np.eye(total)
+    mix[layout.static, layout.signatures] = search.bank.on_map
+    mix[layout.static, layout.channels] = joined.on_map[:, : joined.channels.shape[1]]
+    mix[layout.inputs, layout.inputs] = 0.0
+    return mix
+
+
+def _project(
+    search: Search, view: View, full: FloatArray, b: FloatArray, out: NDArray[np.int64]
+) -> Projection:
+    size, vectors = np.linalg.eigh(full[np.ix_(out, out)])
+    keep = size > _RANK * size[-1]
+    half = vectors[:, keep] / np.sqrt(size[keep])
+    cross = half.T @ full[out]
+    taken = half.T @ b[out]
+    common = np.zeros((len(full), search.bank.common.shape[1]))
+    common[search.joined.layout.signatures] = search.bank.common
+    return Projection(
+        a=(b - cross.T @ taken) / view.scale,
+        gram=full - cross.T @ cross,
+        before=np.maximum(np.diag(full), 1e-12),
+        common=common,
+        rest=view.yy - float(taken @ taken),
+        log_det=view.log_det + float(np.log(size[keep]).sum()),
+        rank=int(keep.sum()),
+    )
 
 
 _SEED = 20140916  # any: it fixes the draws, so that a diagnosis repeats to the last digit
@@ -83,3 +141,72 @@ def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: 
         parts.append(np.array([residual_log_likelihood(left, freedom - int(keep.sum()), log_det)]))
     parts.append(np.array([view.log_likelihood]))
     return np.concatenate(parts)
+
+
+_LARGEST = 1e150  # a norm whose square is finite stands for an infinite one
+
+
+@dataclass(frozen=True)
+class CauseLimit:
+    """Detection limit of one cause.
+
+    Attributes:
+        value: Typical limit over the parameter's range, in `unit`; None where nothing would be seen.
+        unit: Of the amplitude; s for a change of the map's input (the shortest that shows in this gyro).
+        at: Limits over the parameter: (parameter value, limit).
+        parameter: Name of that parameter, or None.
+    """
+
+    value: float | None
+    unit: str
+    at: tuple[tuple[float, float], ...]
+    parameter: str | None
+
+
+def detection_limits(search: Search) -> dict[str, CauseLimit]:
+    """Limits at the likeliest colour, by cause (channels: `auxiliary:name`)."""
+    view, joined = search.likeliest, search.joined
+    projection = project(search, view, "map and beside")
+    size = np.diag(projection.gram) / view.scale**2
+    found: dict[str, list[tuple[Candidate, float]]] = {}
+    for group in search.bank.groups:
+        if group.candidate.role == "structure":
+            continue
+        at = np.arange(group.columns.start, group.columns.stop)
+        power = size[at + joined.layout.signatures.start] * search.bank.scale[at] ** 2
+        amount = amplitude_energy(group.candidate.id, power)
+        if CATALOGUE[group.candidate.id].kind == "static":  # any shape: a unit of it in every block
+            amount = search.y.size / view.scale**2
+        found.setdefault(group.candidate.id, []).append((group.candidate, amount))
+    outside = size[joined.layout.channels.start : joined.layout.inputs.stop]
+    for candidate, energy, norm in zip(joined.added, outside, joined.norm, strict=True):
+        key = candidate.id if candidate.channel is None else f"{candidate.id}:{candidate.channel}"
+        found.setdefault(key, []).append((candidate, float(energy) * min(norm, _LARGEST) ** 2))
+    return {key: limit_of(key.split(":")[0], points) for key, points in found.items()}
+
+
+def amplitude_energy(cause: str, power: FloatArray) -> float:
+    """d² of a cause at unit amplitude from that of its columns, shape (k,): of all draws, or of any one column."""
+    return float(power.sum() if CATALOGUE[cause].kind == "random" else power.mean())
+
+
+def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> CauseLimit:
+    """Limit from the energies of unit amplitudes over the grid of a cause."""
+    d, unit = searched(cause).needed_d, CATALOGUE[cause].unit
+    parameter = shape_parameter(cause)
+    if CATALOGUE[cause].kind == "input":
+        assert parameter is not None
+        seen = [abs(c.values[parameter.name]) for c, power in points if np.sqrt(power) >= d]
+        at = tuple((c.values[parameter.name], float(np.sqrt(power))) for c, power in points)
+        return CauseLimit(min(seen) if seen else None, unit, at, parameter.name)
+    limits = [d / np.sqrt(power) if power > 0.0 else np.inf for _, power in points]
+    finite = [v for v in limits if np.isfinite(v)]
+    value = float(np.exp(np.median(np.log(finite)))) if finite else None
+    if parameter is None:
+        return CauseLimit(value, unit, (), None)
+    at = tuple(
+        (c.values[parameter.name], float(v))
+        for (c, _), v in zip(points, limits, strict=True)
+        if np.isfinite(v)
+    )
+    return CauseLimit(value, unit, at, parameter.name)

@@ -1,4 +1,9 @@
-"""Extension and its gain: the compensation model refitted with the named causes, measured on unseen runs.
+"""The compensation model extended with the named causes: terms, overtones, and whether it is shipped.
+
+States beside a map are one rung more on the ladder of corrections (`train.selection`): every stretch of thermal history
+is left out in turn, and the rung is taken where it is clearly better than the rung that the ladder would emit
+without states, and better than a constant. Causes and their parameters are those of all training runs, as the
+parameters of the evidence process are; the map beside them is fitted anew without each stretch.
 
 The training runs choose, what is shipped, too (`shipping`). Where there are exam runs, they measure. Where there are
 none, runs (or branches of few runs) are left out in turn, and causes and parameters are chosen anew without them.
@@ -9,27 +14,259 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import Progress
+from ..common.arrays import BoolArray, Progress
 from ..common.metrics import Averages
+from ..model import Model
 from ..recordings.records import Dataset
+from ..results.diagnosed import ShippingTrial
 from ..results.lot import LotUse
-from ..train.bumps import Bumps
-from ..train.data import TrainingData, joined
-from ..train.fitting import FitOptions
+from ..train.channels import StandIn, stand_in_of
+from ..train.cross_validation import training_spans
+from ..train.data import TrainingData, cleaned, joined, scaling_of
+from ..train.evidence import TrainingFailed, fit_process
+from ..train.fitting import FitOptions, front_end, map_method, power_ons
+from ..train.mrbf import Bumps
 from ..train.result import Fit
+from ..train.selection import RUNGS, Ladder, climb
+from .attribution import choose
 from .blocks import Records
 from .gain import Gain, floor_of, gain_of
+from .pipeline import search_of
 from .refine import Refined
-from .refit import Effect, completed, samples, scored_means
-from .refitting import FEW_RUNS, Chain, Refitting, folds_of
-from .shipping import Shipping, shipping
+from .refit import (
+    MOST_TERMS,
+    Effect,
+    Played,
+    completed,
+    fit_extended,
+    known,
+    play_runs,
+    samples,
+    scored_means,
+)
+from .single_cycle import cycle_of
 
-__all__ = ["Extension", "extend"]
+__all__ = [
+    "FEW_RUNS",
+    "Chain",
+    "Extension",
+    "Refitting",
+    "Shipping",
+    "extend",
+    "folds_of",
+    "shipping",
+    "stand_ins_of",
+]
+
+
+def stand_ins_of(
+    plain: Model, samples: TrainingData, runs: Sequence[Played], effects: Sequence[Effect]
+) -> dict[str, StandIn]:
+    """A stand-in for the term of each channel, by channel; none where none can be fitted.
+
+    Args:
+        plain: The model with its map, without terms.
+        samples: Those that the map was trained on, without what the effects add.
+        runs: The same runs as terms see them.
+        effects: Those of the extended model.
+    """
+    found = {}
+    for effect in effects:
+        if effect.channel is None:
+            continue
+        added = []
+        for run in runs:
+            shown = run.channels[effect.channel]
+            unknown = shown.is_away | ~np.isfinite(shown.mean)
+            added.append(np.where(unknown, np.nan, run.outcome(effect).added)[run.in_force])
+        stand_in = stand_in_of(plain, samples, np.concatenate(added))
+        if stand_in is not None:
+            found[effect.channel] = stand_in
+    return found
+
+
+Chain = list[list[Averages]]
+"""Residuals of the scored runs for every set of causes, from none to all."""
+
+FEW_RUNS = 3  # fewer cannot be left out whole: two thirds must remain to learn from
+_FOLDS = 3  # two thirds remain to learn from, at the cost of three fits
+_ROUNDING_S = 1e-6  # of times that are compared
+
+
+class Refitting:
+    """Training runs after the front end, and the options of every fit.
+
+    Of a single cycle the map beside any effect is one of T alone (see `cycle`).
+    """
+
+    def __init__(
+        self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool
+    ) -> None:
+        self.records = records
+        self.single_cycle = single_cycle
+        self.runs = [r for r in dataset.runs if r.role == "train"]
+        self.exam_runs = [r for r in dataset.runs if r.role == "exam"]
+        self.front = front_end(self.runs, options.block_s)
+        self.train = play_runs(dataset, self.runs, self.front)
+        self.exam = play_runs(dataset, self.exam_runs, self.front)
+        self.average_s = options.average_s
+        self._fits: list[tuple[list[Effect], bool, Fit]] = []
+        self.arguments: dict[str, Any] = {
+            "method": map_method(options.method),
+            "seed": options.seed,
+            "centers": options.centers,
+            "rho": options.rho,
+            "average_s": options.average_s,
+            # Beside effects the map of a single cycle is one of T alone, which no lot knows.
+            "prior": None if single_cycle else options.prior,
+        }
+
+    def fit(
+        self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None
+    ) -> Fit:
+        """The map beside the effects (`beside`: as if there were any); fits on all samples are remembered."""
+        whole = kept is None or all(m.all() for m in kept)
+        rate = not (self.single_cycle and (bool(effects) if beside is None else beside))
+        for fitted_beside, with_rate, fitted in self._fits:
+            if whole and fitted_beside == list(effects) and with_rate == rate:
+                return fitted
+        fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept, rate=rate)
+        if whole:
+            self._fits.append((list(effects), rate, fitted))
+        return fitted
+
+    def everything(self) -> list[BoolArray]:
+        """All training samples, per run."""
+        return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
+
+    def on_exam(self, stages: Sequence[Sequence[Effect]]) -> Chain:
+        """Residuals of the exam runs for each set of effects, of samples whose input is known beside all of them."""
+        all_of_them = [effect for stage in stages for effect in stage]
+        whole = [known(run, all_of_them) for run in self.exam]
+        return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
+
+    def on_training(self, effects: Sequence[Effect]) -> list[Averages]:
+        """Residuals of the training runs themselves: more first differences for the noise floor."""
+        return self._residuals(self.everything(), self.train, self.everything(), effects)
+
+    def left_out(self, held: list[BoolArray], count: int) -> Chain:
+        """Residuals of held-out training samples; causes are chosen anew on the others."""
+        kept = [~m for m in held]
+        effects = completed(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
+        stages = (effects[:k] for k in range(count + 1))
+        scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
+        return [
+            self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)
+        ]
+
+    def _residuals(
+        self,
+        kept: list[BoolArray],
+        runs: list[Played],
+        scored: list[BoolArray],
+        effects: Sequence[Effect],
+        *,
+        beside: bool | None = None,
+    ) -> list[Averages]:
+        fitted = self.fit(effects, kept, beside=beside)
+        return scored_means(fitted, runs, effects, self.average_s, scored)
+
+    def _chosen(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
+        """Best `count` causes on the records without the held-out samples."""
+        masks = []
+        for run, played, out in zip(self.records.runs, self.train, held, strict=True):
+            times = played.data.time_s[out]
+            hidden = np.zeros(len(run.history.time_s), dtype=bool)
+            if times.size:
+                end = times[-1] + played.block_s
+                hidden = (run.history.time_s >= times[0] - _ROUNDING_S) & (run.history.time_s < end)
+            masks.append(run.usable & ~hidden)
+        rest = self.records.without_rows(masks)
+        return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
+
+
+def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
+    """Held-out masks: groups of runs, or spans of few runs."""
+    sizes = [len(run.data.bias_dph) for run in refitting.train]
+    if len(refitting.train) >= FEW_RUNS:
+        return [
+            [np.full(n, k % _FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)]
+            for fold in range(_FOLDS)
+        ]
+    data = joined([run.data for run in refitting.train])
+    return [
+        [span.contains(run.data.run, run.data.time_s) for run in refitting.train]
+        for span in training_spans(refitting.runs, data)
+    ]
+
+
+@dataclass(frozen=True)
+class Shipping:
+    """What was tried.
+
+    Attributes:
+        shipped: Effects of the extended model.
+        rung: What the ladder would emit without them.
+        left_out: What was left out, in words.
+        before_dph, after_dph: RMS over these stretches without and with the effects, all stretches counting alike;
+            None where nothing can be left out, or nothing was to be added.
+    """
+
+    shipped: list[Effect]
+    rung: str
+    left_out: list[str]
+    before_dph: float | None
+    after_dph: float | None
+
+    def result(self) -> ShippingTrial:
+        """As `diagnose.json` has it."""
+        return ShippingTrial(
+            ships=bool(self.shipped),
+            beside=self.rung,
+            left_out=tuple(self.left_out),
+            rms_before_dph=self.before_dph,
+            rms_after_dph=self.after_dph,
+        )
+
+
+def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
+    """Adds the effects that a table can hold one after the other; those of a single cycle all at once."""
+    able = [e for e in effects if e.term.shipped][:MOST_TERMS]
+    plain = _ladder(refitting, [], None)
+    rung = plain.chosen()
+    shipped: list[Effect] = []
+    best, last = (plain, rung), None
+    together = refitting.single_cycle
+    for tried in [able] if together and able else [able[: k + 1] for k in range(len(able))]:
+        new = tried if together else [*shipped, tried[-1]]
+        name = "mrbf_t" if together else "mrbf"
+        last = _ladder(refitting, new, plain)
+        if best[0].beaten_by(best[1], last, name) and plain.beaten_by(rung, last, name):
+            shipped, best = new, (last, name)
+    after = None if last is None else _rung_rms(last, "mrbf_t" if together else "mrbf")
+    return Shipping(shipped, rung, plain.stretches(), _rung_rms(plain, rung), after)
+
+
+def _ladder(refitting: Refitting, effects: Sequence[Effect], like: Ladder | None) -> Ladder:
+    """Every rung beside the effects, without each stretch of history (those of `like`, where it is given)."""
+    data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
+    scaling = scaling_of(data)
+    try:
+        process = fit_process(data, scaling)
+    except TrainingFailed:
+        process = None
+    folds = None if like is None else like.folds
+    return climb(data, scaling, process, power_ons(refitting.runs), refitting.average_s, folds)
+
+
+def _rung_rms(ladder: Ladder, rung: str) -> float | None:
+    square = ladder.rms_dph[:, RUNGS.index(rung)] ** 2
+    return float(np.sqrt(square.mean())) if len(square) and np.all(np.isfinite(square)) else None
 
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts

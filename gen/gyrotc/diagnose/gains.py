@@ -1,5 +1,9 @@
 """How much better each cause, and each pair of causes, explains the data: profile likelihoods on the grid.
 
+Of a signature that the static map imitates all but a trace of, the trace decides the size: texture that is none of
+the cause's makes a wave of half a turn over the envelope as large as one likes, and the map takes off again what the
+wave adds. Such a model fits, and is no explanation; on other temperatures it goes wrong by its own size.
+
 All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
 change of the map's input the same number of map functions is fitted before and after (equal flexibility),
 on the blocks where the changed input is known. A cause that would have to be larger than is believed (`size_limit`)
@@ -8,23 +12,54 @@ gains nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
-from ..common.orthonormal import orthonormal
+from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, searched
-from .scores import variance_ratio_of
+from .joined import variance_ratio_of
+from .noise import Whitener
 from .search import Search
-from .size_limit import SizeLimit
-from .whitener import Whitener
 
-__all__ = ["CauseSet", "Gains", "Point"]
+__all__ = ["APART", "CauseSet", "Gains", "Point", "SizeLimit", "best_of", "clear_pair", "makes_sense"]
+
+_MOST_SPREAD = (
+    2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
+)
+
+
+class SizeLimit:
+    """The largest effect that is believed for one search.
+
+    Attributes:
+        spread_dph: Largest standard deviation of what a cause adds to the block means, deg/h.
+        noise: Scale of the whitened noise, deg/h.
+    """
+
+    def __init__(self, search: Search) -> None:
+        y = search.y - np.median(search.y)
+        left_out = orthonormal(search.joined.beside)  # blocks of which nothing is left have no rate
+        self.spread_dph = _MOST_SPREAD * float(np.std(y - left_out @ (left_out.T @ y)))
+        self.noise = search.likeliest.scale
+
+    def shares(self, columns: FloatArray) -> FloatArray:
+        """Share of the largest effect that a column is for a weight of 1 to whitened data over the noise scale.
+
+        Args:
+            columns: As block means, not whitened, shape (N, k).
+        """
+        return np.asarray(columns.std(axis=0) * self.noise / max(self.spread_dph, 1e-300))
+
+    def allows(self, contribution: FloatArray) -> bool:
+        """Whether a fitted effect, deg/h, shape (N,), is believed."""
+        return bool(contribution.std() <= self.spread_dph)
 
 
 _INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
@@ -231,3 +266,39 @@ def _take(base: _Base, at: slice, shares: FloatArray) -> _Base | None:
     return _Base(
         base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c, taken
     )
+
+
+_PAIR = 10.0  # what a pair must gain over the best single cause
+_MEMBER = 15.0  # what each of a pair must gain beside the other
+_SMALLEST = 0.03  # ... and of the pair's gain: what is less may be the imperfection of the other
+_LEADING = 0.35  # share of a pair's gain that its best single cause must have
+APART = 0.7
+"""Difference of the logarithms of the parameters of two states of one kind: a factor of two. Nearer ones are one
+state with another parameter."""
+
+
+def makes_sense(point: Point) -> bool:
+    """Pairs that make sense: one shape of the map; two of a kind only where that may be, and far apart."""
+    a, b = point.members
+    if a.id != b.id:
+        return not all(CATALOGUE[m.id].family == "static_map" for m in point.members)
+    if not searched(a.id).twice or a.channel != b.channel:
+        return a.channel != b.channel
+    x, y = (next(iter(m.values.values())) for m in (a, b))
+    return bool(abs(np.log(x / y)) > APART)
+
+
+def best_of(points: Sequence[Point], size: int) -> Point:
+    return max(points, key=lambda p: p.criterion(size))
+
+
+def clear_pair(singles: list[Point], best: Point, size: int) -> Point | None:
+    """The best pair if it is clearly better than the best single cause and needs both its members."""
+    alone = {id: max(p.gain for p in singles if p.members[0].id == id) for id in {m.id for m in best.members}}
+    if best.criterion(size) < best_of(singles, size).criterion(size) + _PAIR:
+        return None
+    least = max(_MEMBER, _SMALLEST * best.gain)
+    if any(best.gain - gain < least for gain in alone.values()):
+        return None
+    leading = max(p.gain for p in singles)
+    return best if leading >= _LEADING * best.gain else None

@@ -23,11 +23,10 @@ from scipy.optimize import minimize
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
-from ..common.orthonormal import orthonormal
+from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, diagnosed, searched
-from .gains import CauseSet, Gains, Point
-from .pairs import best_of
+from .gains import CauseSet, Gains, Point, best_of
 from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
 __all__ = ["MarginalLikelihood"]

@@ -10,21 +10,18 @@ from scipy.special import chdtrc
 
 from ..causes import CATALOGUE
 from ..common.arrays import Progress
-from ..common.orthonormal import main_directions, orthonormal
-from .attribution import Attribution, attribute
+from ..common.statistics import main_directions, orthonormal
+from .attribution import Attribution, attribute, overlap
 from .blocks import Records
-from .cache import bank_of
 from .candidates import Candidate, columns_of, diagnosed, searched
-from .colours import Declared
-from .declared_noise import NoiseFinding, noise_findings
-from .detection_limits import CauseLimit, detection_limits
-from .ensemble import Ensemble, ensemble_of
+from .detection import CauseLimit, detection_limits
+from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .gains import Gains
 from .joined import Channels
-from .noise_words import NOISE_WORDS
-from .overlap import overlap
+from .noise import NOISE_WORDS, Declared
 from .screens import Screened, cleaned, screen
 from .search import Search, open_search
+from .signature_bank import bank_of
 
 __all__ = ["Analysis", "analyse", "search_of"]
 

@@ -1,4 +1,8 @@
-"""Runs as the target would see them, with the terms' corrections in force; fits and scores on them."""
+"""The training runs as the target sees them, refitted with causes, with or without some of the samples.
+
+They are looked for beside the wave itself and any smooth map (`train.mrbf`), the second and then the third, each where
+BIC asks for it; nothing of them has a part in naming the cause.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..causes.base import Cause, Scene
+from ..causes.base import Cause, History, Scene, Values
 from ..common.arrays import FloatArray
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
-from ..target.recursion import Course, CourseChannel, TermOutcome
-from ..train.bumps import Bumps, find_bumps
+from ..target.recursions import Course, CourseChannel, TermOutcome
 from ..train.channels import channel_shown
 from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
+from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps
 from ..train.result import Fit, predict
 from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
-from .overtones import overtones_of
 from .refine import Refined
 
 __all__ = [
@@ -36,11 +39,56 @@ __all__ = [
     "completed",
     "fit_extended",
     "known",
+    "overtones_of",
     "play_runs",
     "samples",
     "scored_means",
     "terms_of",
 ]
+
+_NUMBERS = (2, 3)  # of the overtones: with the wave itself they leave a term of four to something else
+_PARAMETERS = 2  # of an overtone: sine and cosine
+
+
+def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[str, float], ...]:
+    """Parameters of each overtone that the samples ask for; none of a cause that has none.
+
+    Args:
+        data: Cleaned samples without what other causes add.
+        term: The cause.
+        values: Its parameters.
+
+    Raises:
+        TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
+    """
+    beside = None if term.overtone is None else beside_smooth(data, scaling_of(data))
+    if beside is None or term.overtone is None or term.amplitudes is None:
+        return ()
+    able = [dict(term.overtone(values, number)) for number in _NUMBERS]
+    columns = [_columns(beside, term, values)]
+    taken: list[dict[str, float]] = []
+    for own in able:
+        more = _columns(beside, term, own)
+        if _energy(beside, [*columns, more]) - _energy(beside, columns) > beside.price(_PARAMETERS):
+            columns.append(more)
+            taken.append(own)
+    weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), beside.y, rcond=1e-9)[0], dtype=np.float64)
+    found, at = [], columns[0].shape[1]
+    for own, column in zip(taken, columns[1:], strict=True):
+        found.append({**own, **term.amplitudes(weights[at : at + column.shape[1]])})
+        at += column.shape[1]
+    return tuple(found)
+
+
+def _columns(beside: BesideSmooth, term: Cause, values: Values) -> FloatArray:
+    assert term.features is not None
+    history = History(time_s=np.arange(beside.t.size, dtype=np.float64), temperature_c=beside.t)
+    return beside.rest(term.features(history, values).columns * beside.root[:, None])
+
+
+def _energy(beside: BesideSmooth, columns: list[FloatArray]) -> float:
+    q = np.linalg.qr(np.column_stack(columns))[0]
+    return float(((q.T @ beside.y) ** 2).sum())
 
 
 MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h

@@ -16,7 +16,7 @@ from scipy.special import fdtrc, ndtr, pdtrc
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
-from ..common.orthonormal import orthonormal
+from ..common.statistics import orthonormal
 from .blocks import Records, centred_slope
 
 __all__ = ["Screened", "screen"]

@@ -1,28 +1,35 @@
-"""The bank: signatures of all candidates as block means, and their inner products under every noise colour.
+"""Signatures of all candidates as block means, with their inner products, kept on disk between calls.
 
 It depends on the temperature records alone, not on the rates, and is kept on disk by their hash.
+
+Reading makes nothing but the classes of a bank, plain values and arrays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import hashlib
+import importlib
+import inspect
+import io
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..target.operators import first_order, play
-from .alternatives import shapes_of
+from ..store import cache
+from ..target.recursions import first_order, play
 from .blocks import Records
-from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, testable
-from .changed_input import changed_inputs
-from .colours import COLOURS
-from .static_map import LEVELS, MapBasis, fine_columns, make_basis
-from .whitener import Whitener
+from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, shapes_of, testable
+from .noise import COLOURS, Whitener
+from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
 
-__all__ = ["Alternative", "Signature", "SignatureBank", "build", "direction_of"]
-
+__all__ = ["Alternative", "Signature", "SignatureBank", "bank_of", "build", "direction_of"]
 
 _DICTIONARY_LAGS_S = (
     150.0,
@@ -246,3 +253,58 @@ def _late(records: Records, tau_s: float) -> FloatArray:
 def direction_of(records: Records, width_c: float) -> FloatArray:
     """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
     return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])
+
+
+_VERSION = 5  # raised with every change of what a bank holds
+_MAKERS = ("causes", "target", "diagnose")  # packages whose code decides what a bank holds
+_CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
+_OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}
+_NUMPY = {
+    ("numpy", "ndarray"),
+    ("numpy", "dtype"),
+    *((f"numpy.{core}.{part}", name) for core in ("core", "_core") for part, name in (
+        ("multiarray", "_reconstruct"), ("multiarray", "scalar"), ("numeric", "_frombuffer"),
+    )),
+}  # fmt: skip
+
+
+def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _: None) -> SignatureBank:
+    """The bank of these temperature records, from disk or made and kept."""
+    digest = hashlib.sha256(f"{_VERSION} {level} {_code()} {records.key()}".encode()).hexdigest()
+    bank = cache.kept(f"{digest}.bank", _bank)
+    if bank is None:
+        say("computing the signatures of all causes")
+        bank = build(records, level)
+        cache.keep(f"{digest}.bank", _content(bank))
+    return bank
+
+
+def _content(bank: SignatureBank) -> bytes:
+    return pickle.dumps(bank, protocol=5)
+
+
+def _bank(content: bytes) -> SignatureBank | None:
+    bank = _Reader(io.BytesIO(content)).load()
+    return bank if isinstance(bank, SignatureBank) else None
+
+
+class _Reader(pickle.Unpickler):
+    """Makes the classes of a bank and arrays, and calls nothing else."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) in _OWN:
+            return _OWN[module, name]
+        if (module, name) == ("builtins", "slice"):
+            return slice
+        if (module, name) in _NUMPY:
+            return getattr(importlib.import_module(module), name)
+        raise pickle.UnpicklingError(f"{module}.{name} has no place in a bank")
+
+
+@functools.cache
+def _code() -> str:
+    """Hash of the code that makes a bank: a new version makes new banks."""
+    package = Path(__file__).parents[1]
+    files = [path for name in _MAKERS for path in sorted((package / name).rglob("*.py"))]
+    files += [Path(inspect.getfile(t.features)) for t in diagnosed().values() if t.features is not None]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in dict.fromkeys(files))).hexdigest()

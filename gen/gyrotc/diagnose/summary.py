@@ -1,4 +1,4 @@
-"""What a diagnosis found, as `diagnose.json` holds it: figures, words, and what to do next."""
+"""What a diagnosis found, as `diagnose.json` holds it: verdict, figures, words, and what to do next."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..results.diagnosed import (
     ConsideredCause,
     CycleResult,
     Diagnosed,
+    DiagnosisVerdict,
     Estimate,
     ExtendedModel,
     NamedCause,
@@ -26,21 +27,188 @@ from ..results.diagnosed import (
 )
 from ..results.planned import DetectionLimit
 from ..train.fitting import FitOptions, front_end
-from .advice import VERDICTS, next_steps, sentence_of, shows_as
-from .candidates import diagnosed
-from .cycle_fits import memories
-from .declared_noise import NoiseFinding
-from .detection_limits import CauseLimit
+from .attribution import Attribution
+from .candidates import diagnosed, searched, shape_parameter
+from .detection import CauseLimit
+from .discrepancy import NoiseFinding
 from .extension import Extension
-from .intervals import Interval
-from .noise_words import NOISE_WORDS
+from .noise import NOISE_WORDS
 from .pipeline import Analysis
-from .refine import Refined
+from .refine import Interval, Refined
 from .refit import terms_of
-from .single_cycle import Cycle
-from .verdict import looks_like, verdict_of
+from .single_cycle import Cycle, memories
+from .wide_memory import WideMemory
 
-__all__ = ["not_testable", "result_of"]
+__all__ = [
+    "VERDICTS",
+    "holds",
+    "looks_like",
+    "next_steps",
+    "not_testable",
+    "result_of",
+    "sentence_of",
+    "shows_as",
+    "verdict_of",
+]
+
+_WHOLE = 0.995  # a share of the removable error that shows as 100 %
+
+VERDICTS: dict[DiagnosisVerdict, str] = {
+    "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
+    "explained": "The causes listed account for what the simulation gets wrong.",
+    "ambiguous": "Two or more causes explain these recordings equally well.",
+    "partial": "A cause is named, and structure remains that it does not explain.",
+    "noise_differs": "Only the noise is not what the simulation declares.",
+    "unexplained": "There is structure that no cause of the catalogue explains: none is named.",
+    "not_testable": "These recordings cannot decide.",
+}
+
+_STEPS: dict[DiagnosisVerdict, str] = {
+    "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
+    " profile.",
+    "explained": "Build with the extension (gyrotc build --extend), or mend the cause and record again.",
+    "partial": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded input."
+    " Record supply, discharge current, pressure and magnetic field beside the rate.",
+    "noise_differs": "Declare the noise that was measured ([noise] of dataset.toml), or find out why it differs;"
+    " then diagnose again: detection limits follow the noise.",
+    "unexplained": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded"
+    " input. Record supply, discharge current, pressure and magnetic field beside the rate.",
+    "not_testable": "Record ramps over the product's range of temperature, up and down, at two rates at least.",
+}
+
+
+def next_steps(
+    verdict: DiagnosisVerdict, causes: Sequence[NamedCause], untestable: Sequence[str], *, shipped: bool
+) -> list[str]:
+    """Sentences, the most telling first.
+
+    Args:
+        verdict: One of `VERDICTS`.
+        causes: Causes and kinds of noise that were found.
+        untestable: Ids of the causes that these recordings cannot test.
+        shipped: Whether an extension is.
+    """
+    steps = [f"To tell them apart: {c.separate_by}." for c in causes if c.separate_by]
+    if verdict == "explained" and not shipped:
+        remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
+        steps.append(f"Against it: {'; '.join(remedies)}.")
+    elif verdict != "ambiguous":
+        steps.append(_STEPS[verdict])
+    steps += [f"Paste {c.repair} into dataset.toml and build again." for c in causes if c.repair]
+    named = [CATALOGUE[c.id].words for c in causes if c.id in CATALOGUE]
+    steps += dict.fromkeys(words.advice for words in named if words.advice)
+    missing = [text for i in untestable if (text := CATALOGUE[i].words.recording)]
+    if missing and verdict != "not_testable":
+        steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
+    return steps
+
+
+def sentence_of(
+    verdict: DiagnosisVerdict,
+    found: Sequence[NamedCause],
+    extended: ExtendedModel | None,
+    undecided: str,
+    wide: WideMemory | None = None,
+) -> str:
+    """The finding in one to three sentences.
+
+    Args:
+        undecided: Why a single cycle cannot tell of memory.
+        wide: The form of hysteresis that is among the causes, where it is more than one play.
+    """
+    why = f" about memory of the temperature: {undecided}" if undecided else ""
+    causes = [c for c in found if c.family != "noise"]
+    names = "; ".join(
+        f"{name} (twice)" if sum(c.name == name for c in causes) > 1 else name
+        for name in dict.fromkeys(c.name for c in causes)
+    )
+    noise = "; ".join(c.name for c in found if c.family == "noise")
+    text = {
+        "consistent": "Nothing was found beyond the static map and the declared noise.",
+        "explained": f"{names}.",
+        "ambiguous": f"{names}, or equally well: {', '.join(_rivals(causes))}.",
+        "partial": f"{names}, and structure remains that no cause explains.",
+        "noise_differs": f"{noise}.",
+        "unexplained": "There is structure that no cause of the catalogue explains.",
+        "not_testable": f"The recordings cannot decide{why}.",
+    }[verdict]
+    text += f" Here {wide.text}." if wide is not None else ""
+    share = extended.gain.share_of_excess_removed if extended is not None else None
+    if share is None:
+        return text
+    amount = "all" if share >= _WHOLE else f"{share:.0%}"
+    return f"{text} On unseen runs the extension removes {amount} of the removable error."
+
+
+def shows_as(cause: str, wide: WideMemory | None) -> str:
+    """How a cause shows; of hysteresis (`wide`: of a form that is more than one play) also how it differs from that."""
+    words = CATALOGUE[cause].words
+    if wide is None or not searched(cause).loops:
+        return words.signature
+    return f"{words.signature}; here {wide.text}"
+
+
+def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:
+    """Names of causes that explain the runs as well, with their channels."""
+    for cause in causes:
+        for id in cause.equivalent:
+            channels = ", ".join(cause.equivalent_channels or ())
+            yield CATALOGUE[id].words.name + (f" ({channels})" if CATALOGUE[id].needs.channel else "")
+
+
+_MISFITS = ((0.05, 0.5), (0.01, 0.8))
+"""p-value of what is left (`Misfit.worst`), and share of the structure below which the causes then explain too little.
+
+However clear the remainder: where four fifths are a cause and no other shape does better, it is that cause in another
+form than the catalogue's (relays in place of a play), and the remainder is told beside it.
+"""
+
+_REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much
+_SEEN = 0.05  # p-value over the whole search that at least one of the causes has itself
+_LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not hold their own
+
+
+def holds(attribution: Attribution) -> bool:
+    """Whether causes are given at all.
+
+    Not where most of the structure is none of them, where it has another shape or a parameter that no gyro has, and
+    not where the search sees none of them: something else was detected then, in the place of which they came.
+    """
+    left = attribution.left
+    little = any(left.worst < p and left.share < share for p, share in _MISFITS)
+    plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
+    seen = min(attribution.p_values, default=1.0) <= _SEEN
+    return plausible and seen and not little and attribution.other.lead < _LEAD
+
+
+def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
+    """One of the verdicts of the interface; `not_testable` is given before any search.
+
+    Args:
+        attribution: What the search found.
+        noise: Findings of the family `noise`.
+    """
+    if attribution.detected and not holds(attribution):
+        return "unexplained"
+    if holds(attribution):
+        if attribution.left.p_value < _REMAINDER:
+            return "partial"
+        return "ambiguous" if any(attribution.rivals) else "explained"
+    return "noise_differs" if noise else "consistent"
+
+
+def looks_like(attribution: Attribution) -> str | None:
+    """What structure without a name resembles: another shape, or a cause with a parameter that no gyro has."""
+    if attribution.other.lead > 0.0:
+        return attribution.other.name
+    for cause in attribution.causes:
+        parameter = shape_parameter(cause.candidate.id)
+        if parameter is not None and not cause.plausible:
+            value = f"{parameter.name} = {cause.parameters[parameter.name].value:.2g} {parameter.unit}"
+            known = f"{parameter.low:g} to {parameter.high:g} {parameter.unit} are known"
+            return f"{cause.candidate.id.replace('_', ' ')} with {value}, where {known}"
+    return None
+
 
 _MOST_EQUIVALENT = 2  # rivals that are named; the page lists every cause with its p-value besides
 
@@ -77,7 +245,7 @@ def not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> Diagno
     )
 
 
-def result_of(  # long: one line for each field of the result
+def result_of(
     dataset: Dataset,
     analysis: Analysis,
     extension: Extension,

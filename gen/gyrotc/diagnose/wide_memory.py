@@ -23,13 +23,13 @@ from scipy.special import ndtr
 
 from ..causes.base import History
 from ..common.arrays import FloatArray
-from ..common.orthonormal import orthonormal
-from ..target.operators import first_order, play
+from ..common.statistics import orthonormal
+from ..target.recursions import first_order, play
 from .blocks import Record, Records
 from .candidates import reach_of
 from .gains import Gains
+from .joined import ratio_of
 from .rivals import EQUIVALENT
-from .scores import ratio_of
 
 __all__ = ["WideMemory", "outlasts", "rate_independent"]
 

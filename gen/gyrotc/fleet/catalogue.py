@@ -17,12 +17,10 @@ from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..jobs.release import unit_of
 from ..model import Model, load_model
-from ..results.catalogue import CatalogueAnswer, Catalogued, CataloguedFile
-from ..results.fleet import FleetEntry
-from ..store.files import write_atomically
+from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry
+from ..store.files import check_own, open_or_create, write_atomically
 from ..store.marker import sha256
-from ..store.opening import check_own, open_or_create
-from .entry import ENTRY
+from .unit import ENTRY
 
 __all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter"]
 

@@ -11,9 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from ..assess.limits import Limits, load_limits
-from ..common.ceilings import refuse_above
 from ..common.errors import GyrotcError, InputError
-from ..common.inputs_texts import read_toml
+from ..common.inputs import read_toml, refuse_above
 from ..recordings.load import axes_of
 from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions

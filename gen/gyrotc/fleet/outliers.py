@@ -1,16 +1,183 @@
-"""Serials that differ from the rest of their fleet: robust distance of each figure from the fleet's median."""
+"""Serials that differ from the rest of their fleet, copies of recordings, and reversed signs."""
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..common.metrics import MAD_TO_SIGMA
-from ..results.fleet import FleetOutlier, FleetUnit, Spread
+from ..common.arrays import FloatArray
+from ..common.metrics import MAD_TO_SIGMA, Averages, median
+from ..results.fleet import (
+    ComparedRun,
+    Copy,
+    Facts,
+    FleetEntry,
+    FleetOutlier,
+    FleetUnit,
+    LikelyStep,
+    ResidualSeries,
+    Spread,
+)
 
-__all__ = ["FIGURES", "outliers", "spread"]
+__all__ = [
+    "BINS",
+    "BIN_C",
+    "FIGURES",
+    "FIRST_C",
+    "NOISY_RUN",
+    "copies",
+    "facts_of",
+    "outliers",
+    "spread",
+    "step_in",
+    "turned",
+    "with_copies",
+]
+
+_DIGITS = 16  # of a hash
+_LEAST_COMMON = 2  # hashes; one alone might be chance among 100,000 gyros
+_CROWD = 16  # gyros of which one hash is known: enough to name
+
+
+def copies(entries: Sequence[FleetEntry]) -> list[Copy]:
+    """Pairs of gyros of different serials that share rows, in the order of the entries."""
+    words = [_words(entry.sketch) for entry in entries]
+    holders: dict[str, list[int]] = defaultdict(list)
+    for number, of_one in enumerate(words):
+        for word in of_one:
+            if len(holders[word]) < _CROWD:
+                holders[word].append(number)
+    common: Counter[tuple[int, int]] = Counter()
+    for numbers in holders.values():
+        if len(numbers) > 1:
+            common.update((a, b) for k, a in enumerate(numbers) for b in numbers[k + 1 :])
+    return [
+        Copy(
+            name=entries[a].name,
+            serial=one,
+            other=entries[b].name,
+            other_serial=other,
+            share=min(1.0, count / min(len(words[a]), len(words[b]))),
+        )
+        for (a, b), count in sorted(common.items())
+        if count >= min(_LEAST_COMMON, len(words[a]))
+        and (one := entries[a].serial or "") != (other := entries[b].serial or "")
+    ]
+
+
+def _words(sketch: str) -> list[str]:
+    return [sketch[k : k + _DIGITS] for k in range(0, len(sketch), _DIGITS)]
+
+
+def with_copies(entries: Sequence[FleetEntry], found: Sequence[Copy]) -> list[FleetEntry]:
+    """The entries, each of a pair with the finding `copy_of_other` and the others' names."""
+    others: dict[str, list[str]] = defaultdict(list)
+    for copy in found:
+        others[copy.name].append(copy.other)
+        others[copy.other].append(copy.name)
+    return [
+        entry.model_copy(
+            update={"findings": (*entry.findings, "copy_of_other"), "copy_of": tuple(others[entry.name])}
+        )
+        if entry.name in others and entry.model_hash is not None
+        else entry
+        for entry in entries
+    ]
+
+
+FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
+NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at
+_LEAST_IN_BIN = 3  # means, for a mean of them
+_LEAST_MEANS = 16  # a shorter run does not show a step
+_EDGE = 0.1  # of a run, on either side of which a step is not sought
+_POINTS = 160  # of the residual that a picture shows
+
+
+def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
+    """Facts of a gyro from the means of its runs, each with its file."""
+    told = [(file, a) for file, a in runs if a.time_s.size]
+    steps = [step_in(a.after_dph) for _, a in told]
+    compared = [_compared(file, a, step) for (file, a), step in zip(told, steps, strict=True)]
+    return Facts(
+        curve=_curve([a for _, a in told]),
+        runs=tuple(compared),
+        series=_series(*told[_shown(compared)]) if told else None,
+    )
+
+
+def _shown(runs: Sequence[ComparedRun]) -> int:
+    """The run that is drawn if the gyro stands apart: one much noisier than its others, else the likeliest step."""
+    noise = np.array([run.noise_dph for run in runs])
+    if noise.max() > NOISY_RUN * median(noise):
+        return int(np.argmax(noise))
+    return int(np.argmax([run.step.score for run in runs]))
+
+
+def _compared(file: str, a: Averages, step: tuple[int, float, float]) -> ComparedRun:
+    index, size, score = step
+    return ComparedRun(
+        file=file,
+        mean_c=float(a.temperature_c.mean()),
+        noise_dph=_noise(a.after_dph),
+        step=LikelyStep(time_s=_edge_s(a, index), size_dph=size, score=score),
+    )
+
+
+def _series(file: str, a: Averages) -> ResidualSeries:
+    every = max(1, a.after_dph.size // _POINTS)
+    return ResidualSeries(
+        file=file,
+        time_s=tuple(float(t) for t in a.time_s[::every]),
+        rate_dph=tuple(float(r) for r in a.after_dph[::every]),
+    )
+
+
+def _edge_s(a: Averages, index: int) -> float:
+    """Time between the means before and after a step, from the start of the run, s."""
+    start = a.time_s[0]
+    return float(0.5 * (a.time_s[index - 1] + a.time_s[index]) - start) if index else 0.0
+
+
+def _curve(runs: Sequence[Averages]) -> tuple[float | None, ...]:
+    """Mean bias (deg/h) over cells of `BIN_C` from `FIRST_C` on."""
+    t = np.concatenate([a.temperature_c for a in runs]) if runs else np.zeros(0)
+    rate = np.concatenate([a.before_dph for a in runs]) if runs else np.zeros(0)
+    number = np.clip(((t - FIRST_C) / BIN_C).astype(np.int64), 0, BINS - 1)
+    count = np.bincount(number, minlength=BINS)
+    total = np.bincount(number, weights=rate, minlength=BINS)
+    return tuple(float(s / n) if n >= _LEAST_IN_BIN else None for s, n in zip(total, count, strict=True))
+
+
+def _noise(residual: FloatArray) -> float:
+    """Noise of a mean from successive differences, of their bulk: steps and spikes do not count."""
+    if residual.size < 3:
+        return 0.0
+    return float(MAD_TO_SIGMA * median(np.abs(np.diff(residual))) / np.sqrt(2.0))
+
+
+def step_in(residual: FloatArray) -> tuple[int, float, float]:
+    """The likeliest step of a residual: index of the first mean after it, size (deg/h), and its score.
+
+    The score is the largest difference between the means of what lies before and after, in standard deviations of that
+    difference for white noise (Sen and Srivastava 1975). Slow noise has large scores too: they are compared with
+    those of the lot.
+    """
+    n = residual.size
+    sigma = _noise(residual)
+    if n < _LEAST_MEANS or sigma == 0.0:
+        return 0, 0.0, 0.0
+    calm = np.clip(residual, *(median(residual) + np.array([-6.0, 6.0]) * max(sigma, float(residual.std()))))
+    k = np.arange(1, n)
+    before = np.cumsum(calm)[:-1] / k
+    after = (calm.sum() - np.cumsum(calm)[:-1]) / (n - k)
+    score = np.abs(after - before) * np.sqrt(k * (n - k) / n) / sigma
+    edge = max(2, int(_EDGE * n))
+    inside = slice(edge - 1, n - edge)
+    best = int(np.argmax(score[inside])) + edge - 1
+    return best + 1, float(after[best] - before[best]), float(score[best])
+
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
@@ -21,7 +188,7 @@ FIGURES = {
     "bias_dph": False,
     "after_mean_dph": False,
 }
-_LEAST = 8  # fewer serials do not say what a usual one is
+_LEAST_SERIALS = 8  # fewer serials do not say what a usual one is
 _SIGMAS = 5.0  # once in two million normal figures: of a thousand gyros with six figures none by chance
 _LEAST_OF_RMS = 0.1  # of the others, in shares of what usually remains: means of 1e-9 deg/h say nothing
 _LEAST_RATIO = 0.02  # of figures compared by their ratio: closer ones are alike, however close the others are
@@ -51,7 +218,7 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
     for figure, by_ratio in FIGURES.items():
         known = [(e.name, v) for e in entries if (v := getattr(e, figure)) is not None]
         known = [(name, v) for name, v in known if v > 0.0 or not by_ratio]
-        if len(known) < _LEAST:
+        if len(known) < _LEAST_SERIALS:
             continue
         values = np.array([value for _, value in known])
         scaled = np.log(values) if by_ratio else values
@@ -74,3 +241,41 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
             if distance > _SIGMAS * sigma
         ]
     return found
+
+
+_LEAST_GYROS = 8  # gyros; fewer do not say what is usual
+_LEAST_PLACES = 6  # of a shorter curve a correlation of 0.9 may be chance
+_ALIKE = (
+    0.9  # correlation of the usual gyro with the median of the lot, and of a turned one with its negative
+)
+_SWING = 3.0  # how much more or less than the median it may swing
+_KNOWN = 0.8  # share of the lot that knows a temperature
+
+
+def turned(entries: Sequence[FleetEntry]) -> list[str]:
+    """Names of gyros whose curve is the lot's turned over, axis by axis; none where the lot has no common one."""
+    names: list[str] = []
+    for axis in dict.fromkeys(entry.axis for entry in entries):
+        lot = [(e.name, e.facts.curve) for e in entries if e.axis == axis and e.facts is not None]
+        names += _turned_of(lot) if len(lot) >= _LEAST_GYROS else []
+    return names
+
+
+def _turned_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]:
+    curves = np.array([[np.nan if b is None else b for b in curve] for _, curve in lot], dtype=np.float64)
+    known = np.mean(np.isfinite(curves), axis=0) >= _KNOWN
+    curves = curves[:, known]
+    if curves.shape[1] < _LEAST_PLACES:
+        return []
+    whole = np.flatnonzero(np.isfinite(curves).all(axis=1))
+    shapes = curves[whole] - curves[whole].mean(axis=1, keepdims=True)
+    usual = np.median(shapes, axis=0)
+    swing = np.sqrt(np.mean(shapes**2, axis=1))
+    size = float(np.sqrt(np.mean(usual**2)))
+    if len(whole) < _LEAST_GYROS or size == 0.0:
+        return []
+    alike = np.mean(shapes * usual, axis=1) / np.maximum(swing * size, np.finfo(float).tiny)
+    if float(np.median(alike)) < _ALIKE:
+        return []
+    even = (swing < _SWING * size) & (swing > size / _SWING)
+    return [lot[whole[k]][0] for k in np.flatnonzero((alike < -_ALIKE) & even)]

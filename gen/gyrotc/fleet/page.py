@@ -11,15 +11,13 @@ from urllib.parse import quote
 
 from .. import __version__
 from ..common.texts import csv_cell
-from ..pages.lot_plots import lot_picture, unit_apart
+from ..pages.plots import lot_picture, unit_apart
 from ..pages.report import page_environment
 from ..results.fleet import FleetEntry, FleetSummary, FleetUnit
-from ..store.files import write_atomically
+from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
-from ..store.jsontext import json_text
-from .copies import copies, with_copies
 from .manifest import SUMMARY
-from .outliers import FIGURES, outliers, spread
+from .outliers import FIGURES, copies, outliers, spread, with_copies
 from .reasons import reasons, with_reasons
 
 __all__ = ["summary_of", "write_summary"]

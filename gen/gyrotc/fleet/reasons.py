@@ -14,8 +14,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
-from .facts import NOISY_RUN
-from .turned import turned
+from .outliers import NOISY_RUN, turned
 
 __all__ = ["reasons", "with_reasons"]
 

@@ -13,19 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
-from ..common.inputs_texts import checked, read_json
+from ..common.inputs import checked, read_json
 from ..results.fleet import FleetEntry, ShardEntries
-from ..store.files import write_atomically
+from ..store.files import Lock, check_own, json_text, write_atomically
 from ..store.folder import result_folder
 from ..store.interrupts import deferred
-from ..store.jsontext import json_text
-from ..store.lock import Lock
-from ..store.opening import check_own
-from .aside import clean_units
 from .catalogue import enter
 from .manifest import SUMMARY, Fleet
 from .run import Told, checked_place, done_already, summed, tasks_of, unfinished, worked
-from .unit import Task
+from .unit import Task, clean_units
 
 __all__ = ["SHARDS", "Share", "gather", "mine", "run_share", "share_of"]
 

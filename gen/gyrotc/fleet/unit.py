@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import socket
 import sys
@@ -10,8 +11,9 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from ..assess.conformity import coverage_factor
+from ..assess.limits import coverage_factor
 from ..common.errors import GyrotcError, InputError
+from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.build import Built, build_into
 from ..model import Model
@@ -19,16 +21,79 @@ from ..recordings.load import load
 from ..recordings.records import Dataset
 from ..results.evaluation import Evaluation
 from ..results.fleet import FleetEntry
-from ..store.fingerprint import inputs_of, program_of
-from ..store.folder import result_folder
-from ..store.jsontext import digest_of
-from ..store.marker import KINDS
-from .aside import set_aside
-from .entry import kept_entry, write_entry
-from .facts import facts_of
+from ..store.cache import inputs_of, program_of
+from ..store.files import Lock, digest_of, json_text, write_atomically
+from ..store.folder import clean, leftovers, result_folder
+from ..store.marker import KINDS, faults, read_marker, survey
 from .manifest import Fleet, Unit, printable
+from .outliers import facts_of
 
-__all__ = ["Task", "do_unit", "done_before", "failed"]
+__all__ = [
+    "ENTRY",
+    "Task",
+    "clean_units",
+    "do_unit",
+    "done_before",
+    "failed",
+    "kept_entry",
+    "set_aside",
+    "write_entry",
+]
+
+
+def set_aside(place: Path) -> str:
+    """A result in which somebody changed a file makes room for a new one, under a name of its own.
+
+    Returns:
+        That name; empty if there was no such result.
+
+    Raises:
+        InputError: A job is writing there.
+    """
+    if not place.exists() or not _changed(place):
+        return ""
+    lock = Lock(place, "fleet")
+    try:
+        names = (f"{place.name}.changed-{k}" for k in itertools.count(1))
+        other = next(path for name in names if not (path := place.with_name(name)).exists())
+        place.rename(other)
+    finally:
+        lock.release()
+    return other.name
+
+
+def _changed(place: Path) -> bool:
+    try:
+        marker = read_marker(place)
+        return marker is not None and bool(survey(place, marker)[1])
+    except InputError:  # the marker itself is damaged
+        return True
+
+
+def clean_units(out: Path, names: Sequence[str]) -> None:
+    """Removes what jobs that were killed left beside results in a fleet's folder; of these names also their locks."""
+    for name in leftovers(out, names):
+        with suppress(InputError):  # a job is at work there
+            clean(out / name)
+
+
+ENTRY = "entry.json"
+
+
+def write_entry(folder: Path, entry: FleetEntry) -> FleetEntry:
+    """Writes `entry.json` into a unit's result, whose marker will hold its hash; returns it."""
+    write_atomically(folder / ENTRY, json_text(entry.content()))
+    return entry
+
+
+def kept_entry(folder: Path, key: str) -> FleetEntry | None:
+    """The entry of a result that is whole and was made of the same things (`key`); None: it must be made again."""
+    try:
+        entry = checked(FleetEntry, read_json(folder / ENTRY, "the entry of a gyro"), ENTRY)
+        whole = entry.model_hash is not None and not faults(folder)
+        return entry if entry.key == key and entry.status == "done" and whole else None
+    except (GyrotcError, OSError, ValueError, RecursionError):
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +220,7 @@ def _built(task: Task) -> FleetEntry:
     return entry.model_copy(update={"aside": aside}) if aside else entry
 
 
-def _entry_of(  # long: a field a line
+def _entry_of(
     task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]
 ) -> FleetEntry:
     """What the summary says of the gyro, and what it is compared with others by."""

@@ -12,13 +12,12 @@ from ..common.texts import c_environment
 from ..model import Model, load_model
 from ..pages.report import axes_page
 from ..results.verification import JointVerification, Verification
-from ..store.files import write_atomically
-from ..store.opening import write_own
+from ..store.files import write_atomically, write_own
 from ..store.scratch import scratch_folder
 from ..tables.amalgamate import ARITHMETICS, amalgamate
-from ..tables.example import example_period_us, example_samples
-from ..tables.files import emitted_tables
+from ..tables.emit import emitted_tables
 from ..tables.record import RECORD, joint_record_text
+from ..tables.text import example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.job import verify
 from ..verify.signatures import check_signature, load_public_key

@@ -22,19 +22,17 @@ from ..model import Model
 from ..pages.report import write_report
 from ..recordings.load import axes_of, load
 from ..recordings.records import Dataset
-from ..results.changes import Changes
 from ..results.diagnosed import Diagnosed
-from ..results.evaluation import Evaluation
-from ..results.limits import HeldLimits
-from ..results.manifest import Manifest
+from ..results.evaluation import Changes, Evaluation
+from ..results.folder import Manifest
+from ..results.release import HeldLimits
 from ..results.training import Training
 from ..results.verification import Verification
-from ..store.files import write_atomically
+from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
-from ..store.jsontext import json_text
 from ..store.marker import MARKER, sha256
 from ..tables.applied import applied_of
-from ..tables.files import emit
+from ..tables.emit import emit
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify.job import chosen_targets, verify
 from .axes import join_axes
@@ -181,9 +179,7 @@ def build_into(
     )
 
 
-def _build_axis(
-    dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress
-) -> Built:  # long: the stages in their order
+def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
     options = with_prior(options, dataset, order.prior, order.ageing_dph, order.limits)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
@@ -294,7 +290,7 @@ def _versions() -> dict[str, str]:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
-    from ..store.fingerprint import program_of  # the package of fleets imports this module
+    from ..store.cache import program_of  # the package of fleets imports this module
 
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return Manifest(

@@ -19,14 +19,13 @@ from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
-from ..results.comparison import Comparison, Group, Method
-from ..results.evaluation import Pooled
+from ..results.evaluation import Comparison, Group, Method, Pooled
+from ..train.cross_validation import training_spans
 from ..train.data import TrainingData, joined
 from ..train.fitting import front_end, samples_of
 from ..train.methods import METHODS, fit
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
-from ..train.spans import training_spans
 
 __all__ = ["CompareOptions", "compare"]
 

@@ -1,31 +1,41 @@
-"""`gyrotc diagnose --out`: the diagnosis with its pictures, its page, the extended model and the extended scenario.
+"""`gyrotc diagnose --out`: the diagnosis with pictures, page and extended model, kept between calls.
 
 Data flows one way: `diagnose` finds, `diagnosis_plots` draws, `diagnosis_page` writes the page from what
 stands in the folder.
+
+What a diagnosis depends on makes its name there: the bytes of the recordings and of their description, the options,
+every file of gyrotc and the versions of what computes and draws beside it.
 """
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import json
 import math
-from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path, PurePosixPath
+from typing import Any
 
+from .. import _core
 from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
-from ..diagnose.result import Diagnosis, diagnose
+from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..model import Model
-from ..pages.diagnosis_page import PICTURES, write_diagnosis_page
-from ..pages.diagnosis_plots import draw
+from ..pages.diagnosis import PICTURES, draw, write_diagnosis_page
+from ..recordings.description import FILE
 from ..recordings.records import Dataset
+from ..results.base import checked_result
 from ..results.diagnosed import Diagnosed, NamedCause
-from ..store.files import write_atomically
+from ..store import cache
+from ..store.files import digest_of, json_text, write_atomically
 from ..store.folder import result_folder
-from ..store.jsontext import json_text
 from ..train.fitting import FitOptions
 
-__all__ = ["diagnose_into", "extended_scenario", "save"]
-
+__all__ = ["diagnose_into", "diagnosed", "extended_scenario", "save"]
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
@@ -110,3 +120,142 @@ def _cause(cause: NamedCause) -> Iterator[str]:
     for name, value in values.items():
         if math.isfinite(value):
             yield f"{toml_key(name)} = {toml_value(value)}"
+
+
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "jinja2", "pydantic", "pyarrow")
+_REPORT, _RESULT = "report.html", "diagnose.json"
+_KINDS = (".html", ".json", ".svg", ".toml")
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A diagnosis as it was written: the result, and the texts of its files by path within the folder."""
+
+    result: Diagnosed
+    files: dict[str, str]
+
+
+def diagnosed(
+    dataset: Dataset,
+    out: Path | None = None,
+    *,
+    model: Model | None = None,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+    accept_events: bool = False,
+    fresh: bool = False,
+) -> Diagnosed:
+    """Diagnoses a data set, or takes what an earlier call found of the same.
+
+    Args:
+        out: Folder that is filled as by `diagnose_into`; None: no files.
+        options: As for `fit`, without an earlier model.
+        fresh: Diagnoses anew in any case.
+
+    Raises:
+        InputError: As `diagnose` and `result_folder`.
+    """
+    name = _name(dataset, model, options, accept_events=accept_events, files=out is not None)
+    found = None if fresh else cache.kept(name, _unpacked)
+    if found is None:
+        result = _anew(dataset, out, model, options, progress, accept_events)
+        files = {} if out is None else {path: _text(out / path) for path in _written(result)}
+        cache.keep(name, _packed(_Kept(result, files)))
+        return result
+    if progress:
+        progress("taking what was found before")
+    if out is not None:
+        _write(out, dataset, found.files)
+    return found.result
+
+
+def _anew(
+    dataset: Dataset,
+    out: Path | None,
+    model: Model | None,
+    options: FitOptions | None,
+    progress: Progress | None,
+    accept_events: bool,
+) -> Diagnosed:
+    from ..diagnose.diagnosis import diagnose
+
+    pass
+
+    into = diagnose if out is None else functools.partial(diagnose_into, out)
+    return into(dataset, model=model, options=options, progress=progress, accept_events=accept_events).result
+
+
+def _write(out: Path, dataset: Dataset, files: dict[str, str]) -> None:
+    """The folder as `diagnose_into` leaves it."""
+    with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
+        stage.of(dataset.serial, dataset.axis)
+        for path, text in files.items():
+            if path != _REPORT:
+                write_atomically(stage.folder / path, text)
+        with result_folder(stage.folder, "report", kind="", entries=(_REPORT,)) as page:
+            write_atomically(page.folder / _REPORT, files[_REPORT])
+
+
+def _written(result: Diagnosed) -> Sequence[str]:
+    """Paths of the files that a diagnosis wrote, as its result names them."""
+    extended = result.extended.model if result.extended is not None else None
+    more = (*(result.pictures or ()), extended, result.scenario)
+    return (_RESULT, _REPORT, *(path for path in more if path is not None))
+
+
+def _text(path: Path) -> str:
+    return path.read_bytes().decode("utf-8")
+
+
+def _packed(found: _Kept) -> bytes:
+    return json.dumps({"result": found.result.content(), "files": found.files}).encode("ascii")
+
+
+def _unpacked(content: bytes) -> _Kept | None:
+    """None where it is no diagnosis with the files that its result names."""
+    held = json.loads(content)
+    result, files = checked_result(held["result"], Diagnosed, "what was kept"), held["files"]
+    plain = all(isinstance(text, str) and _is_plain(path) for path, text in files.items())
+    return _Kept(result, files) if plain and set(files) in ({*_written(result)}, set()) else None
+
+
+def _is_plain(path: str) -> bool:
+    """Whether a path leads to a file within the folder, of a kind that a diagnosis writes."""
+    pure = PurePosixPath(path)
+    return not pure.is_absolute() and ".." not in pure.parts and pure.suffix in _KINDS
+
+
+def _name(
+    dataset: Dataset, model: Model | None, options: FitOptions | None, *, accept_events: bool, files: bool
+) -> str:
+    """Name of a diagnosis among what is kept: a hash of all that it depends on."""
+    description = dataset.folder / FILE
+    prior = options.prior if options is not None else None
+    depends: dict[str, Any] = {
+        "code": _code(),
+        "description": hashlib.sha256(description.read_bytes()).hexdigest()
+        if description.is_file()
+        else None,
+        "recordings": [[run.file, run.sha256, run.role] for run in dataset.runs],
+        "told": [dataset.serial, dataset.axis, dataset.applied_table, dataset.trusted, dataset.warnings],
+        "model": None if model is None else digest_of(model.to_dict()),
+        "options": None if options is None else asdict(replace(options, prior=None)),
+        "prior": None if prior is None else prior.key,
+        "accept_events": accept_events,
+        "files": files,
+    }
+    return f"{digest_of(depends)}.diagnosis"
+
+
+@functools.cache
+def _code() -> str:
+    """Hash of gyrotc's files, and the versions of what it computes and draws with."""
+    digest = hashlib.sha256(platform.python_version().encode())
+    for library in _LIBRARIES:
+        digest.update(f"{library} {version(library)}\n".encode())
+    package = Path(__file__).parents[1]
+    own = sorted(p for p in package.rglob("*") if p.is_file() and p.suffix != ".pyc")
+    for path in (*own, Path(_core.__file__)):
+        content = path.read_bytes()
+        digest.update(f"{path.name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..assess.budget import DAYS_A_YEAR, yearly_drifts
 from ..assess.changes import Earlier, load_earlier, started_on
 from ..assess.limits import Limits
-from ..assess.stated import DAYS_A_YEAR, yearly_drifts
 from ..common.errors import InputError
 from ..lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, stated_sigma_dph, widened
+from ..lot.learn import FALSE_ALARM
 from ..lot.prior import MapPosterior
-from ..lot.surprise import FALSE_ALARM
 from ..lot.use import prior_of
 from ..model import Model, load_model
 from ..recordings.records import Dataset

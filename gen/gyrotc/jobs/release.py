@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..assess.conformity import worst_of
 from ..assess.consistency import check_budget, check_figures, check_limits
+from ..assess.limits import worst_of
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..pages.unit import UnitResults, unit_in

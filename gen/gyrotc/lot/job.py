@@ -15,12 +15,11 @@ from ..model import Model, load_model
 from ..results.base import read_result
 from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
 from ..results.training import Training
-from ..store.jsontext import digest_of
+from ..store.files import digest_of
 from ..store.marker import check_intact
 from ..train.evidence import MEAN_S
 from ..train.means import UnitMeans, means_of
-from .learn import LEAST_UNITS, Envelope, Learned, folds_of, learn
-from .model import LotState
+from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, learn
 from .prior import process_told, rounded
 from .use import prior_of
 
@@ -128,7 +127,7 @@ def _envelope(models: Sequence[Model]) -> Envelope:
     return (float(t.min()), float(t.max())), (float(r.min()), float(r.max()))
 
 
-def lot_from(  # long: one line for each field of lot.json
+def lot_from(
     names: Sequence[tuple[str, str]],
     units: Sequence[UnitMeans],
     found: Learned,

@@ -1,4 +1,4 @@
-"""What is known of a unit's map before its runs, and with them: normal distributions of its coefficients."""
+"""What is known of a unit's map before its runs and with them, and whether the unit fits its lot."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from ..results.lot import LotProcess
 from ..train.evidence import Asked
 from ..train.means import UnitMeans
 from .basis import PARAMETERS, LotBasis
-from .learn import sums_of
-from .model import evidence
-from .surprise import of_few, p_value, scores
+from .learn import evidence, of_few, p_value, scores, sums_of
 
 __all__ = [
     "MapPosterior",
@@ -25,7 +23,6 @@ __all__ = [
     "rounded",
     "triangle",
 ]
-
 
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 

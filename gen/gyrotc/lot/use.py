@@ -16,14 +16,14 @@ from ..common.errors import InputError
 from ..results.lot import KnownMap, Lot, LotUse, UnitCurve
 from ..train.data import Bins, Scaling, TrainingData, average
 from ..train.evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
-from ..train.guard import objection
+from ..train.guards import objection
 from ..train.means import UnitMeans, unit_means
 from ..train.mrbf import fit_mrbf
 from ..train.prior import Given
 from ..train.result import Outcome
 from .basis import LotBasis
+from .learn import FALSE_ALARM, freedom_of, of_few
 from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
-from .surprise import FALSE_ALARM, freedom_of, of_few
 
 __all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
 

@@ -13,19 +13,23 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from ..causes import CATALOGUE
-from ..common.ceilings import need_memory, refuse_above
 from ..common.errors import InputError
+from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average
-from ..common.opening import open_input
 from ..common.texts import file_stem, html_environment
-from ..quality.left_out import exclude_text
+from ..quality.outliers import exclude_text
 from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
 from ..store.files import write_atomically
 from ..store.folder import result_folder
-from .history_plots import calibrations_over_time
-from .plots import allan_deviation, bias_over_time, curve_by_size, map_with_centers
-from .prior_plots import prior_and_posterior
+from .plots import (
+    allan_deviation,
+    bias_over_time,
+    calibrations_over_time,
+    curve_by_size,
+    map_with_centers,
+    prior_and_posterior,
+)
 from .unit import UnitResults, unit_in
 from .words import (
     bound_words,

@@ -8,12 +8,10 @@ from pathlib import Path
 
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
-from ..results.budget import Budget
-from ..results.changes import Changes
 from ..results.diagnosed import Diagnosed
-from ..results.evaluation import Evaluation, Pooled
-from ..results.limits import HeldLimits, Limit, Verdict
-from ..results.manifest import Manifest
+from ..results.evaluation import Changes, Evaluation, Pooled
+from ..results.folder import Manifest
+from ..results.release import Budget, HeldLimits, Limit, Verdict
 from ..results.training import Rung, Training
 from ..results.verification import Verification
 from .words import limit_words, plain, words

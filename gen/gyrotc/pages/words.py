@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ..results.limits import Limit
+from ..results.release import Limit
 
 __all__ = [
     "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",

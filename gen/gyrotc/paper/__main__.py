@@ -18,8 +18,7 @@ from ..simulate.campaign import campaign, with_noise
 from ..simulate.scenario import read
 from ..store.files import write_atomically
 from .figures import FIGURES, checksum, draw, draw_run
-from .page import filled, parts
-from .record import SEEDS, departures, measured
+from .page import SEEDS, departures, filled, measured, parts
 
 _RUN = "5 C/min"
 

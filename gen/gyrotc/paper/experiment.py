@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.metrics import average, statistics
-from ..pages.published import ENVIRONMENTS, NEURONS
+from ..pages.comparison import ENVIRONMENTS, NEURONS
 from ..recordings.load import load
 from ..simulate.campaign import Noise, simulate
 from ..simulate.truth import simulated_floor

@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..pages.comparison import ENVIRONMENTS
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
-from ..pages.published import ENVIRONMENTS
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
 from ..store.files import write_atomically

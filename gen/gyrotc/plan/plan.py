@@ -1,4 +1,7 @@
-"""`gyrotc plan`: what a programmed profile will be able to tell, before the chamber is booked.
+"""`gyrotc plan`: what a programmed profile will be able to show, before the chamber is booked.
+
+A part of the bias that follows T_node − T_sensor shows by what no map of (T, dT/dt) and no thermometer that is there
+already can hold of that difference. The amplitude that is found in 95 % of cases has d = 6 (docs/diagnosis.md).
 
 The temperatures come from the simulation of chamber and gyro, the rest from the search that `diagnose` would
 make on them: detection limits, separability, how well the map will be known after how many hours.
@@ -7,16 +10,19 @@ make on them: detection limits, separability, how well the map will be known aft
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from .. import __version__
 from ..causes import CATALOGUE, separate_by
+from ..common.errors import InputError
+from ..common.statistics import orthonormal
 from ..diagnose.blocks import Record
 from ..diagnose.candidates import searched
-from ..diagnose.detection_limits import CauseLimit
+from ..diagnose.detection import CauseLimit
+from ..diagnose.gains import Gains
 from ..results.planned import (
     Accuracy,
     Additions,
@@ -33,20 +39,136 @@ from ..results.planned import (
     TriedRun,
 )
 from ..simulate.campaign import Noise
-from .programme import Programme, programme_of
-from .sensitivity import Sensitivity
-from .separate import Row, additions, separability
-from .shortest import shortest
-from .thermometers import places
+from .programme import Programme, node_temperatures, programme_of
+from .sensitivity import Row, Sensitivity, additions, separability
 
-__all__ = ["plan"]
+__all__ = ["FoundProfile", "Place", "places", "plan", "shortest"]
+
+_MOST_RUNS = 60  # bounds the search
+_UNSEEN = 1e3  # times the required limit: what counts for a cause that would not be seen at all
+
+
+@dataclass(frozen=True)
+class FoundProfile:
+    """Runs by name (with repetitions) and their hours; None where no number of these runs reaches the limits."""
+
+    runs: tuple[str, ...] | None
+    hours: float | None
+    reached: dict[str, float | None]
+
+
+def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> FoundProfile:
+    """Adds the run that helps most for its hours, until every limit is reached.
+
+    Args:
+        sensitivity: Belongs to the programme whose runs may be used, each as often as needed.
+        required: Limits by cause, in the unit of its limit.
+
+    Raises:
+        InputError: A cause is unknown or cannot be tested by these runs.
+    """
+    known = sensitivity.limits()
+    for id in required:
+        if id not in known:
+            raise InputError("--require", repr(id), ", ".join(known))
+    hours = sensitivity.programme.hours
+    chosen: list[int] = []
+    now = _distance(sensitivity, chosen, required)
+    while now > 0.0 and len(chosen) < _MOST_RUNS:
+        after = [_distance(sensitivity, [*chosen, k], required) for k in range(len(hours))]
+        best = max(range(len(hours)), key=lambda k: ((now - after[k]) / hours[k], -chosen.count(k)))
+        chosen.append(best)
+        now = after[best]
+    if now > 0.0:
+        return FoundProfile(None, None, _values(sensitivity, chosen, required))
+    for k in sorted(chosen, key=lambda k: -hours[k]):
+        rest = [*chosen]
+        rest.remove(k)
+        if _distance(sensitivity, rest, required) == 0.0:  # what a later run has made needless
+            chosen = rest
+    reached = _values(sensitivity, chosen, required)
+    names = [run.name for run in sensitivity.programme.records.runs]
+    return FoundProfile(tuple(names[k] for k in chosen), sum(hours[k] for k in chosen), reached)
+
+
+def _values(
+    sensitivity: Sensitivity, runs: list[int], required: Mapping[str, float]
+) -> dict[str, float | None]:
+    if not runs:
+        return dict.fromkeys(required)
+    limits = sensitivity.limits(runs)
+    return {id: limits[id].value for id in required}
+
+
+def _distance(sensitivity: Sensitivity, runs: list[int], required: Mapping[str, float]) -> float:
+    """Sum of the logarithms by which limits are above what is required; 0 when all are reached."""
+    values = _values(sensitivity, runs, required)
+    return sum(
+        float(np.log(_UNSEEN if v is None else max(v / required[id], 1.0))) for id, v in values.items()
+    )
+
+
+_D_FOUND = 6.0  # about where most causes are found, as in `separate`
+_LEAST_C = 1e-4  # no thermometer tells less than this
+
+
+@dataclass(frozen=True)
+class Place:
+    """A node of the gyro as a place for a thermometer.
+
+    Attributes:
+        node: Its name.
+        there: Whether a thermometer is there.
+        apart_c: RMS of its temperature less that of the sensor, about the mean, C.
+        unseen_c: RMS of what neither the map nor the thermometers that are there hold of it, C.
+        limit_dph_per_c: Amplitude of a part of the bias that follows it from which these runs show it; None: never.
+    """
+
+    node: str
+    there: bool
+    apart_c: float
+    unseen_c: float
+    limit_dph_per_c: float | None
+
+
+def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int) -> list[Place]:
+    """Every node but the sensor's own, the most telling first.
+
+    Raises:
+        InputError: The scenario's gyro has no other node.
+    """
+    found = node_temperatures(scenario, noise=noise, seed=seed)
+    if len(found.runs[0]) < 2:
+        raise InputError(f"{scenario}, gyro.node", "one node", "further nodes, where a thermometer could be")
+    records = sensitivity.programme.records
+    apart = {
+        node: records.average([run[node] - run[found.sensor] for run in found.runs])
+        for node in found.runs[0]
+        if node != found.sensor
+    }
+    gains = Gains(sensitivity.search)
+    there = [node for node in apart if node in found.there]
+    ranked = []
+    for node, column in apart.items():
+        others = [apart[o] for o in there if o != node]
+        white, plain = gains.whiten(column), column - column.mean()
+        q = orthonormal(gains.map, *([gains.whiten(np.column_stack(others))] if others else []))
+        own = white - q @ (q.T @ white)
+        held = np.column_stack([sensitivity.bank.map, *others, np.ones(len(column))])
+        rest = column - held @ np.linalg.lstsq(held, column, rcond=1e-9)[0]
+        unseen = float(np.sqrt(np.mean(rest**2)))
+        norm = float(np.linalg.norm(own)) / gains.scale
+        limit = _D_FOUND / norm if unseen > _LEAST_C else None
+        ranked.append(Place(node, node in there, float(np.sqrt(np.mean(plain**2))), unseen, limit))
+    return sorted(ranked, key=lambda place: (place.there, place.limit_dph_per_c or np.inf))
+
 
 _AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
 _PICTURE_POINTS = 200  # of a run: as many as a picture a few centimetres wide shows
 _HARD = 10.0  # d above which two causes count as hard to tell apart
 
 
-def plan(  # long: one line for each field of the result
+def plan(
     scenario: str | Path,
     *,
     noise: Noise = "paper",

@@ -11,12 +11,10 @@ import numpy as np
 from ..causes.base import History
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..diagnose.blocks import Record, Records
-from ..diagnose.colours import Declared
-from ..diagnose.gather import block_length
+from ..diagnose.blocks import Record, Records, block_length
+from ..diagnose.noise import Declared
 from ..simulate.campaign import Noise, campaign, with_noise
-from ..simulate.scenario import RunSet, Scenario, read
-from ..simulate.signals import Thermometer
+from ..simulate.scenario import RunSet, Scenario, Thermometer, read
 
 __all__ = ["NodeTemperatures", "Programme", "library", "node_temperatures", "programme_of"]
 

@@ -16,8 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
-from ..common.cells import cell_means, noise_of
-from ..common.quantiles import CHI2_95_ONE, NORMAL_95
+from ..common.statistics import CHI2_95_ONE, NORMAL_95, cell_means, noise_of
 
 __all__ = ["Drift", "drifts_of"]
 

@@ -116,7 +116,7 @@ class RunFacts:
     earth: EarthRate | None
 
 
-def facts_of(run: Run, rows: Rows) -> RunFacts:  # long: one line for each fact
+def facts_of(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
     time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)

@@ -19,10 +19,9 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from ..common.arrays import FloatArray
-from ..common.ceilings import need_memory, refuse_above
 from ..common.errors import InputError
-from ..common.opening import open_input
-from .source import Prefix, Source
+from ..common.inputs import need_memory, open_input, refuse_above
+from .files import Prefix, Source
 from .values import Fault
 
 __all__ = ["CsvFile"]

@@ -1,30 +1,198 @@
-"""A folder becomes a data set: description, files, spans; each thing that is wrong is told in words."""
+"""A folder becomes a data set: description, files, runs; each problem is reported with file and field."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
-from ..common.ceilings import refuse_above
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from .columns import arrange
-from .consistency import check_description, check_spans, common_channels, in_entry, of_axis, place_of
-from .curves import curves_of
-from .earth import earth_rate
+from ..common.inputs import refuse_above
+from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
 from .overlap import shared_rows
-from .problems import Problems
+from .plausibility import Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
-from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run
-from .schema import FILE, Description, RunEntry, check_serial, parse_description
-from .shared import sketch
-from .trust import check_channel_units, judge, suspected, suspected_of_earth
+from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
+from .shared_rows import sketch
+from .units import NATIVE
+from .values import arrange
 
-__all__ = ["axes_of", "load", "survey"]
+__all__ = [
+    "axes_of",
+    "check_channel_units",
+    "check_description",
+    "check_spans",
+    "common_channels",
+    "in_entry",
+    "judge",
+    "load",
+    "of_axis",
+    "place_of",
+    "survey",
+    "suspected",
+    "suspected_of_earth",
+]
+
+
+def place_of(description: Description, index: int) -> str:
+    """Where a run stands, for messages."""
+    return f"{FILE}, run {index + 1} ({description.run[index].file})"
+
+
+def in_entry(entry: RunEntry, time_s: FloatArray) -> NDArray[np.bool_]:
+    """Which times belong to a run."""
+    gaps = tuple(Exclusion(gap.from_s, gap.to_s, gap.reason) for gap in entry.exclude)
+    return inside(time_s, entry.from_s, entry.to_s, gaps)
+
+
+def check_description(
+    description: Description, applied: Applied | None, exam_only: bool, problems: Problems
+) -> None:
+    """Checks that there is a training run, that Earth's rate can be computed, that the model given was subtracted."""
+    if not exam_only and all(entry.role != "train" for entry in description.run):
+        expected = "at least one training run"
+        problems.add(InputError(f"{FILE}, field role", "no run has the role train", expected))
+    if description.earth_rate == "compute" and description.latitude_deg is None:
+        expected = 'a latitude, as earth_rate = "compute"'
+        problems.add(InputError(f"{FILE}, field latitude_deg", "is missing", expected))
+    stated = description.applied_table
+    if stated != "none" and applied is None:
+        found = f"the model {stated[:12]}... was subtracted while recording"
+        problems.add(InputError(f"{FILE}, field applied_table", found, "that model by --applied FILE"))
+    if applied is not None and applied.hash != stated:
+        found = f"{stated!r}, and the model given is {applied.hash}"
+        problems.add(InputError(f"{FILE}, field applied_table", found, "the hash of the model given"))
+
+
+def check_spans(description: Description, problems: Problems) -> None:
+    """Checks that spans and exclusions have a length, and that no row of a file belongs to two runs."""
+    for index, entry in enumerate(description.run):
+        stretches = [("from_s", entry.from_s, entry.to_s)]
+        stretches += [(f"exclude.{k}.from_s", gap.from_s, gap.to_s) for k, gap in enumerate(entry.exclude)]
+        for field, start, end in stretches:
+            if start is not None and end is not None and start >= end:
+                where = f"{place_of(description, index)}, field {field}"
+                problems.add(InputError(where, f"{start:.10g} s", f"less than to_s, {end:.10g} s"))
+    for (i, one), (j, other) in combinations(enumerate(description.run), 2):
+        if one.file == other.file and _overlap(one, other):
+            found = f"the span overlaps that of run {i + 1}"
+            expected = "every row of a file in one run at most"
+            problems.add(InputError(place_of(description, j), found, expected))
+
+
+def _overlap(one: RunEntry, other: RunEntry) -> bool:
+    def before(a: RunEntry, b: RunEntry) -> bool:
+        return a.to_s is not None and b.from_s is not None and a.to_s <= b.from_s
+
+    return not before(one, other) and not before(other, one)
+
+
+def of_axis(
+    recordings: Mapping[str, Recording], axis: str | None, problems: Problems
+) -> dict[str, Recording]:
+    """The recordings that have the axis that was asked for."""
+    kept = {}
+    for name, recording in recordings.items():
+        axes = recording.layout.axes
+        choices = f"--axis {'|'.join([*axes, 'all'])}"
+        if axis is None and axes:
+            problems.add(InputError(name, f"rates of the axes {', '.join(axes)}", choices))
+        elif axis is not None and axis not in axes:
+            expected = choices if axes else "no --axis: the recording has one rate"
+            problems.add(InputError(name, f"no rate of the axis {axis}", expected))
+        else:
+            kept[name] = recording
+    return kept
+
+
+def common_channels(recordings: Mapping[str, Recording]) -> tuple[tuple[str, ...], list[str]]:
+    """Auxiliary channels that every file has, and a warning for each of the others."""
+    every = list(recordings.values())
+    seen = dict.fromkeys(name for r in every for name in r.layout.channels)
+    common = tuple(name for name in seen if all(name in r.layout.channels for r in every))
+    warnings = []
+    for name in seen:
+        if name not in common:
+            without = ", ".join(r.file.name for r in every if name not in r.layout.channels)
+            warnings.append(f"channel {name} is left out: {without} has no such column")
+    return common, warnings
+
+
+Doubted = tuple[str, Suspicion]
+"""Name of a file and what contradicts its units."""
+
+
+def check_channel_units(
+    description: Description, recordings: Mapping[str, Recording], problems: Problems
+) -> None:
+    """Checks that every unit is that of a column: a typing error must not pass."""
+    channels = {name for r in recordings.values() for name in r.layout.channels}
+    for name in description.units:
+        if name not in NATIVE and name not in channels:
+            expected = (
+                f"rate, time, temperature or a channel ({', '.join(sorted(channels)) or 'there is none'})"
+            )
+            problems.add(InputError(f"{FILE}, field units.{name}", "no such column", expected))
+
+
+def suspected(description: Description, recordings: Mapping[str, Recording]) -> Iterator[Doubted]:
+    """What contradicts the units of each file."""
+    noise = description.noise.arw_deg_per_sqrt_h if description.noise else None
+    for name, recording in recordings.items():
+        found = suspicions(
+            recording.evidence,
+            recording.layout,
+            recording.units,
+            earth_stated=description.earth_rate is not None,
+            noise=noise,
+        )
+        yield from ((name, one) for one in found)
+
+
+def suspected_of_earth(
+    axis: str | None, runs: Sequence[Run], recordings: Mapping[str, Recording]
+) -> Iterator[Doubted]:
+    """Runs whose mean is Earth's component along the axis in another unit, where that is computed."""
+    for run in runs:
+        recording = recordings[run.file]
+        layout = recording.layout
+        if run.earth is None or layout.pulses:
+            continue
+        column = layout.value_of(axis)
+        index = 2 + (list(layout.axes.values()).index(column) if layout.axes else 0)
+        cells = recording.evidence.cells
+        mine = cells[run.in_span(cells[:, 0]), index]
+        unit = recording.units.get(column)
+        one = earth_suspicion(column, float(mine.mean()), run.earth.rate_dph, unit) if len(mine) else None
+        if one is not None:
+            yield run.file, one
+
+
+def judge(doubted: Sequence[Doubted], trust: bool, problems: Problems) -> list[tuple[str, str]]:
+    """Refuses what contradicts its unit; where the user's word is taken, the file and what it was taken against."""
+    trusted: list[tuple[str, str]] = []
+    seen = set()
+    for name, one in doubted:
+        if (name, one.kind) in seen:
+            continue
+        seen.add((name, one.kind))
+        where = f"{name}, column {one.column}"
+        if trust:
+            trusted.append((where, one.found))
+        else:
+            expected = (
+                f'[units] {one.kind} = "{one.likely}" in {FILE}, or --trust-units if it is right as it is'
+            )
+            problems.add(InputError(where, one.found, expected))
+    return trusted
+
 
 _KINDS = (".csv", ".parquet")
 
@@ -72,7 +240,7 @@ def axes_of(folder: Path) -> tuple[str, ...]:
     return tuple(layout.axes)
 
 
-def survey(  # long: a reader is told everything that it needs, by name
+def survey(
     folder: Path,
     problems: Problems,
     *,

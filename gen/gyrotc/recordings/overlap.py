@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from .problems import Problems
+from .description import FILE, Problems
 from .reading import Reader, Recording
 from .records import Run, SharedRows
-from .schema import FILE
-from .shared import windows_in_common, windows_that_repeat
+from .shared_rows import windows_in_common, windows_that_repeat
 
 __all__ = ["shared_rows"]
 

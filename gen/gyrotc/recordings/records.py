@@ -287,7 +287,7 @@ class Dataset:
         trusted: What the values look like against their units, where the user's word was taken for them.
         sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
         shared: Rows that runs of one role have in common, or that a run has twice.
-        sketch: Hashes of rows by which gyros of a fleet are compared (`shared.sketch`).
+        sketch: Hashes of rows by which gyros of a fleet are compared (`shared_rows.sketch`).
         curves: Mean rates over temperature, of every axis of every run.
     """
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..common.inputs_texts import checked, read_json
+from ..common.inputs import checked, read_json
 
 __all__ = [
     "Amount", "Arithmetic", "Axis", "Count", "Figure", "Numbered", "Part", "Positive", "Result", "checked_result",

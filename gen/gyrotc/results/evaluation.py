@@ -1,4 +1,4 @@
-"""`evaluate.json`: recordings replayed through the compiled code, and what remains."""
+"""`evaluate.json`, `compare.json` and `changes.json`: a correction, methods, and differences to an earlier result."""
 
 from __future__ import annotations
 
@@ -10,10 +10,90 @@ from pydantic import Field
 
 from ..common.metrics import Averages, statistics
 from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
+from .release import HeldLimits
 
 __all__ = [
-    "EvaluatedRun", "Evaluation", "FigureUncertainty", "FoundIn", "ModelSizes", "Pooled", "RunStatistics", "Statistics",
-]  # fmt: skip
+    "Apart",
+    "AsFound",
+    "At",
+    "Calibration",
+    "Changes",
+    "Comparison",
+    "Envelopes",
+    "EvaluatedRun",
+    "Evaluation",
+    "FigureChange",
+    "FigureUncertainty",
+    "FileChanges",
+    "FoundIn",
+    "Group",
+    "Method",
+    "ModelSizes",
+    "NameChanges",
+    "Pooled",
+    "Published",
+    "RangeChange",
+    "RunStatistics",
+    "Statistics",
+    "TextChange",
+]
+
+
+class Published(Part):
+    """Figures of Ding et al. 2014, Table 1."""
+
+    before_rms_dph: float = Field(description="deg/h")
+    after_rms_dph: float = Field(description="deg/h")
+    improvement: float = Field(description="RMS before over RMS after")
+
+
+class Group(Part):
+    """What one method makes of one environment."""
+
+    environment: str = Field(description="free text of the data set")
+    samples: Count = Field(description="means over `average_s`")
+    before_rms_dph: Figure = Field(description="deg/h")
+    before_std_dph: Figure = Field(description="about the mean, deg/h")
+    after_rms_dph: Figure = Field(description="deg/h")
+    after_std_dph: Figure = Field(description="about the mean, deg/h")
+    improvement: Figure = Field(description="RMS before over RMS after")
+    published: Published | None = Field(
+        default=None, description="the paper's figures, where the recordings are of its environments"
+    )
+
+
+class Method(Part):
+    """What one training method makes of all environments."""
+
+    id: str = Field(description="as `--method` takes it")
+    groups: tuple[Group, ...] = Field(description="environment by environment")
+    exam_rms_dph: Figure = Field(description="RMS over all environments, deg/h")
+    exam_std_dph: Figure = Field(description="about the mean, deg/h")
+    before_rms_dph: Figure = Field(description="deg/h")
+    improvement: Figure = Field(description="RMS before over RMS after")
+    centers: Count = Field(description="centers of the networks")
+    table_bytes: Count = Field(description="size of its table, bytes")
+    sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
+    noise_floor_dph: Figure = Field(description="as this method estimates it, deg/h")
+    train_s: float = Field(description="processor time of training, s")
+    published_train_s: tuple[float, float] | None = Field(
+        default=None, description="least and most of the paper, s"
+    )
+
+
+class Comparison(Result):
+    """Every training method on one data set (`gyrotc compare`)."""
+
+    schema_: Annotated[Literal["gyrotc.compare/1"], Field(alias="schema")] = "gyrotc.compare/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    block_s: float = Field(description="length of a block, s")
+    average_s: float = Field(description="averaging of all RMS figures, s")
+    seed: int = Field(description="of everything that is drawn")
+    judged_on: Literal["exam", "left_out"] = Field(description="exam runs, or what was left out in turn")
+    noise_floor_dph: Figure = Field(description="estimated, of means over `average_s`, deg/h")
+    noise_floor_source: Literal["estimated"] = Field(description="where the noise floor comes from")
+    methods: tuple[Method, ...] = Field(description="in the order in which they were tried")
 
 
 class Statistics(Part):
@@ -138,3 +218,131 @@ class Evaluation(Result):
         if self.left_out:
             return "left_out", self.left_out
         return ("train", self.train) if self.train else None
+
+
+class FigureChange(Part):
+    """A figure of both results."""
+
+    before: int | Figure = Field(description="of the earlier result")
+    after: int | Figure = Field(description="of this one")
+
+
+class TextChange(Part):
+    """A text of both results."""
+
+    before: str | None = Field(description="of the earlier result")
+    after: str | None = Field(description="of this one")
+
+
+class RangeChange(Part):
+    """A range of both results, lowest and highest."""
+
+    before: tuple[float, float] = Field(description="of the earlier result")
+    after: tuple[float, float] = Field(description="of this one")
+
+
+class Envelopes(Part):
+    """Calibrated ranges."""
+
+    temperature_c: RangeChange = Field(description="C")
+    slope_c_per_min: RangeChange = Field(description="C/min")
+
+    @classmethod
+    def of(cls, **ranges: tuple[tuple[float, float], tuple[float, float]]) -> Envelopes:
+        """From pairs of an earlier and a later range."""
+        return cls(**{name: RangeChange(before=a, after=b) for name, (a, b) in ranges.items()})
+
+
+class NameChanges(Part):
+    """Names that came and went."""
+
+    new: tuple[str, ...] = Field(description="only in this result")
+    gone: tuple[str, ...] = Field(description="only in the earlier one")
+
+
+class FileChanges(NameChanges):
+    """Files that came, went, or have other bytes."""
+
+    other_bytes: tuple[str, ...] = Field(description="in both, with another SHA-256")
+
+
+class At(Part):
+    """A place on the map."""
+
+    temperature_c: float = Field(description="C")
+    slope_c_per_min: float = Field(description="C/min")
+
+
+class Apart(Part):
+    """How far the maps lie apart where both were calibrated."""
+
+    rms_dph: float = Field(description="deg/h")
+    mean_dph: float = Field(description="deg/h")
+    max_abs_dph: float = Field(description="deg/h")
+    at: At = Field(description="where they are farthest apart")
+    rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null where that is not known")
+    expanded_uncertainty_dph: Amount | None = Field(
+        default=None,
+        description="U (k = 2) of `rms_dph`: twice the RMS that the uncertainties of both maps give "
+        "(`uncertainty_dph` of the models; without it those of the means of what remains) although the gyro has not "
+        "changed; null where that is not known",
+    )
+    significant: bool | None = Field(
+        default=None, description="whether `rms_dph` is more than that; null where it is not known"
+    )
+
+
+class AsFound(Part):
+    """The earlier correction on the new recordings: how the unit was when it came back."""
+
+    judged_on: Literal["exam", "train"] = Field(
+        description="runs of the new data set that it was judged on; it has seen none of them"
+    )
+    figures: Pooled = Field(description="of these runs, `after` with the earlier correction")
+    limits: HeldLimits | None = Field(description="the same limits; null where there were none")
+
+
+class Calibration(Part):
+    """One of the calibrations of a unit, the earliest first."""
+
+    date: str | None = Field(description="`calibrated_on` of `[meta]`, else the start of the last recording")
+    model_hash: str = Field(description="of its model")
+    as_found_rms_dph: Figure = Field(description="of the correction before it on its recordings, deg/h")
+    as_left_rms_dph: Figure = Field(description="of its own, deg/h")
+    moved_rms_dph: Figure = Field(description="how far the map moved since the one before, deg/h")
+    moved_mean_dph: Figure = Field(description="its mean over the common envelope, deg/h")
+    expanded_uncertainty_dph: Figure = Field(description="U (k = 2) of `moved_rms_dph`")
+    significant: bool | None = Field(description="whether it moved by more than that")
+
+
+class Changes(Result):
+    """What is different from an earlier result (`gyrotc build --previous`)."""
+
+    schema_: Annotated[Literal["gyrotc.changes/1"], Field(alias="schema")] = "gyrotc.changes/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    same_model: bool = Field(description="whether the models have one hash")
+    model_hash: TextChange = Field(description="hashes of the models")
+    recordings: FileChanges = Field(description="recordings that the models were fitted to")
+    map: Apart | None = Field(description="null where the envelopes have nothing in common")
+    envelope: Envelopes = Field(description="calibrated ranges")
+    figures: dict[str, FigureChange | str] = Field(
+        description="figures of both results; `judged_on` says on what those of recordings were measured, which are "
+        "there where both results were judged on the same kind"
+    )
+    findings: NameChanges = Field(description="ids of findings")
+    versions: dict[str, TextChange] = Field(description="programs whose version is another")
+    files: FileChanges = Field(description="emitted files")
+    as_found: AsFound | None = Field(
+        default=None, description="null where `as_found_missing` says why, or of an older gyrotc"
+    )
+    as_found_missing: str = Field(default="", description="why there is no state as found")
+    history: tuple[Calibration, ...] = Field(
+        default=(),
+        description="all calibrations that are known by their chain of `--previous`, this one last",
+    )
+
+    @property
+    def named(self) -> tuple[tuple[str, NameChanges], ...]:
+        """What came, went or has other bytes, by what it is."""
+        return ("recordings", self.recordings), ("findings", self.findings), ("files", self.files)

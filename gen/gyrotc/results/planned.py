@@ -1,4 +1,4 @@
-"""`plan.json`: what a programmed profile will be able to tell."""
+"""`plan.json` of `gyrotc plan`, of a profile, with a lot and for one unit."""
 
 from __future__ import annotations
 
@@ -6,23 +6,91 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Count, Figure, Part, Result
+from .base import Amount, Axis, Count, Figure, Part, Positive, Result
 
 __all__ = [
     "Accuracy",
     "Additions",
     "AssumedNoise",
+    "ChamberStep",
     "DetectionLimit",
     "Hard",
+    "LotPlan",
+    "LotProgramme",
+    "NextRun",
     "Plan",
     "PlanLimit",
     "PlannedRun",
+    "ProposedRun",
     "Separability",
     "Shortest",
     "Temperature",
     "ThermometerPlace",
     "TriedRun",
-]  # fmt: skip
+]
+
+
+class ChamberStep(Part):
+    """A ramp and the hold after it."""
+
+    to_c: float = Field(description="set point, C")
+    c_per_min: Amount = Field(description="rate of the ramp to it, C/min")
+    hold_min: Amount = Field(description="hold there, min")
+
+
+class LotProgramme(Part):
+    """A chamber programme and what it promises."""
+
+    start_c: float = Field(description="where it starts, power coming on with it, C")
+    steps: tuple[ChamberStep, ...] = Field(description="in their order")
+    hours: Amount = Field(description="length, h")
+    sigma_dph: Amount = Field(description="promised: 1 sigma of the map, RMS over where units are, deg/h")
+    rms_over_floor: Amount = Field(description="the same as RMS over the noise floor of means over 100 s")
+    reached: bool = Field(description="whether that is what was required; else it is what a day reaches")
+
+
+class LotPlan(Result):
+    """The shortest programme with a lot, and without."""
+
+    schema_: Annotated[Literal["gyrotc.lot-plan/1"], Field(alias="schema")] = "gyrotc.lot-plan/1"
+    lot: str = Field(description="checksum of the lot")
+    scenario: str = Field(description="whose chamber and instrument are assumed")
+    accuracy_dph: Amount = Field(description="required, deg/h")
+    before_dph: Amount = Field(description="1 sigma by the lot alone, before any run, deg/h")
+    with_lot: LotProgramme = Field(description="with the lot")
+    without: LotProgramme = Field(
+        description="for a unit of which nothing is known but that its map is smooth"
+    )
+
+
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class ProposedRun(Part):
+    """A run, what it is expected to bring, and what it costs."""
+
+    programme: LotProgramme = Field(description="what the chamber does, and 1 sigma of the map after it")
+    removed_share: _Share = Field(
+        description="of the map's variance, mean over where corrections are asked for"
+    )
+    price: Amount = Field(description="of the run, with what one run costs before it begins")
+
+
+class NextRun(Result):
+    """Which run to record next for a unit (`gyrotc plan --unit`)."""
+
+    schema_: Annotated[Literal["gyrotc.next-run/1"], Field(alias="schema")] = "gyrotc.next-run/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    model_hash: str = Field(description="of the unit's model")
+    scenario: str = Field(description="whose chamber and instrument are assumed")
+    before_dph: Amount = Field(description="1 sigma of the map as it is known now, deg/h")
+    price_per_hour: Positive = Field(description="of the chamber, in any currency")
+    price_per_run: Amount = Field(description="of mounting, settling and powering once, in the same")
+    proposals: tuple[ProposedRun, ...] = Field(
+        description="each longer than the one before it and beginning like it; the last is the longest that is allowed"
+    )
+    best: int = Field(ge=0, description="number of the one that removes most variance for its price, from 0")
 
 
 class AssumedNoise(Part):

@@ -1,4 +1,4 @@
-"""`verify.json`: whether the emitted files are what the model gives, and what every target computed with them."""
+"""Results of `emit` and `verify`: which files were written, and what every target computed with them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,46 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Axis, Count, Part, Result
-from .limits import Verdict
+from .base import Arithmetic, Axis, Count, Part, Result
+from .release import Verdict
 
 __all__ = [
-    "CallCost", "EmittedWith", "FunctionCost", "JointVerification", "LogPart", "MapError", "ReadLog", "ReplayedRows",
-    "SignatureCheck", "Verification", "VerifiedFile", "VerifiedTarget", "WorstError",
-]  # fmt: skip
+    "CallCost",
+    "Emitted",
+    "EmittedTable",
+    "EmittedWith",
+    "FunctionCost",
+    "JointVerification",
+    "LogPart",
+    "MapError",
+    "ReadLog",
+    "ReplayedRows",
+    "SignatureCheck",
+    "Verification",
+    "VerifiedFile",
+    "VerifiedTarget",
+    "WorstError",
+]
+
+
+class EmittedTable(Part):
+    """Size and error bound of one table."""
+
+    numeric: Arithmetic = Field(description="its arithmetic")
+    table_bytes: Count = Field(description="size of the table, bytes (section 3)")
+    error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
+
+
+class Emitted(Result):
+    """Tables that were written."""
+
+    schema_: Annotated[Literal["gyrotc.emit/1"], Field(alias="schema")] = "gyrotc.emit/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
+    id: str = Field(description="id of the table, part of every emitted name")
+    tables: tuple[EmittedTable, ...] = Field(description="one for each arithmetic")
+    refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
+
 
 PassOrFail = Literal["pass", "fail"]
 

@@ -13,18 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import InputError
-from ..recordings.text import dataset_toml
-from ..results.truth import SimulatedTruth, TrueLot, TrueRun
+from ..recordings.description import dataset_toml
+from ..results.recordings import SimulatedTruth, TrueLot, TrueRun
+from ..store.files import create, json_text, write_own
 from ..store.folder import result_folder
-from ..store.jsontext import json_text
-from ..store.opening import create, write_own
-from .biasmap import BiasMap, draw
+from .gyro import BiasMap, draw
 from .instrument import SimulatedRecord, record
 from .noise import CELL_S
-from .recording import RowLength, rows
+from .recording import Format, RowLength, SimulatedRunFile, rows
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
-from .write import Format, SimulatedRunFile
 
 __all__ = [
     "NOISE",

@@ -1,4 +1,4 @@
-"""One simulated run once a second: chamber, thermal nodes, causes, bias, sensor, noise."""
+"""One simulated run once a second: chamber, thermal nodes, causes, bias, thermometers, channels, noise."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..causes.base import Scene
 from ..common.arrays import FloatArray
-from ..common.ceilings import need_memory
-from ..target.operators import first_order
-from . import chamber, noise, profile, thermal
-from .biasmap import BiasMap
-from .channels import channel_readings, channel_values
-from .internal import internal_of, internal_readings
+from ..common.inputs import need_memory
+from ..target.recursions import first_order
+from . import chamber, noise, profile
+from . import chamber as thermal
+from .gyro import BiasMap, channel_readings, channel_values, internal_of, internal_readings, quantised_c
 from .noise import CELL_S
 from .scenario import Gyro, Profile, Scenario, ScenarioCause
-from .thermometers import quantised_c
 
 __all__ = ["SimulatedRecord", "record", "thermal_network"]
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..results.truth import TrueLot
+from ..results.recordings import TrueLot
 from ..store.folder import result_folder
-from .biasmap import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .campaign import Noise, RowForm, SimulatedGyro, with_noise, write_gyro
+from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .scenario import Gyro, Scenario, read
 
 __all__ = ["LotOrder", "draw_lot", "simulate_lot"]
@@ -181,7 +181,7 @@ def _map(gyro: Gyro, scores: Scores, center: FloatArray, family: float) -> BiasM
 
 
 def _shape_of(s: Scores) -> dict[str, object]:
-    """Parameters of the shape (`simulate/biasmap.py`); their moments are those of the gyros that `draw` makes."""
+    """Parameters of the shape (`simulate/gyro.py`); their moments are those of the gyros that `draw` makes."""
     knots_c = np.linspace(*T_RANGE_C, _KNOTS)
     x = np.linspace(-1.0, 1.0, _KNOTS)
     expansion = 0.4 * s["expansion"] * x + 0.35 * s["expansion_slope"] * (x**2 - 1.0 / 3.0)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import InputError
-from ..common.opening import read_input
+from ..common.inputs import read_input
 from ..results.base import read_optional
-from ..results.truth import SimulatedTruth
+from ..results.recordings import SimulatedTruth
 
 __all__ = ["FILE", "Truth", "read_truth", "simulated_floor"]
 

@@ -1,4 +1,4 @@
-"""A result folder: written beside its place, on disk, then put there in one step; the earlier one until then."""
+"""A result folder: written beside its place, then exchanged with it in one step where the system can do that."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
-from .exchange import can_exchange, exchange
-from .files import check_replaceable, sync_folder, unfinished, write_atomically
+from .files import Lock, check_replaceable, sync_folder, unfinished, write_atomically, write_own
 from .interrupts import deferred
-from .lock import Lock
 from .marker import (
     KINDS,
     MARKER,
     OWN,
     Marker,
+    check_apart,
+    check_contents,
+    check_serial,
     faults,
+    final_place,
     is_inside,
     marker_of,
     marker_text,
+    prefix_of,
     read_marker,
     remove_listed,
     sha256,
     walk,
 )
-from .opening import write_own
-from .places import check_apart, check_contents, check_serial, final_place, prefix_of
-from .update import Update, write_marker
+from .update import Update, can_exchange, exchange, write_marker
 
 __all__ = ["Stage", "clean", "leftovers", "result_folder", "write_result"]
 

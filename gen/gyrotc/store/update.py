@@ -1,18 +1,64 @@
-"""Some entries of a result folder are replaced, the others stay: in one step where that can be."""
+"""Entries of a result folder are replaced in one step where the system can exchange two names."""
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from .exchange import can_exchange, exchange
-from .files import sync_folder
+from .files import create, sync_folder, write_own
 from .marker import MARKER, NEW, OWN, Marker, marker_text, sha256, walk
-from .opening import create
 
-__all__ = ["Update", "write_marker"]
+__all__ = ["Update", "can_exchange", "exchange", "write_marker"]
+
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
+_RENAME_SWAP = 2  # sys/stdio.h of macOS
+_NOT_HERE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
+
+
+def exchange(first: Path, second: Path) -> bool:
+    """Swaps two existing names; False where system or file system cannot (nothing is done then).
+
+    Raises:
+        OSError: It can, and it failed.
+    """
+    call = _call()
+    if call is None:
+        return False
+    if call(os.fsencode(first), os.fsencode(second)) == 0:
+        return True
+    number = ctypes.get_errno()
+    if number in _NOT_HERE:
+        return False
+    raise OSError(number, os.strerror(number), str(first), None, str(second))
+
+
+def _call() -> Callable[[bytes, bytes], int] | None:
+    library = ctypes.CDLL(None, use_errno=True)
+    try:
+        if sys.platform == "darwin":
+            swap = library.renamex_np
+            return lambda a, b: int(swap(a, b, ctypes.c_uint(_RENAME_SWAP)))
+        rename = library.renameat2
+    except AttributeError:
+        return None
+    return lambda a, b: int(rename(_AT_FDCWD, a, _AT_FDCWD, b, ctypes.c_uint(_RENAME_EXCHANGE)))
+
+
+def can_exchange(folder: Path) -> bool:
+    """Whether two names in `folder`, one of gyrotc's own, can be swapped: tried."""
+    names = [folder / ".gyrotc-try-1", folder / ".gyrotc-try-2"]  # see marker.OWN
+    try:
+        for name in names:
+            write_own(name, b"")
+        return exchange(*names)
+    finally:
+        for name in names:
+            name.unlink(missing_ok=True)
 
 
 def write_marker(work: Path, folder: Path, marker: Marker) -> None:

@@ -29,7 +29,7 @@ def amalgamate(
     """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
 
     Args:
-        include_dir, libc_dir: As `reference.runtime.runtime_folders` gives them.
+        include_dir, libc_dir: As `common.runtime.runtime_folders` gives them.
         numerics: The arithmetics that `gtc.c` holds; `gtc.h` declares all.
         bank: Banks of networks are compiled in by default (GTC_WITH_BANK 1).
     """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..model import Model, load_model
 from ..recordings.records import Applied, Rows
-from ..target.follow import samples_per_block
+from ..target.front_end import samples_per_block
 from ..target.history import replay
 from ..target.table import Table
 from ..train.samples import missed_before

@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..model import Envelope, Model, Network
 from ..target.table import Table, Words, f32_words
-from .authority import unbounded
-from .common import STEEPEST, shared
-from .gradient import largest_gradient
-from .guards import guard_words
-from .handover import Axis, handover_error_dph, regions
-from .sigma import sigma_values
-from .terms import f32_terms
+from .error_bounds import Axis, handover_error_dph, regions, unbounded
+from .rounding import STEEPEST, f32_terms, guard_words, largest_gradient, shared, sigma_values
 
 __all__ = ["table_of"]
 

@@ -14,10 +14,10 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import InputError
-from ..common.opening import read_input
+from ..common.inputs import read_input
 from ..model import Model
 from ..results.base import Axis, Numbered
-from ..store.jsontext import json_text
+from ..store.files import json_text
 from ..target.table import Numeric
 
 __all__ = [

@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Model
-from ..target.follow import period_us
-from .guards import guard_of
-from .terms import channel_names
+from ..target.front_end import period_us
+from .rounding import channel_names, guard_of
 
 __all__ = ["MISSING", "Calls", "Segment", "Vectors", "answers_text", "make_vectors"]
 
@@ -234,7 +233,7 @@ def _one(numeric: str, value: float) -> int:
     return int(np.clip(round(value * 65536), -(2**31) + 1, 2**31 - 1)) & 0xFFFFFFFF
 
 
-def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # long: one script, call by call
+def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # noqa: PLR0915 - one script
     """Start-up, hold, ramps over the envelope and beyond, then every fault, and recovery from it."""
     zero = dict.fromkeys(numerics, 0)
     n = SAMPLES_PER_BLOCK

@@ -1,6 +1,8 @@
-"""The operations of which the recursions of terms are made, and those of float64.
+"""The operations of front end and terms in each arithmetic, and in float64.
 
-`reference` has those of the target: float32 and fixed point.
+`target.operations` has those of the target: float32 and fixed point.
+
+Element by element only: `np.sum`, `@` and the like may add in any order and are not used.
 """
 
 from __future__ import annotations
@@ -9,9 +11,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FLOAT64", "Bells", "Floating", "Operations"]
+__all__ = ["F32", "FLOAT64", "Q31", "Arithmetic", "Bells", "Floating", "Operations"]
 
 Numbers = NDArray[Any]
 Bells = tuple[tuple[Any, Any], tuple[Any, Any]]
@@ -91,3 +93,141 @@ class Floating:
 
 
 FLOAT64: Operations = Floating()
+
+
+_MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
+
+
+class Arithmetic(Protocol):
+    """Operations on temperatures; arrays broadcast, and every result is rounded as on the target."""
+
+    def numbers(self, x: ArrayLike) -> Numbers:
+        """Values of the arithmetic's type."""
+
+    def missing(self, n: int) -> Numbers:
+        """n samples that did not arrive."""
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]: ...
+
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        """max_step + max_rate * time, in microseconds."""
+
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
+        """|a - b| <= limit."""
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        """Last of the running sums along axis 1, added from left to right."""
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers: ...
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers: ...
+
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        """Least-squares slope of differences d at abscissae 0, 1, ... where `used`; 0 where under two are.
+
+        Args:
+            d: Shape (abscissae, n).
+            used: The same shape.
+        """
+
+
+class _F32:
+    def numbers(self, x: ArrayLike) -> Numbers:
+        return np.asarray(x, dtype=np.float32)
+
+    def missing(self, n: int) -> Numbers:
+        return np.full(n, np.nan, dtype=np.float32)
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+        return ~np.isfinite(x)
+
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        change = np.float32(max_rate) * np.float32(us)
+        return np.float32(max_step) + change
+
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
+        return np.abs(a - b) <= limit
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        # accumulate is sequential by definition: r[i] = r[i-1] + d[i]
+        return np.asarray(np.add.accumulate(d, axis=1, dtype=np.float32)[:, -1])
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers:
+        return np.asarray(a - b)
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+        quotient = total / n.astype(np.float32)
+        return np.asarray(base + quotient)
+
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        sum_d, sum_kd = np.zeros_like(d[0]), np.zeros_like(d[0])
+        everywhere = used.all()
+        for abscissa, one in enumerate(d):
+            product = np.float32(abscissa) * one
+            there = True if everywhere else used[abscissa]
+            np.add(sum_d, one, out=sum_d, where=there)
+            np.add(sum_kd, product, out=sum_kd, where=there)
+        n, sum_k, sum_kk = moments(used)
+        den = n * sum_kk - sum_k * sum_k
+        first = n.astype(np.float32) * sum_kd
+        second = sum_k.astype(np.float32) * sum_d
+        num = first - second
+        return np.asarray(num / np.where(den > 0, den, 1).astype(np.float32))
+
+
+def moments(
+    used: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """n, Σk, Σk² over the abscissae k = 0, 1, ... in use, shape (n,) each."""
+    k = np.arange(len(used), dtype=np.int64)
+    if used.all():  # as almost everywhere
+        n, sum_k, sum_kk = (np.full(used.shape[1], total) for total in (k.size, k.sum(), (k * k).sum()))
+        return n, sum_k, sum_kk
+    return np.count_nonzero(used, axis=0), k @ used, (k * k) @ used
+
+
+class _Q31:
+    """Temperatures in 2^-16 C, held in int64; every result fits 32 bits, sums and products 64."""
+
+    def numbers(self, x: ArrayLike) -> Numbers:
+        return np.asarray(x, dtype=np.int64)
+
+    def missing(self, n: int) -> Numbers:
+        return np.full(n, _MISSING_Q31, dtype=np.int64)
+
+    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+        return np.asarray(x == _MISSING_Q31)
+
+    def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
+        return min(int(max_step) + ((int(max_rate) * us) >> 24), 2**32 - 1)
+
+    def is_near(self, a: Any, b: Any, limit: Any) -> Any:
+        return np.abs(a - b) <= limit
+
+    def running_sum(self, d: Numbers) -> Numbers:
+        return np.asarray(np.add.accumulate(d, axis=1)[:, -1])
+
+    def diff(self, a: Numbers, b: Numbers) -> Numbers:
+        return np.asarray(a - b)
+
+    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+        return np.asarray(base + divided(total, n))
+
+    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+        sum_d, sum_kd = np.zeros_like(d[0]), np.zeros_like(d[0])
+        for abscissa, one in enumerate(d * used):
+            sum_d += one
+            sum_kd += abscissa * one
+        n, sum_k, sum_kk = moments(used)
+        den = n * sum_kk - sum_k * sum_k
+        return divided(n * sum_kd - sum_k * sum_d, np.where(den > 0, den, 1))
+
+
+def divided(num: Any, den: Any) -> NDArray[np.int64]:
+    """num/den rounded to nearest, halves away from zero; den > 0."""
+    magnitude = np.abs(num) + np.asarray(den) // 2
+    return np.asarray(np.sign(num) * (magnitude // den))
+
+
+F32: Arithmetic = _F32()
+Q31: Arithmetic = _Q31()

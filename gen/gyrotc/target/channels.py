@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .believe import Guarded
-from .follow import FALLBACK, KEEP, MAP, Settings, Steps, follow
-from .numbers import Arithmetic, Numbers
-from .recursion import CourseChannel
+from .arithmetic import Arithmetic, Numbers
+from .front_end import FALLBACK, KEEP, MAP, Settings, Steps, follow
+from .recursions import CourseChannel
+from .samples import Guarded
 from .status import CHANNEL_LOST, CLAMPED, HELD
 
 __all__ = ["channel_at"]

@@ -1,6 +1,6 @@
 """Operations of extension terms in both arithmetics of the target: mirrors of libc/gtc_num_<n>.h.
 
-The recursions themselves stand in `terms.recursion`; every operation here is rounded as on the target.
+The recursions themselves stand in `target.recursions`; every operation here is rounded as on the target.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from . import f32, q31
 from .arithmetic import Bells, Floating, Operations
-from .recursion import Recursion, TableKind, recursion_of
+from .recursions import Recursion, TableKind, recursion_of
 from .table import ARRAYS, Table
 
 __all__ = ["recursions"]

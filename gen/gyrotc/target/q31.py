@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
-from .numbers import divided
+from .arithmetic import divided
 from .table import ARRAYS, Table, Words
 
 __all__ = [

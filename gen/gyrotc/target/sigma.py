@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from . import f32, q31
-from .follow import FALLBACK as FALLEN
-from .follow import MAP, Steps
-from .recursion import Course, TableKind, TermOutcome
+from .front_end import FALLBACK as FALLEN
+from .front_end import MAP, Steps
+from .recursions import Course, TableKind, TermOutcome
 from .squares import RULES, SQUARES
 from .status import FALLBACK, UNCOVERED, WARMING
 from .table import ARRAYS, Table, Words

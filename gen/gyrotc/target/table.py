@@ -1,7 +1,7 @@
 """Table layout 2 as Python data: the words of one table, in the order of its binary image.
 
 Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
-every word; `reference` computes with a `Table`, `quantise` makes one, `emit` prints it.
+every word; this package computes with a `Table`, `tables` makes one and prints it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _widened(words: Words) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One table: what `emit` prints and `reference` computes with. Every number is a 32-bit word.
+    """One table: what `tables` prints and this package computes with. Every number is a 32-bit word.
 
     Scalars have the names and the order of the members of gtc_<n>_table_t; `authority`, `effect`, `scale` and
     `envelope` are tuples of words, `coverage_cells` and `sigma_cells` pairs. Arrays are flat.

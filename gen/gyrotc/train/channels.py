@@ -1,4 +1,13 @@
-"""Recorded channels as inputs: what the target would see of each, which may be one, which earn their place.
+"""Recorded channels as inputs: what the target would see of each, its shape, and what stands in where it is lost.
+
+Each is the record of one term, whose columns at fixed centers and width are linear in their weights; `parts` says
+which is earned. The centers lie at a quarter and three quarters of what training showed, 0.9 of its half range wide:
+of squares, cubes, saturations and exponentials over the range that leaves one to two hundredths of the variance that a
+line leaves, of a corner a twentieth.
+
+It is fitted to what map and other terms leave of the training samples, so that map and stand-in together are the best
+correction of one thermometer that these samples give. The fit is that of a map, which takes no more Gaussians than
+the noise can tell.
 
 A table holds functions of up to four channels: straight lines, and where they are earned bent ones or a slope that
 depends on the temperature (`shapes`). Candidates are the recorded channels as they are, and of thermometers their
@@ -11,31 +20,194 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
+from ..causes import CATALOGUE
+from ..causes.base import Cause, History
 from ..common.arrays import FloatArray
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
-from ..target.believe import Guarded
+from ..target.arithmetic import F32
 from ..target.channels import channel_at
-from ..target.follow import with_missing
-from ..target.numbers import F32
-from ..target.recursion import CourseChannel
+from ..target.front_end import with_missing
+from ..target.recursions import CourseChannel, TableKind
+from ..target.samples import Guarded
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, TrainingFailed, conditioned, fit_process
 from .guards import channel_guard
+from .methods import fit
 from .parts import Parts, PartsTrial, bent_parts, chosen_parts
+from .result import predict, rescaled, snapped
 from .samples import Blocks
-from .shapes import SHAPES, ChannelShape, shape_of
-from .stand_ins import stand_in_of
+from .uncertainty import of_few
 
-__all__ = ["ChannelChoice", "channel_shown", "chosen_channels", "seen_by_target", "with_channels"]
+__all__ = [
+    "SHAPES",
+    "ChannelChoice",
+    "ChannelShape",
+    "ShapeId",
+    "StandIn",
+    "channel_shown",
+    "chosen_channels",
+    "seen_by_target",
+    "shape_of",
+    "stand_in_of",
+    "with_channels",
+]
+
+ShapeId = Literal["line", "product", "curve"]
+
+#: The simplest first, and the kind of the record of each.
+SHAPES: dict[ShapeId, TableKind] = {
+    "line": TableKind.AUXILIARY,
+    "product": TableKind.PRODUCT,
+    "curve": TableKind.CURVE,
+}
+_SHOWN = (0.002, 0.998)  # quantiles of a channel between which its range is taken: spikes are none of it
+# In half ranges: least of what is left of bent functions, among 0.25 to 1.2 and 0.4 to 1.5.
+_CENTER, _WIDTH = 0.5, 0.9
+_NARROWEST = 0.01  # in the unit of the channel: 1.2/width in 2^-24 fits a word of fixed point from 0.0094 on
+
+
+@dataclass(frozen=True)
+class ChannelShape:
+    """One of the functions that a channel may add.
+
+    Attributes:
+        id: Which.
+        cause: Its term.
+        values: Parameters of the term that are not weights.
+        columns: At every training sample, shape (n, k); of a channel that shows nothing there: of its median.
+        lost: The same with the median of the channel in its place everywhere: what a table knows when it is lost.
+    """
+
+    id: ShapeId
+    cause: Cause
+    values: Mapping[str, float]
+    columns: FloatArray
+    lost: FloatArray
+
+    @property
+    def is_held(self) -> bool:
+        """Whether tables of both arithmetics can hold it."""
+        return self.values.get("width", _NARROWEST) >= _NARROWEST
+
+    def parameters(self, weights: FloatArray) -> dict[str, float]:
+        """Parameters of the term with these weights."""
+        assert self.cause.amplitudes is not None
+        return {**self.cause.amplitudes(weights), **self.values}
+
+    def slope(self, added: FloatArray) -> float:
+        """Of the straight line through what it adds at every training sample, deg/h per unit."""
+        line = self.columns[:, 0] - self.columns[:, 0].mean()
+        return float(line @ added / (line @ line))
+
+    def doubt_dph(self, weights: FloatArray) -> float:
+        """RMS over training of what the correction lacks when the channel is lost."""
+        return float(np.sqrt(np.mean(((self.columns - self.lost) @ weights) ** 2)))
+
+
+def shape_of(id: ShapeId, values: FloatArray, reference: float, samples: TrainingData) -> ChannelShape:
+    """A function of a channel.
+
+    Args:
+        id: Which.
+        values: The channel at every sample, NaN where it shows nothing.
+        reference: Mean of the channel.
+        samples: The training samples.
+    """
+    cause = next(c for c in CATALOGUE.values() if c.table is not None and c.table.kind == SHAPES[id])
+    fixed = _fixed(id, values, reference, samples)
+    median = float(np.nanmedian(values))
+    shown = np.where(np.isfinite(values), values, median)
+    columns, lost = (
+        _columns(cause, fixed, samples, channel) for channel in (shown, np.full(len(values), median))
+    )
+    return ChannelShape(id, cause, fixed, columns, lost)
+
+
+def _columns(
+    cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: FloatArray
+) -> FloatArray:
+    assert cause.features is not None
+    found = cause.features(History(samples.time_s, samples.temperature_c, channel=channel), fixed).columns
+    # Of a line alone the reference is no parameter of its column: the constant is the map's.
+    return found - fixed["reference"] if found.shape[1] == 1 else found
+
+
+def _fixed(id: ShapeId, values: FloatArray, reference: float, samples: TrainingData) -> dict[str, float]:
+    if id == "product":
+        middle_c = 0.5 * float(samples.temperature_c.min() + samples.temperature_c.max())
+        return {"reference": reference, "reference_c": middle_c}
+    if id == "curve":
+        low, high = (float(x) for x in np.nanquantile(values, _SHOWN))
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        return {
+            "reference": middle - _CENTER * half,
+            "second_center": middle + _CENTER * half,
+            "width": _WIDTH * half,
+        }
+    return {"reference": reference}
+
+
+_METHODS = ("mrbf", "linear", "constant")  # the first whose map keeps to the samples
+
+
+@dataclass(frozen=True, slots=True)
+class StandIn:
+    """What stands for a term.
+
+    Attributes:
+        network: As `model.json` has it, in the scale of the model.
+        added: What it adds at every training sample, deg/h, shape (n,).
+        sigma_dph: 1 σ of what the term would have added about it, at the next power-on.
+    """
+
+    network: dict[str, Any]
+    added: FloatArray
+    sigma_dph: float
+
+
+def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> StandIn | None:
+    """The stand-in of a term; None where nothing can be fitted.
+
+    Args:
+        model: The model with its map.
+        samples: Those that the map was trained on, without what the terms add.
+        effect: What the term adds at these samples, deg/h; NaN where its channel is not known, shape (n,).
+    """
+    known = np.isfinite(effect)
+    seen = samples.select(known)
+    of_map = model.map_dph(seen.temperature_c, seen.slope_c_per_min)
+    target = replace(seen, bias_dph=seen.bias_dph - of_map + effect[known])
+    scale = model.to_dict()["scale"]
+    for method in _METHODS:
+        try:
+            found = fit(target, method=method, average_s=model.average_s)
+        except TrainingFailed:
+            continue
+        if any(finding["id"] == "map_beyond_data" for finding in found.findings):
+            continue
+        added = predict(found, samples.temperature_c, samples.slope_c_per_min)
+        network = snapped(rescaled(found.networks[0], found.scale, scale), scale)
+        return StandIn(network, added, _next_rms(effect[known] - added[known], seen.run))
+    return None
+
+
+def _next_rms(left: FloatArray, run: NDArray[np.int64]) -> float:
+    """RMS to expect at the next power-on: spread within the runs, and of their means as few runs show it."""
+    _, index, count = np.unique(run, return_inverse=True, return_counts=True)
+    mean = np.bincount(index, left) / count
+    within = float(np.mean((left - mean[index]) ** 2))
+    n = len(count)
+    between = float(np.var(mean, ddof=1)) * (1.0 + 1.0 / n) * of_few(n) if n > 1 else float(mean[0] ** 2)
+    return float(np.sqrt(within + between))
 
 
 _MOST = 4  # terms of a table: GTC_MAX_TERMS of gtc.h

@@ -21,7 +21,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import GyrotcError
 from ..common.metrics import MAD_TO_SIGMA, median
 from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
-from .residual_noise import difference_sigma
+from .noise import difference_sigma
 
 __all__ = ["MEAN_S", "Asked", "MapModel", "Process", "TrainingFailed", "conditioned", "fit_process"]
 

@@ -1,4 +1,3 @@
-# long: what training.json and model.json say of a fit stands together
 """From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
 
 Joins the stages dataset → frontend → train → model; computes nothing of its own beyond the choice of
@@ -15,30 +14,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..common.arrays import Progress
+from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages
 from ..model import Model
-from ..quality.left_out import outliers_of, stretches_left_out
-from ..recordings.earth import earth_rate_warning
+from ..quality.outliers import outliers_of, stretches_left_out
+from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.evaluation import FoundIn, Pooled
 from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
-from .bumps import Bumps
 from .channels import chosen_channels, seen_by_target, with_channels
+from .cross_validation import Span, training_spans
 from .data import TrainingData, cleaned, joined, scaling_of
 from .evidence import TrainingFailed
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .means import unit_means
 from .methods import AUTO, METHODS, NETWORK_METHODS, fit
-from .noisefloor import noise_terms, sensitivities, stretches
+from .mrbf import Bumps
+from .noise import noise_terms, sensitivities, stretches
 from .prior import Prior
 from .result import Fit, predict, snapped
-from .rules import rezero_dph
 from .samples import Blocks, run_blocks
 from .simple import SIMPLE
-from .spans import Span, training_spans
-from .uncertainty import coverage, uncertainty
+from .uncertainty import coverage, rezero_dph, uncertainty
 
 __all__ = [
     "HOLD_S",
@@ -147,9 +145,7 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
-def fit_dataset(
-    dataset: Dataset, options: FitOptions, *, progress: Progress | None = None
-) -> Fitted:  # long: the stages of a fit in their order
+def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
     """Fits a model to the training runs of a data set.
 
     Raises:
@@ -169,28 +165,12 @@ def fit_dataset(
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
     stretches = joined_runs(runs)
-    parts, columns = [], []
-    left_out_rows: list[LeftOutRows] = []
-    longest_s = 0.0
-    for k, run in enumerate(stretches):
-        say(f"reading {run.file}")
-        blocks = front.blocks(run)
-        longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
-        parts.append(samples_of(blocks, front.block_s, k))
-        columns.append(seen_by_target(dataset, run.rows(), blocks) if options.channels else {})
-        left_out_rows += stretches_left_out(run, blocks.left_out_s)
-    data = joined(parts)
-    if data.bias_dph.size < _MIN_SAMPLES:
-        raise InputError(
-            str(dataset.folder),
-            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
-            f"at least {_MIN_SAMPLES}",
-        )
+    read = _read(dataset, stretches, front, say, channels=options.channels)
+    data = read.data
     say("training")
     choice = None
     if options.channels:
-        whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
-        choice = chosen_channels(dataset, data, whole, power_ons(stretches), options.average_s)
+        choice = chosen_channels(dataset, data, read.channels, power_ons(stretches), options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
@@ -198,11 +178,11 @@ def fit_dataset(
     use = fitted.lot or fitted.prior
     again = replace(options, method=fitted.method, prior=options.prior if use and use.accepted else None)
     left_out = _left_out(data, spans, again, say) if spans else None
-    front = replace(front, stuck_s=stuck_after_s(longest_s))
+    front = replace(front, stuck_s=stuck_after_s(read.longest_same_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
     told: dict[str, Any] = {
-        "outliers": outliers_of(left_out_rows, float(data.weight.sum())),
+        "outliers": outliers_of(read.left_out, float(data.weight.sum())),
         "means": _means(data, fitted),
     }
     told |= {"lot": fitted.lot} if fitted.lot else {}
@@ -212,6 +192,48 @@ def fit_dataset(
         told["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
     return Fitted(model, training.model_copy(update=told))
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """What the front end made of the training runs.
+
+    Attributes:
+        data: Training samples.
+        channels: What the target would see of each recorded channel, shape (samples,).
+        left_out: Rows that were left out as outliers.
+        longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
+    """
+
+    data: TrainingData
+    channels: dict[str, FloatArray]
+    left_out: list[LeftOutRows]
+    longest_same_s: float
+
+
+def _read(
+    dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool
+) -> _Read:
+    """Reads the training runs. Raises InputError where too few samples are usable."""
+    parts, columns = [], []
+    left_out: list[LeftOutRows] = []
+    longest_s = 0.0
+    for k, run in enumerate(stretches):
+        say(f"reading {run.file}")
+        blocks = front.blocks(run)
+        longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
+        parts.append(samples_of(blocks, front.block_s, k))
+        columns.append(seen_by_target(dataset, run.rows(), blocks) if channels else {})
+        left_out += stretches_left_out(run, blocks.left_out_s)
+    data = joined(parts)
+    if data.bias_dph.size < _MIN_SAMPLES:
+        raise InputError(
+            str(dataset.folder),
+            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
+            f"at least {_MIN_SAMPLES}",
+        )
+    whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
+    return _Read(data, whole, left_out, longest_s)
 
 
 def map_method(method: str) -> str:
@@ -293,7 +315,7 @@ def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: floa
     return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
 
 
-def model_of(  # long: one line for each field of model.json
+def model_of(
     dataset: Dataset,
     runs: Sequence[Run],
     data: TrainingData,

@@ -12,7 +12,7 @@ from ..common.errors import InputError
 from ..results.training import MapMeans
 from .data import Scaling, TrainingData, average, gather
 from .evidence import MEAN_S, Process
-from .residual_noise import difference_sigma
+from .noise import difference_sigma
 
 __all__ = ["UnitMeans", "means_of", "unit_means"]
 

@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from ..common.errors import InputError
 from ..common.metrics import LEAST_SPAN_C
-from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .evidence import TrainingFailed
-from .guard import objection
-from .linear import fit_mlr, fit_poly, fit_poly_slope
+from .guards import objection
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .ols import RIDGE, SIZE_RULES, fit_ols
+from .noise import floor_dph
+from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
 from .prior import Prior
-from .residual_noise import floor_dph
 from .result import Fit, Outcome, network, predict
-from .rungs import chosen_by_ladder
+from .selection import chosen_by_ladder
 from .simple import SIMPLE, fit_simple
 from .uncertainty import coverage, uncertainty
 
@@ -63,7 +61,7 @@ def fit(
     power_on: NDArray[np.int64] | None = None,
     prior: Prior | None = None,
     serial: str = "",
-) -> Fit:  # long: the ways to a map, one after the other
+) -> Fit:
     """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
 
     Args:

@@ -1,4 +1,10 @@
-"""The default method: evidence model, compressed into few anisotropic Gaussians, size by departure.
+"""The default method: the evidence model, compressed into few anisotropic Gaussians, and a finer map over T.
+
+The evidence process has 40 functions of T; what is narrower than a fifteenth of the range it follows badly, and at the
+price of noise everywhere. So bumps are looked for one after the other, beside splines that stand for any smooth map
+(of T every 12 C, and with dT/dt and its square every 30 C): the place and the width that explain most, then all
+places, widths and heights again by least squares with the linear part projected out (Golub and Pereyra 1973). The
+number is that of the smallest BIC, each bump at the price of three parameters. A map of the rest stands beside them.
 
 1. Means over 50 s are gathered into bins; a Hilbert-space Gaussian process is fitted by maximum evidence.
 2. A Kohonen network on the bins proposes places; orthogonal least squares picks among them; variable
@@ -10,20 +16,228 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .. import _core
 from ..common.arrays import FloatArray
+from ..common.metrics import MAD_TO_SIGMA
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, fit_process
-from .residual_noise import not_white
+from .noise import not_white
 from .result import Outcome, network
-from .simple import without_rate
+from .simple import FLAT, without_rate
 
-__all__ = ["fit_mrbf", "fit_mrbf_t"]
+__all__ = ["BesideSmooth", "Bumps", "beside_smooth", "find_bumps", "fit_mrbf", "fit_mrbf_t"]
+
+_WIDTHS_C = (1.0, 1.4, 2.0)  # tried; one wider bump in the place of two narrow ones would stay there
+_LIMITS_C = (0.6, 3.5)  # refined; blocks of 10 s at 5 C/min are 0.8 C long, wider ones the process follows
+_BEYOND_C = 5.0  # a bump's middle may lie so far outside the samples
+_MOST = 24  # as many as a map of the evidence process has
+_SPLINE_C = (12.0, 30.0)  # between knots: of T, and of what depends on dT/dt
+_CELL_C, _CELL_C_PER_MIN = (
+    0.25,
+    0.5,
+)  # of bins: a quarter of the narrowest bump; splines are smooth over dT/dt
+_SLOW_S = 600.0  # noise of gyros is slower than this in part: more samples of one place say no more
+_OUTLIER = 4.5  # robust standard deviations, as in the evidence process
+_PARAMETERS = 3  # of a bump: place, width, height
+_OWN = 0.02  # share of a bump's energy that must be its own beside splines and other bumps
+_LEAST, _WORSE = 6, 2.0  # bumps that are tried, and prices above the best criterion at which the search ends
+_MEAN_S = 100.0  # independent means for BIC
+_ROUNDS = 12  # of refinement: the next bump moves all of them again
+
+
+@dataclass(frozen=True, slots=True)
+class Bumps:
+    """Gaussians of T alone: height · exp(−((T − center)/width)²), T kept to the range of the samples.
+
+    Attributes:
+        centers_c, widths_c, heights_dph: One entry for each.
+        range_c: Lowest and highest temperature of the samples.
+    """
+
+    centers_c: tuple[float, ...]
+    widths_c: tuple[float, ...]
+    heights_dph: tuple[float, ...]
+    range_c: tuple[float, float]
+
+    def __call__(self, temperature_c: FloatArray) -> FloatArray:
+        """Their sum at temperatures, deg/h, same shape."""
+        total = np.zeros(np.shape(temperature_c))
+        t = np.clip(temperature_c, *self.range_c)
+        for center, width, height in zip(self.centers_c, self.widths_c, self.heights_dph, strict=True):
+            total = total + height * np.exp(-(((t - center) / width) ** 2))
+        return total
+
+    def beside(self, network: Mapping[str, Any], half_range_c: float) -> dict[str, Any]:
+        """A network of `model.json` with the bumps added, ordered by temperature; widths are in half ranges."""
+        widths = [width / half_range_c for width in self.widths_c]
+        own = zip(self.centers_c, widths, self.heights_dph, strict=True)
+        shapes = list(zip(network["centers"], network["widths"], network["weights"], strict=True))
+        shapes += [([center, 0.0], [width, FLAT], height) for center, width, height in own]
+        shapes.sort(key=lambda shape: (shape[0][0], shape[0][1]))
+        centers, widths, weights = ([shape[k] for shape in shapes] for k in range(3))
+        return {**network, "centers": centers, "widths": widths, "weights": weights}
+
+
+def find_bumps(data: TrainingData, scaling: Scaling) -> Bumps:
+    """Bumps in cleaned samples; none where BIC asks for none.
+
+    Raises:
+        TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
+    """
+    beside = beside_smooth(data, scaling)
+    if beside is None:
+        return Bumps((), (), (), scaling.temperature_c)
+    return _Search(beside).found(beside.price(_PARAMETERS))
+
+
+def beside_smooth(data: TrainingData, scaling: Scaling) -> BesideSmooth | None:
+    """Cleaned samples without outliers beside any smooth map; None where nothing is left of them.
+
+    Raises:
+        TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
+    """
+    process = fit_process(data, scaling)
+    t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
+    weight = data.weight / np.median(data.weight)
+    residual = (data.bias_dph - process.mean_dph(t, r)) * np.sqrt(weight)
+    sigma = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    near = np.abs(residual) <= _OUTLIER * sigma
+    if sigma <= 0.0 or not near.any():
+        return None
+    return BesideSmooth(data.select(near), weight[near], sigma, scaling, float(data.duration_s.sum()))
+
+
+class BesideSmooth:
+    """Bins of samples, weighted to unit noise, with the splines projected out.
+
+    Attributes:
+        t: Temperature of each bin, C, shape (n,).
+        root: Square root of its weight, 1/(deg/h), the same shape.
+        range: Lowest and highest temperature of the samples.
+        y: Weighted bias beside the splines, the same shape.
+    """
+
+    def __init__(
+        self, data: TrainingData, weight: FloatArray, sigma: float, scaling: Scaling, seconds: float
+    ) -> None:
+        cell = np.floor(data.temperature_c / _CELL_C).astype(np.int64) * 1_000_003
+        cell += np.floor(data.slope_c_per_min / _CELL_C_PER_MIN + 0.5).astype(np.int64)
+        _, index = np.unique(cell, return_inverse=True)
+        count = np.bincount(index, weight)
+        self.t, r, y = (
+            np.bincount(index, weight * x) / count
+            for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph)
+        )
+        slow = _SLOW_S / float(np.median(data.duration_s))
+        self.root = 1.0 / (sigma * np.sqrt(1.0 / count + 1.0 / slow))
+        self.range = scaling.temperature_c
+        self._seconds = seconds
+        r = r / scaling.half_range_c_per_min
+        fine, coarse = (_splines(self.t, self.range, step) for step in _SPLINE_C)
+        columns = np.column_stack([fine, coarse * r[:, None], coarse * r[:, None] ** 2])
+        left, size, _ = np.linalg.svd(columns * self.root[:, None], full_matrices=False)
+        self._smooth = left[:, size > 1e-3 * size[0]]
+        self.y = self.rest((y * self.root)[:, None])[:, 0]
+
+    def rest(self, columns: FloatArray) -> FloatArray:
+        """What the splines do not hold of weighted columns, shape (n, k)."""
+        return np.asarray(columns - self._smooth @ (self._smooth.T @ columns))
+
+    def price(self, parameters: int) -> float:
+        """Energy that so many parameters must explain by BIC."""
+        return parameters * float(np.log(max(self._seconds / _MEAN_S, 2.0)))
+
+
+class _Search:
+    """Bumps one after the other."""
+
+    def __init__(self, beside: BesideSmooth) -> None:
+        self.t, self.root, self.range, self.y = beside.t, beside.root, beside.range, beside.y
+        self._rest = beside.rest
+        tried = [(c, w) for w in _WIDTHS_C for c in np.arange(*self.range, 0.5 * w)]
+        self.tried = np.array(tried).reshape(-1, 2).T
+        raw = self._raw(*self.tried)
+        self.energy = np.einsum("ij,ij->j", raw, raw)
+        self.candidates = self._rest(raw)
+
+    def found(self, price: float) -> Bumps:
+        """The bumps of the smallest criterion."""
+        x, best, at = np.zeros(0), float(self.y @ self.y), np.zeros(0)
+        for number in range(1, _MOST + 1):
+            x, square = self._refined(self._with_next(x))
+            if square + price * number < best:
+                best, at = square + price * number, x
+            elif number > _LEAST and square + price * number > best + _WORSE * price:
+                break
+        while x.size > 2:  # what was taken first may be needless beside what came later
+            x, square = self._refined(self._without_least(x))
+            if square + price * (x.size // 2) < best:
+                best, at = square + price * (x.size // 2), x
+        centers, log_widths = np.split(at, 2)
+        heights = self._solved(at)[0]
+        widths = np.exp(log_widths)
+        return Bumps(tuple(centers.tolist()), tuple(widths.tolist()), tuple(heights.tolist()), self.range)
+
+    def _with_next(self, x: FloatArray) -> FloatArray:
+        """The bump that explains most of what these leave, added to them."""
+        held = np.linalg.qr(self._columns(x))[0]
+        own = self.candidates - held @ (held.T @ self.candidates)
+        power = np.einsum("ij,ij->j", own, own)
+        able = power > _OWN * self.energy
+        gain: FloatArray = np.where(able, (own.T @ self._solved(x)[1]) ** 2 / np.where(able, power, 1.0), 0.0)
+        center, width = self.tried[:, int(gain.argmax())]
+        centers, widths = np.split(x, 2)
+        return np.asarray(np.r_[centers, center, widths, np.log(width)])
+
+    def _without_least(self, x: FloatArray) -> FloatArray:
+        """These bumps without the one whose loss, with the heights of the others fitted anew, is least."""
+        columns = self._columns(x)
+        q, r = np.linalg.qr(columns)
+        inverse = np.linalg.pinv(r)
+        heights = inverse @ (q.T @ self.y)
+        loss = heights**2 / np.einsum("ij,ij->i", inverse, inverse)
+        return np.delete(x.reshape(2, -1), int(loss.argmin()), axis=1).reshape(-1)
+
+    def _refined(self, x: FloatArray) -> tuple[FloatArray, float]:
+        """Places and widths by least squares, and the sum of squares that is left."""
+        from scipy.optimize import least_squares
+
+        n = x.size // 2
+        low = np.r_[np.full(n, self.range[0] - _BEYOND_C), np.full(n, np.log(_LIMITS_C[0]))]
+        high = np.r_[np.full(n, self.range[1] + _BEYOND_C), np.full(n, np.log(_LIMITS_C[1]))]
+        start = np.clip(x, low + 1e-6, high - 1e-6)
+        solved = least_squares(
+            lambda x: np.asarray(self._solved(x)[1]), start, bounds=(low, high), max_nfev=_ROUNDS
+        )
+        return np.asarray(solved.x), 2.0 * float(solved.cost)
+
+    def _solved(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Heights, and what is left of the data."""
+        columns = self._columns(x)
+        heights = np.linalg.lstsq(columns, self.y, rcond=1e-9)[0] if x.size else np.zeros(0)
+        return np.asarray(heights, dtype=np.float64), np.asarray(self.y - columns @ heights)
+
+    def _columns(self, x: FloatArray) -> FloatArray:
+        centers, log_widths = np.split(x, 2)
+        return self._rest(self._raw(centers, np.exp(log_widths)))
+
+    def _raw(self, centers: FloatArray, widths: FloatArray) -> FloatArray:
+        return np.asarray(np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * self.root[:, None])
+
+
+def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatArray:
+    """Cubic B-splines over a range with knots about `step_c` apart."""
+    from scipy.interpolate import BSpline  # with what it imports: not for diagnoses without a finer map
+
+    inner = np.linspace(span[0] - 1e-6, span[1] + 1e-6, max(3, 1 + round((span[1] - span[0]) / step_c)))
+    knots = np.r_[[inner[0]] * 3, inner, [inner[-1]] * 3]
+    return np.asarray(BSpline.design_matrix(np.clip(t, *span), knots, 3).toarray())
 
 
 MAX_CENTERS = 24  # bounds the time of a fit, and its table at 504 bytes

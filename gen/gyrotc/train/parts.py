@@ -1,4 +1,4 @@
-"""Parts of a correction beside its map, each a group of columns, chosen by thermal history that was left out.
+"""Corrections without a search, and parts beside the map, chosen by thermal history that was left out.
 
 The samples are y = map(T, dT/dt) + Σ columns β + noise. With the map as a Gaussian process of known parameters the
 weights are those of generalised least squares, β = (Uᵀ E U + Λ)⁻¹ Uᵀ E y, E v = v less the process conditioned on v
@@ -19,15 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
+from .cross_validation import Fold, history_folds, more_than_its_error, of_pieces, surely_above_0
 from .data import Scaling, TrainingData, average
 from .evidence import MEAN_S, Process, conditioned, fit_process
-from .ladder import pieces_of
-from .paired import more_than_its_error, of_pieces, surely_above_0
-from .residual_noise import difference_sigma
-from .spans import Fold, history_folds
+from .noise import difference_sigma
+from .selection import pieces_of
 
 __all__ = ["Parts", "PartsTrial", "bent_parts", "chosen_parts"]
-
 
 _ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
 

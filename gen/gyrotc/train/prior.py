@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..results.earlier import EarlierUse
 from ..results.lot import KnownMap, LotUse
+from ..results.training import EarlierUse
 from .data import Scaling, TrainingData
 from .result import Outcome
 

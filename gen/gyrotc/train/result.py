@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.arrays import FloatArray
-from ..results.earlier import EarlierUse
 from ..results.lot import KnownMap, LotUse
+from ..results.training import EarlierUse
 from .data import Scaling
 from .evidence import Process
 

@@ -8,12 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quality.screen import departing_rows
+from ..quality.outliers import departing_rows
 from ..target import status as status_bits
-from ..target.believe import Guarded
-from ..target.follow import FALLBACK, KEEP, MAP, Settings, Steps, follow, period_us, samples_per_block
-from ..target.numbers import F32
-from ..target.stream import Stream
+from ..target.arithmetic import F32
+from ..target.front_end import (
+    FALLBACK,
+    KEEP,
+    MAP,
+    Settings,
+    Steps,
+    Stream,
+    follow,
+    period_us,
+    samples_per_block,
+)
+from ..target.samples import Guarded
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
@@ -76,7 +85,7 @@ def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
     return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
 
 
-def run_blocks(  # long: one line for each field of the result
+def run_blocks(
     rows: Rows,
     run: Run,
     *,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
-from .residual_noise import floor_dph
+from .noise import floor_dph
 from .result import Network, Outcome, network
 
 __all__ = ["SIMPLE", "all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]

@@ -1,4 +1,6 @@
-"""The most instructions that each public function can take on a target, from its object code and a table's sizes.
+"""The most instructions of each public function on a target, from object code, loops and a table's sizes.
+
+Li and Malik, "Performance analysis of embedded software using implicit path enumeration", DAC 1995.
 
 The code of a function with all that it calls is one graph of blocks; how often each can run is limited by what leads to
 it and by the bounds of loops, and the most instructions under these limits are a linear program (`paths`). What is
@@ -9,17 +11,312 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..store.opening import write_own
+import numpy as np
+
+from ..common.errors import CheckFailed
+from ..store.files import write_own
 from ..target.table import Table
-from .flow import parse_flows
-from .functions import PUBLIC
-from .loops import MEMORY, POWER, LoopText, counts_of, totals
-from .paths import Paths, Program
+from .flow import MEMORY, POWER, SHORT_QUOTIENTS, Block, Flow, Loop, LoopText, counts_of, parse_flows, totals
+from .sizes import PUBLIC, TERM_CODES
 from .toolchain import Target, compile_objects, disassembly, link, symbols
 
-__all__ = ["instruction_bounds"]
+__all__ = ["Paths", "Program", "instruction_bounds"]
+
+STAND_IN = "is_shown"  # the function that asks the network of a stand-in
+_ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
+
+
+@dataclass(slots=True)
+class Program:
+    """Linked code, and the text it was made of."""
+
+    flows: dict[int, Flow]
+    addresses: dict[str, int]
+    text: LoopText
+    loops: dict[int, list[tuple[Loop, int]]] = field(default_factory=dict)
+
+    def loops_of(self, flow: Flow) -> list[tuple[Loop, int]]:
+        """Loops of a function, each with the line of its text (0 in the compiler's library)."""
+        if flow.entry not in self.loops:
+            self.loops[flow.entry] = [(loop, self._line(flow, loop)) for loop in flow.loops()]
+        return self.loops[flow.entry]
+
+    def _line(self, flow: Flow, loop: Loop) -> int:
+        """The line of its `for`, whose test the compiler put where the loop goes round or is left."""
+        leaving = [b for b in loop.body - loop.inner if not loop.body.issuperset(flow.blocks[b].successors)]
+        tests = [[flow.blocks[b].last.line for b in some] for some in (loop.latches, leaving)]
+        inside = [
+            [i.line for b in some for i in flow.blocks[b].instructions]
+            for some in (loop.latches, loop.body - loop.inner)
+        ]
+        for lines in (*tests, *inside):
+            found = {line for line in lines if self.text.is_loop(line)}
+            if len({self.text.at(line) for line in found}) == 1:
+                return min(found)
+        raise CheckFailed(f"{flow.name}: the loop at {loop.header:x} is of no one loop of the text")
+
+    def hooks(self, numeric: str, slot: str) -> list[tuple[int, int]]:
+        """Functions behind a pointer of a term's code: address, and how many terms of the table have it."""
+        found: dict[int, int] = {}
+        for kind in self.text.counts.kinds:
+            names = [
+                f"gtc_{n}_{what}"
+                for what in (f"{TERM_CODES[kind - 1]}_{slot}", "nothing")
+                for n in (numeric, _twin(numeric))
+            ]
+            address = next(self.addresses[n] for n in names if n in self.addresses)
+            found[address] = found.get(address, 0) + 1
+        return list(found.items())
+
+
+def _twin(numeric: str) -> str:
+    """Functions that are the same in both arithmetics are linked once, by one of the two names."""
+    return "q31" if numeric == "f32" else "f32"
+
+
+@dataclass(slots=True)
+class _Copy:
+    """A function in one place where it is called: nodes of its blocks, edges by the blocks that they join."""
+
+    flow: Flow
+    around: str  # text of the loop that it is called in
+    line: str  # text of the line that calls it, or what it is called by in the compiler's library
+    node: dict[int, int]
+    ways: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    hooks: list[tuple[int, int, int]] = field(default_factory=list)  # block, edge to it, terms that have it
+
+
+@dataclass(slots=True)
+class Paths:
+    """The linear program: flows along edges, each from a node to another; node 0 is the end."""
+
+    program: Program
+    numeric: str
+    cost: list[int] = field(default_factory=lambda: [0])
+    edges: list[tuple[int, int]] = field(default_factory=list)
+    limits: list[tuple[dict[int, float], float]] = field(
+        default_factory=list
+    )  # sum of factors x edges <= limit
+    entered: list[tuple[str, str, int]] = field(default_factory=list)  # caller, function, edge into it
+    turns: dict[str, list[dict[int, float]]] = field(default_factory=dict)  # of loops, by text
+    begun: dict[str, list[int]] = field(default_factory=dict)  # edges into loops from outside, by text
+    stored: dict[str, list[int]] = field(
+        default_factory=dict
+    )  # nodes that write to memory for a line, by text
+    long_quotients: list[int] = field(
+        default_factory=list
+    )  # edges into the way of libgcc's division for these
+
+    def whole(self, address: int) -> None:
+        """Makes the graph of a function from its first instruction (edge 0) to its end (node 0)."""
+        self.edges.append((-1, 0))
+        first, exits = self.function(address)
+        self.edges[0] = (-1, first)
+        self.edges += [(node, 0) for node in exits]
+
+    def function(
+        self, address: int, above: tuple[int, ...] = (), around: str = "", line: str = ""
+    ) -> tuple[int, list[int]]:
+        """A copy of a function for one place where it is called: its first node, and those at which it ends.
+
+        Raises:
+            CheckFailed: It calls itself, or code that is not there.
+        """
+        if address in above or address not in self.program.flows:
+            raise CheckFailed(f"a call to {address:x} cannot be followed: no bound on the instructions")
+        flow = self.program.flows[address]
+        copy = _Copy(flow, around, line, {start: self._node(block) for start, block in flow.blocks.items()})
+        exits: list[int] = []
+        for start, block in flow.blocks.items():
+            done = self._called(copy, start, (*above, address))
+            calls = block.hook or block.call is not None
+            if block.leaves:
+                exits += done if calls else [copy.node[start]]
+            from_here = done if calls and not block.leaves else [copy.node[start]]
+            for after in block.successors:
+                ways = [self._edge(a, copy.node[after]) for a in from_here]
+                copy.ways.setdefault((start, after), []).extend(ways)
+        self._divided(copy)
+        self._without_stand_ins(copy)
+        for loop, at in self.program.loops_of(flow):
+            self._bounded(copy, loop, at)
+        return copy.node[address], exits
+
+    def _node(self, block: Block) -> int:
+        self.cost.append(len(block.instructions))
+        for line in {i.line for i in block.instructions if i.line and i.name.startswith("str")}:
+            self.stored.setdefault(self.program.text.at(line), []).append(len(self.cost) - 1)
+        return len(self.cost) - 1
+
+    def _edge(self, a: int, b: int) -> int:
+        self.edges.append((a, b))
+        return len(self.edges) - 1
+
+    def _called(self, copy: _Copy, start: int, above: tuple[int, ...]) -> list[int]:
+        """The nodes at which what a block calls ends; none where it calls nothing."""
+        block = copy.flow.blocks[start]
+        if block.hook:
+            slot = re.search(r"->(begin|step|apply)\(", self.program.text.at(block.last.line))
+            if slot is None:
+                raise CheckFailed(
+                    f"{copy.flow.name}: a call through a pointer at {start:x} cannot be followed"
+                )
+            callees = self.program.hooks(self.numeric, slot[1])
+        elif block.call is not None:
+            callees = [(block.call, 0)]
+        else:
+            return []
+        ends: list[int] = []
+        for callee, terms in callees:
+            line = self.program.text.at(block.last.line) if block.last.line else copy.line
+            if copy.flow.name.endswith("_angle"):
+                line = ""  # an increment that does not fit is refused behind the division
+            first, exits = self.function(callee, above, self._around(copy, start), line)
+            way = self._edge(copy.node[start], first)
+            self.entered.append((copy.flow.name, self.program.flows[callee].name, way))
+            if terms:
+                copy.hooks.append((start, way, terms))
+            ends += exits
+        return ends
+
+    def _divided(self, copy: _Copy) -> None:
+        """Ways through libgcc's division that no call takes: divisors of the runtime have 32 bits, and so have the
+        quotients of most of its lines; then the upper word of what is divided is below the divisor."""
+        if copy.flow.name != "__udivmoddi4":
+            return
+        first = copy.flow.blocks[copy.flow.entry]
+        if not first.ends_with(("cmp", "r3, #0"), "bne"):
+            return
+        self._not_taken(copy, first)
+        second = copy.flow.blocks[first.successors[1]]
+        compared = [i.operands for i in second.instructions if i.name == "cmp"]
+        if not (second.last.name.startswith("bls") and compared and compared[0].endswith(", r1")):
+            return
+        if copy.line in SHORT_QUOTIENTS:
+            self._not_taken(copy, second)
+        else:
+            self.long_quotients += copy.ways[second.start, second.successors[0]]
+
+    def _without_stand_ins(self, copy: _Copy) -> None:
+        """A table without stand-ins has 0 in the upper half of the word of a term's channel."""
+        if self.program.text.counts.stand_ins:
+            return
+        for block in copy.flow.blocks.values():
+            line = self.program.text.at(block.last.line) if block.last.line else ""
+            if "(stand_in != 0U)" in line and block.shifts_by(16) and len(block.successors) == 2:
+                self._not_taken(copy, block, 0 if block.last.name.startswith("bne") else 1)
+
+    def _not_taken(self, copy: _Copy, block: Block, k: int = 0) -> None:
+        """What comes behind the branch at the end of a block never runs: k = 0 where it is taken, 1 where it is not."""
+        self.limits.append((dict.fromkeys(copy.ways[block.start, block.successors[k]], 1.0), 0.0))
+
+    def _around(self, copy: _Copy, start: int) -> str:
+        """The text of the innermost loop around a block; where there is none, of the loop that calls the function."""
+        loops = [
+            (len(loop.body), line) for loop, line in self.program.loops_of(copy.flow) if start in loop.body
+        ]
+        return self.program.text.at(min(loops)[1]) if loops else copy.around
+
+    def _bounded(self, copy: _Copy, loop: Loop, line: int) -> None:
+        """Limits how often a loop goes round, and which terms it meets."""
+        text = self.program.text
+        outer = [(len(o.body), n) for o, n in self.program.loops_of(copy.flow) if o.body > loop.body]
+        most = text.most(line, text.at(min(outer)[1]) if outer else copy.around, STAND_IN in copy.flow.name)
+        back = [e for b in loop.latches for e in copy.ways[b, loop.header]]
+        entries = [
+            e for (a, b), es in copy.ways.items() for e in es if b == loop.header and a not in loop.body
+        ]
+        tested_last = self._is_tested_last(copy.flow, loop, text.at(line))
+        turns = dict.fromkeys(back, 1.0) | (dict.fromkeys(entries, 1.0) if tested_last else {})
+        self.limits.append((_less(turns, entries, float(most)), float(most) if not entries else 0.0))
+        self.turns.setdefault(text.at(line), []).append(turns)
+        self.begun.setdefault(text.at(line), []).extend(entries)
+        for start, way, terms in copy.hooks:
+            if start in loop.body - loop.inner:
+                self.limits.append((_less({way: 1.0}, entries, float(terms)), 0.0))
+
+    def _is_tested_last(self, flow: Flow, loop: Loop, text: str) -> bool:
+        """Whether a turn ends, and does not begin, with the test of the loop: turns are ways back and one more."""
+
+        def tests(start: int) -> bool:
+            block = flow.blocks[start]
+            line = block.last.line
+            leaves = any(after not in loop.body for after in block.successors)
+            return leaves and self.program.text.is_loop(line) and self.program.text.at(line) == text
+
+        one_block = loop.latches == {loop.header} and len(loop.body) == 1
+        if all(tests(b) for b in loop.latches) and (one_block or not tests(loop.header)):
+            return True
+        # What is tested first is tested without a branch before: the conditions of the text are comparisons.
+        return not tests(self._straight(flow, loop)) and any(tests(b) for b in loop.body)
+
+    def _straight(self, flow: Flow, loop: Loop) -> int:
+        """The block at which what always runs from the first block of a loop on ends with a branch or a call."""
+        start = loop.header
+        for _ in flow.blocks:
+            block = flow.blocks[start]
+            if len(block.successors) != 1 or block.call is not None or block.hook:
+                break
+            (start,) = block.successors
+        return start
+
+    def calls(self, caller: str, callee: str) -> list[dict[int, float]]:
+        """Edges of calls, by patterns of the names' beginnings."""
+        return [{e: 1.0} for a, b, e in self.entered if re.match(caller, a) and re.match(callee, b)]
+
+    def stores(self, text: str) -> list[dict[int, float]]:
+        """Edges into blocks that write to memory for a line with this text."""
+        nodes = set(self.stored.get(text, []))
+        return [{e: 1.0} for e, (_, to) in enumerate(self.edges) if to in nodes]
+
+    def limit(self, flows: list[dict[int, float]], most: float) -> None:
+        """The sum of flows is at most so much."""
+        total: dict[int, float] = {}
+        for some in flows:
+            for edge, factor in some.items():
+                total[edge] = total.get(edge, 0.0) + factor
+        self.limits.append((total, float(most)))
+
+    def most(self) -> int:
+        """The most instructions on any way from the first node, that of edge 0, to the end."""
+        from scipy import sparse  # a second for each start of gyrotc that asks for no bound
+        from scipy.optimize import linprog
+
+        n = len(self.edges)
+        ends = np.array(self.edges)
+        into, out_of = ends[:, 1], ends[1:, 0]
+        balance = sparse.csr_matrix(
+            (
+                np.concatenate([np.ones(n), -np.ones(n - 1)]),
+                (np.concatenate([into, out_of]), np.concatenate([np.arange(n), np.arange(1, n)])),
+            ),
+            shape=(len(self.cost), n),
+        )
+        cells = [(row, e, f) for row, (factors, _) in enumerate(self.limits) for e, f in factors.items()]
+        rows, columns, factors = np.array(cells, dtype=float).reshape(-1, 3).T
+        unequal = sparse.csr_matrix((factors, (rows.astype(int), columns.astype(int))), (len(self.limits), n))
+        cost = np.array(self.cost, dtype=float)[into]
+        right = np.zeros(len(self.cost))
+        right[0] = 1.0  # what goes in at edge 0 comes out at the end
+        found = linprog(
+            -cost, A_ub=unequal, b_ub=[limit for _, limit in self.limits], A_eq=balance, b_eq=right,
+            bounds=(0.0, None), method="highs",
+        )  # fmt: skip
+        if found.status != 0:
+            raise CheckFailed(f"no bound on the instructions: {found.message}")
+        return int(np.floor(-found.fun + _ROUNDING))
+
+
+def _less(turns: dict[int, float], entries: list[int], most: float) -> dict[int, float]:
+    """Factors of `turns - most x entries`."""
+    factors = dict(turns)
+    for e in entries:
+        factors[e] = factors.get(e, 0.0) - most
+    return factors
+
 
 _MACRO = re.compile(r"^#define (\w+) (\d+)U?L?(?: |$)", re.MULTILINE)
 _THUMB_2 = {"-mcpu=cortex-m3", "-mcpu=cortex-m4", "-mcpu=cortex-m7"}

@@ -22,9 +22,8 @@ from ..model import Model
 from ..store.scratch import scratch_folder
 from ..target.q31 import exp2_table
 from ..target.table import Table
-from .confined import confined
-from .source import checked_sources, table_files
-from .toolchain import Target, all_targets, compile_objects, link
+from .emitted import checked_sources, table_files
+from .toolchain import Target, all_targets, compile_objects, confined, link
 
 __all__ = ["Visited", "visit_all"]
 

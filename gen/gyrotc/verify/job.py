@@ -32,16 +32,14 @@ from ..results.verification import (
     WorstError,
 )
 from ..store.marker import check_intact
-from ..tables.files import emit_texts, expected_answers
+from ..tables.emit import emit_texts, expected_answers
 from ..tables.vectors import Vectors, make_vectors
-from .board import Job, board_entries
-from .confined import end_all
+from .board import Job, board_entries, log_entries
 from .emitted import EDITABLE, c_hash, file_entries, made_again
 from .exhaustive import visit_all
-from .logs import log_entries
-from .recordings import replay_dataset
+from .replay import replay_dataset
 from .signatures import check_signature, load_public_key
-from .toolchain import Target, all_targets
+from .toolchain import Target, all_targets, end_all
 
 __all__ = ["chosen_targets", "file_entries", "verify"]
 
@@ -50,7 +48,7 @@ __all__ = ["chosen_targets", "file_entries", "verify"]
 _NEXT_PROGRAM_S = 0.05
 
 
-def verify(  # long: the order of the checks, then one line for each field of the result
+def verify(
     folder: Path,
     *,
     targets: Sequence[str] = (),

@@ -1,4 +1,4 @@
-"""Recordings through the compiled code of a target, every step compared with the reference.
+"""Recordings through the compiled code of one or several targets, every step compared with the reference.
 
 A recording goes in as 32-bit words of the target's byte order over standard input (for bare metal: a
 file of the emulator's host), and so come the results out.
@@ -6,9 +6,11 @@ file of the emulator's host), and so come the results out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +19,20 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
 from ..model import Model
-from ..recordings.records import Rows, Run
-from ..store.opening import write_own
+from ..recordings.records import Dataset, Rows, Run
+from ..results.verification import ReplayedRows, VerifiedTarget
+from ..store.files import write_own
 from ..store.scratch import scratch_folder
 from ..tables.applied import channels_of
-from ..target.follow import period_us, samples_per_block
+from ..target.front_end import period_us, samples_per_block
 from ..target.history import Replay, replay
 from ..target.table import Table, Words
 from ..train.samples import blocks_since_power_on, missed_before
-from .source import checked_sources, table_files
+from .board import Job
+from .emitted import checked_sources, table_files
 from .toolchain import Target, compile_c, run_program
 
-__all__ = ["ReplayCase", "Replayed", "history_of", "replay_on", "replay_program"]
+__all__ = ["ReplayCase", "Replayed", "history_of", "replay_dataset", "replay_on", "replay_program"]
 
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
@@ -144,3 +148,74 @@ def _stream(history: ReplayCase, word: np.dtype[np.uint32]) -> bytes:
 def _difference(row: int, got: Sequence[Words], want: Sequence[Words]) -> str:
     texts = [" ".join(f"{int(words[row]):08x}" for words in side) for side in (got, want)]
     return f"row {row}: statuses and bits {texts[0]}, reference {texts[1]}"
+
+
+@dataclass(slots=True)
+class _Lane:
+    """One table on one target: its program, and what came of it so far."""
+
+    target: Target
+    table: Table
+    program: Path | None = None
+    rows: int = 0
+    runs: int = 0
+    mismatches: int = 0
+    first: list[str] = field(default_factory=list)
+    error: str | None = None
+
+    def run(self, file: str, history: ReplayCase) -> None:
+        if self.program is None or self.error is not None:
+            return
+        try:
+            replayed = replay_on(self.target, self.program, history)
+        except CheckFailed as error:
+            self.error = f"{file}: {error}"
+            return
+        self.runs += 1
+        self.rows += len(history.missed)
+        self.mismatches += replayed.mismatches
+        room = _SHOWN_MISMATCHES - len(self.first)
+        self.first += [f"{file}, {text}" for text in replayed.first[:room]]
+
+
+def replay_dataset(
+    job: Job,
+    entries: Sequence[VerifiedTarget],
+    targets: Sequence[Target],
+    dataset: Dataset,
+    progress: Callable[[str], None],
+) -> list[VerifiedTarget]:
+    """Replays every run on every target whose board test ran; the entries, with `replayed` in theirs."""
+    with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        lanes = {}
+        for number, entry in enumerate(entries):
+            target = next((t for t in targets if t.name == entry.name), None)
+            if target is not None and entry.status != "missing" and target.reads_input:
+                lanes[number] = _Lane(target, job.tables[entry.numeric])
+        for lane in lanes.values():
+            try:
+                lane.program = stack.enter_context(
+                    replay_program(job.c_folder, job.model, lane.table, lane.target, trusted=job.trusted)
+                )
+            except CheckFailed as error:
+                lane.error = str(error)
+        for k, run in enumerate(dataset.runs, 1):
+            progress(f"replaying {run.file}, {k} of {len(dataset.runs)}")
+            rows = run.rows()
+            for table in job.tables.values():
+                history = history_of(rows, run, job.model, table)
+                same = [lane for lane in lanes.values() if lane.table is table]
+                list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
+    return [_entered(entry, lanes.get(number)) for number, entry in enumerate(entries)]
+
+
+def _entered(entry: VerifiedTarget, lane: _Lane | None) -> VerifiedTarget:
+    if lane is None:
+        return entry
+    replayed = ReplayedRows(
+        runs=lane.runs, rows=lane.rows, mismatches=lane.mismatches, first_mismatches=tuple(lane.first)
+    )
+    if lane.error is not None:
+        replayed = replayed.model_copy(update={"error": lane.error})
+    status = "fail" if lane.error is not None or lane.mismatches else entry.status
+    return entry.model_copy(update={"replayed": replayed, "status": status})

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..common.errors import InputError
-from ..common.inputs_texts import parse_json
+from ..common.inputs import parse_json
 from ..results.base import checked_result
 from ..results.release import RELEASED, Release
 from ..results.verification import SignatureCheck

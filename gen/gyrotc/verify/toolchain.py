@@ -1,4 +1,7 @@
-"""Compile and run C for a target: compiler, flags, how to run. One short TOML file describes each target.
+"""Compile and run C for a target, with limits and nothing of the user's; a TOML file describes each target.
+
+What is compiled and run may be somebody else's. Every command runs in the folder of its work, with an environment of
+its own, limits of time, memory and file size, no core dumps, and all of its processes end with it.
 
 Bare-metal targets are linked with parts of `bare/`: start-up code, and the few functions of the C
 library that the test programs use. Their standard input is the file `stdin.bin` of the working folder.
@@ -7,25 +10,28 @@ library that the test programs use. Their standard input is the file `stdin.bin`
 from __future__ import annotations
 
 import functools
+import os
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import IO, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import CheckFailed, InputError
-from ..common.inputs_texts import read_toml
-from ..store.opening import write_own
+from ..common.inputs import read_toml
+from ..store.files import write_own
 from ..store.scratch import scratch_folder
-from .confined import ProgramRun, run_to_end
 
 __all__ = [
     "C_FLAGS",
+    "LIMIT_S",
     "ProgramRun",
     "Symbol",
     "Target",
@@ -33,13 +39,110 @@ __all__ = [
     "compile_c",
     "compile_objects",
     "compiler_version",
+    "confined",
     "disassembly",
+    "end_all",
     "link",
     "load_target",
     "run_program",
+    "run_to_end",
     "symbols",
     "writable_bytes",
 ]
+
+LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
+# Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).
+# Addresses: qemu-user reserves the 4 GiB of a 32-bit processor, which are addresses without memory behind them.
+# A file: the answers to a recording of 350 million rows. Shells count in KiB, and files in blocks of 512 bytes.
+_LIMITS = {"c": 0, "d": 2 * 2**20, "v": 16 * 2**20, "f": 8 * 2**20}
+_SAID_BYTES = 64 * 2**20  # kept of what a program says on stderr
+
+Stream = IO[bytes] | int
+
+_groups: set[int] = set()  # of processes that run now
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramRun:
+    """How a program ended and what it printed."""
+
+    returncode: int
+    stdout: bytes
+    stderr: str
+
+
+@contextmanager
+def confined(
+    command: Sequence[str], folder: Path, *, stdin: Stream, stdout: Stream, stderr: Stream, cpu_s: int
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A process in `folder`, whose whole group ends with the block.
+
+    A shell sets the limits, those that the system has: what Python does between fork and exec is not safe with threads.
+    """
+    limits = "; ".join(f"ulimit -{option} {n} 2>/dev/null" for option, n in {**_LIMITS, "t": cpu_s}.items())
+    process = subprocess.Popen(
+        ["/bin/sh", "-c", f'{limits}; exec "$@"', "sh", *command],
+        cwd=folder,
+        env=_environment(folder.absolute()),
+        stdin=stdin,
+        stdout=stdout,
+        stderr=stderr,
+        start_new_session=True,
+    )
+    _groups.add(process.pid)
+    try:
+        yield process
+    finally:
+        _groups.discard(process.pid)
+        _end(process.pid)
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                with suppress(BrokenPipeError):  # what was still to be written to it
+                    pipe.close()
+
+
+def end_all() -> None:
+    """Ends what other threads run: the job is interrupted, and nobody waits for it any more."""
+    for group in tuple(_groups):
+        _end(group)
+
+
+def _end(group: int) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def run_to_end(
+    command: Sequence[str], folder: Path, what: str, stdin: Stream = subprocess.DEVNULL
+) -> ProgramRun:
+    """Runs a command in `folder` to its end.
+
+    Raises:
+        CheckFailed: It did not end; `what` says in words who it is.
+    """
+    # Files, not pipes: a recording goes in and comes out, and is in memory once.
+    with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+        # The clock ends it; the limit of processor time is for what escapes the clock, and must not come first.
+        with confined(
+            command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S
+        ) as process:
+            try:
+                process.wait(LIMIT_S)
+            except subprocess.TimeoutExpired as error:
+                raise CheckFailed(f"{what} did not end within {LIMIT_S} s") from error
+        for stream in (stdout, stderr):
+            stream.seek(0)
+        return ProgramRun(
+            process.returncode, stdout.read(), stderr.read(_SAID_BYTES).decode("utf-8", "replace")
+        )
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """All that a compiler or a program sees of the user's environment: where programs are."""
+    path = os.environ.get("PATH", os.defpath)
+    return {"PATH": path, "HOME": str(folder), "TMPDIR": str(folder), "LANG": "C", "LC_ALL": "C"}
+
 
 C_FLAGS = (
     "-std=c99", "-pedantic", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion",

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .arrays import ArrayTable, part_of
-from .tables import Column, LoggerFile, LoggerTable, library
+from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, part_of
 
 __all__ = ["open_dataflash"]
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...common.errors import InputError
-from ...common.opening import open_input
-from .csvtable import open_csv
-from .mapping import Map
+from ...common.inputs import open_input
+from .csv_table import open_csv
+from .map_file import Map
 from .tables import LoggerFile
 
 __all__ = ["open_logger_file"]

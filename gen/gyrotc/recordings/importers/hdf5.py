@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .arrays import Part, grouped, rate_of
-from .tables import Column, LoggerFile, library, numbers
+from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
 
 __all__ = ["open_hdf5"]
 

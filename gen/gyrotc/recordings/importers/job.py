@@ -2,31 +2,214 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import hashlib
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from pydantic_core import PydanticCustomError
+
 from ... import __version__
 from ...common.errors import InputError
-from ...results.imported import ImportedFile, ImportedFiles, OriginalFile
+from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
+from ...store.files import write_own
 from ...store.folder import result_folder
-from ...store.opening import write_own
-from ..plausible import Suspicion, suspicions
-from ..schema import FILE
+from ..description import FILE, check_serial, dataset_toml
+from ..plausibility import Suspicion, suspicions
 from ..values import MIN_ROWS
-from .described import description_of, kept_map, run_name, serial_of, sha256_of, size_of
 from .formats import open_logger_file
-from .mapping import MAP_FILE, Map, map_text
-from .propose import propose
-from .rows import ImportedRows
-from .runfile import Format, RunFile
+from .map_file import MAP_FILE, Choice, ImportPlan, Map, TimeMap, map_text
+from .propose import Ask, propose
+from .rows import NAMES, Format, ImportedRows, RunFile
 from .tables import LoggerFile
-from .told import preview, proposal, summary
-from .unitchoice import Ask
 
-__all__ = ["ImportOptions", "Imported", "import_files"]
+__all__ = [
+    "ImportOptions",
+    "Imported",
+    "description_of",
+    "import_files",
+    "kept_map",
+    "preview",
+    "proposal",
+    "run_name",
+    "serial_of",
+    "sha256_of",
+    "size_of",
+    "summary",
+]
+
+_BLOCK_BYTES = 2**22  # of a read: bounds memory
+
+
+def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Map:
+    """The map with every choice that was made."""
+    columns: dict[str, Any] = {choice.role: choice.source for choice in (*plan.values, plan.temperature)}
+    if plan.time:
+        columns["time"] = tuple(choice.column.name for choice in plan.time)
+    units = dict(chosen.units)
+    if plan.time and plan.time[0].unit:
+        units["time"] = plan.time[0].unit
+    units["temperature"] = plan.temperature.unit or ""
+    if plan.values[0].unit:
+        units["rate"] = plan.values[0].unit
+    units |= {
+        choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units
+    }
+    time = TimeMap(format=rows.clock.form or None, zone=chosen.time.zone, rate_hz=plan.rate_hz)
+    csv = {
+        k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal", "thousands")
+    } | chosen.csv.given()
+    update = {
+        "columns": columns,
+        "channels": {choice.role: choice.source for choice in plan.channels},
+        "units": units,
+        "csv": csv,
+        "time": time.model_dump(),
+    }
+    return Map.model_validate(chosen.model_dump() | update)
+
+
+def serial_of(stated: str | None, chosen: Map, file: LoggerFile, out: Path) -> str:
+    in_file = next(
+        (v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None
+    )
+    told = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
+    serial = told or out.resolve().name
+    try:
+        return check_serial(serial)
+    except PydanticCustomError as error:
+        where = (
+            "--serial" if stated else f"the serial {'in the file' if told else 'from the name of the folder'}"
+        )
+        raise InputError(where, repr(serial), f"{error.message()}; --serial names one") from error
+
+
+def run_name(path: Path, taken: set[str]) -> str:
+    """A plain name for a run, from that of its file."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-.") or "run"
+    name, k = plain, 2
+    while name in taken:
+        name, k = f"{plain}-{k}", k + 1
+    taken.add(name)
+    return name
+
+
+def description_of(serial: str, chosen: Map, entries: Sequence[Mapping[str, Any]]) -> str:
+    head: dict[str, Any] = {"schema": 1, "serial": serial}
+    for key in ("description", "earth_rate", "latitude_deg", "pulse_weight_arcsec"):
+        if getattr(chosen, key) not in (None, ""):
+            head[key] = getattr(chosen, key)
+    if any(entry["trusted"] for entry in entries):
+        head["trust_units"] = True
+    sources = [entry["source"] for entry in entries]
+    tables: dict[str, Any] = {"source": sources[0] if len(sources) == 1 else sources}
+    if chosen.meta:
+        tables["meta"] = chosen.meta
+    if chosen.noise:
+        tables["noise"] = chosen.noise
+    return dataset_toml(head, tables, [dict(_run_entry(entry)) for entry in entries])
+
+
+def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    yield "file", entry["file"]
+    if entry["started"] is not None:
+        yield "started", entry["started"]
+    if not entry["since_power_on"]:
+        yield "power_on_s", "unknown"
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, or of the files of a folder one after the other in the order of their names."""
+    digest = hashlib.sha256()
+    for one in sorted(path.iterdir()) if path.is_dir() else [path]:
+        with one.open("rb") as file:
+            while block := file.read(_BLOCK_BYTES):
+                digest.update(block)
+    return digest.hexdigest()
+
+
+def size_of(path: Path) -> int:
+    return sum(one.stat().st_size for one in path.iterdir()) if path.is_dir() else path.stat().st_size
+
+
+_NATIVE = {"time": "s", "temperature": "C", "rate": "deg/h"}
+_MOST_NAMES = 12  # that are listed in a line of a terminal
+
+
+def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator[str]:
+    """How a file is read, a line for each column."""
+    table = f", table {plan.main.name}" if plan.main.name else ""
+    yield f"{file.path.name}: {file.format}{table}"
+    if plan.time:
+        names = " + ".join(choice.column.name for choice in plan.time)
+        form = f"stamps {rows.clock.form}" if rows.clock.form else _unit_words(plan.time[0])
+        yield _line("time", names, form, _why(plan.time[0]))
+    else:
+        yield _line("time", "-", f"{plan.rate_hz:g} rows per second", plan.why_rate)
+    for choice in (plan.temperature, *plan.values, *plan.channels):
+        yield _line(choice.role, choice.source, _unit_words(choice), _why(choice))
+    if rows.clock.needs_zone:
+        yield "  the stamps have no zone: when the run started is left out (--time-zone Europe/Berlin would say it)"
+    if plan.left_out:
+        more = f" and {len(plan.left_out) - _MOST_NAMES} more" if len(plan.left_out) > _MOST_NAMES else ""
+        yield f"  left out: {', '.join(plan.left_out[:_MOST_NAMES])}{more} ([channels] of the map takes them)"
+    for note in plan.main.notes:
+        yield f"  {note}"
+
+
+def preview(rows: ImportedRows) -> Iterator[str]:
+    """The first rows as the file has them and as they become."""
+    for k in range(min(3, len(next(iter(rows.raw.values()), [])))):
+        before = ", ".join(f"{name} {values[k]}" for name, values in rows.raw.items())
+        after = ", ".join(f"{name} {values[k]:.10g}" for name, values in rows.first_rows.items())
+        yield f"  row {k + 1}: {before or '-'}  ->  {after}"
+
+
+def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """What was written."""
+    for entry in entries:
+        cells = entry["evidence"].cells
+        low, high = entry["evidence"].temperature_c
+        period = (cells[-1, 0] - cells[0, 0]) / max(entry["rows"] - 1, 1)
+        means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(cells[:, 2:].mean(axis=0)))
+        left = "".join(f"; {count} left out: {reason}" for reason, count in entry["left_out"].items())
+        yield (
+            f"{out / entry['file']}: {entry['rows']} rows of about {period:.4g} s, {low:.4g} ... {high:.4g} C, "
+            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}{left}"
+        )
+        for text in entry["trusted"]:
+            yield f"  units are trusted: {text}"
+    yield f"{out / 'map.toml'}: reads the next file of this logger: gyrotc import FILE --map map.toml --out ..."
+
+
+def _line(role: str, source: str, unit: str, why: str) -> str:
+    return f"  {role:<12} {source:<24} {unit:<24} {why}"
+
+
+def _unit_words(choice: Choice) -> str:
+    kind = "rate" if choice.role.startswith("rate") else choice.role
+    if choice.role in NAMES or choice.role == "time":
+        return f"{choice.unit} -> {_NATIVE[kind]}" if choice.unit and kind in _NATIVE else ""
+    return choice.unit or ""
+
+
+def _why(choice: Choice) -> str:
+    from .names import meaning
+
+    column = choice.column
+    if choice.unit is None:
+        return choice.why
+    if choice.unit == column.unit:
+        return f"{choice.why}; the unit: {column.why or 'in the file'}"
+    in_name = meaning(column.name, None, choice.table.name)
+    if choice.unit == in_name.unit and in_name.why:
+        return f"{choice.why}; the unit: {in_name.why}"
+    return f"{choice.why}; the unit: as stated"
+
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
@@ -155,7 +338,7 @@ def _run(
     options: ImportOptions,
     tell: Say,
     progress: Progress | None,
-) -> dict[str, Any]:  # long: the stages of an import in their order
+) -> dict[str, Any]:
     """Writes one run; its entry."""
     layout = rows.layout
     names = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]

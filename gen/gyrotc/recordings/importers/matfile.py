@@ -13,15 +13,14 @@ import numpy as np
 import scipy.io
 
 from ...common.errors import InputError
-from .arrays import Part, grouped, part_of, rate_of
-from .tables import Column, LoggerFile, numbers
+from .tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
 
 __all__ = ["open_mat"]
 
 _DEEPEST = 4  # structures within one another: deeper ones are no tables
 
 
-def open_mat(path: Path) -> LoggerFile:  # long: one branch for each form of the file
+def open_mat(path: Path) -> LoggerFile:
     """A MATLAB file: numeric vectors, columns of matrices, fields of structs.
 
     Raises:

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError
-from .arrays import ArrayTable, Part
-from .tables import Column, LoggerFile, LoggerTable, library, numbers
+from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
 __all__ = ["open_mdf"]
 

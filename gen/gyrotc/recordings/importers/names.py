@@ -1,4 +1,4 @@
-"""What the name of a column says: its unit, and whether it holds time, temperature, a rate of an axis.
+"""What the name of a column says: its unit, and whether it is time, temperature or the rate of an axis.
 
 Every guess carries its reason in words; nothing here looks at values.
 """
@@ -166,9 +166,7 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
     return name, None, ""
 
 
-def meaning(
-    name: str, unit: str | None, table: str = ""
-) -> Meaning:  # long: one rule after the other, the surest first
+def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
     """What a column of that name and (where the file gives one) that unit holds."""
     base, in_name, why = split_unit(name)
     kind = kind_of(unit) if unit else None

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...common.errors import InputError
-from .csvcells import kind_of_cells
+from .csv_dialect import kind_of_cells
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
 __all__ = ["open_parquet"]

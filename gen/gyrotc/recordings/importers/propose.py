@@ -1,4 +1,4 @@
-"""A map for a file that has none, or what a map leaves open: which column is what, in which unit, and why.
+"""A map for a file that has none: which column is what, in which unit, and why.
 
 Names and units decide, never values. Where two columns are as likely, or a unit stands nowhere, nothing is guessed:
 the refusal names the choices and the option that makes one.
@@ -6,20 +6,146 @@ the refusal names the choices and the option that makes one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...common.errors import InputError
-from ..units import UnitError, channel_unit, conversion
-from .clockparts import fraction_of, parts_of
-from .hints import in_text, increments, listed, name_it, nameless
-from .mapping import Map
+from ..units import NATIVE, UnitError, channel_unit, conversion
+from .clock import fraction_of, parts_of
+from .map_file import Choice, ImportPlan, Map
 from .names import Meaning, meaning, split_unit, words
-from .plan import Choice, ImportPlan
 from .tables import Column, LoggerFile, LoggerTable
-from .unitchoice import Ask, Units, asked, said
 
-__all__ = ["propose"]
+__all__ = [
+    "OPTIONS",
+    "Ask",
+    "Units",
+    "asked",
+    "in_text",
+    "increments",
+    "listed",
+    "name_it",
+    "nameless",
+    "propose",
+    "said",
+]
+
+Ask = Callable[[str], str | None]
+"""Asks a person on a terminal; None where there is none."""
+
+
+OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
+_EXAMPLES = {"time": "s, ms, us, min, d", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
+
+
+class Units:
+    """Units of the three kinds: stated, in the file, or asked for."""
+
+    def __init__(self, file: str, stated: Mapping[str, str], ask: Ask, missing: list[str]) -> None:
+        self._file, self._stated, self._ask, self._missing = file, stated, ask, missing
+        self._asked: dict[str, str] = {}
+
+    def of(self, kind: str, column: Column, table: LoggerTable) -> str:
+        """The unit of a column of a kind; empty (and noted as missing) where it stands nowhere."""
+        if kind in self._stated:
+            return self._checked(kind, self._stated[kind], OPTIONS[kind])
+        _, in_name, how = split_unit(column.name)
+        in_file = column.unit or meaning(column.name, None, table.name).unit
+        if in_file is None and how.startswith(("in brackets", "after")):
+            in_file = in_name
+        if in_file is not None:
+            try:
+                conversion(in_file, kind)
+            except UnitError:
+                found = f"the file gives it in {in_file!r}, which is no {kind}"
+                expected = (
+                    f"{OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
+                )
+                raise InputError(f"{self._file}, column {column.name}", found, expected) from None
+            return in_file
+        if kind not in self._asked:
+            answer = self._ask(
+                f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})"
+            )
+            if answer:
+                self._asked[kind] = self._checked(kind, answer, "the answer")
+        if kind not in self._asked:
+            self._missing.append(f"{kind}\t{column.name}")
+            return ""
+        return self._asked[kind]
+
+    def _checked(self, kind: str, unit: str, where: str) -> str:
+        try:
+            conversion(unit, kind)
+        except UnitError as error:
+            raise InputError(where, str(error), f"one of {_EXAMPLES[kind]}") from error
+        return unit
+
+
+def said(missing: Sequence[str]) -> Iterator[str]:
+    seen = set()
+    for one in missing:
+        kind, column = one.split("\t")
+        if kind not in seen:
+            seen.add(kind)
+            yield f"no unit of the {kind} in column {column!r}"
+
+
+def asked(missing: Sequence[str]) -> Iterator[str]:
+    for one in missing:
+        kind = one.split("\t")[0]
+        yield f'{OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
+
+
+_HEXADECIMAL = re.compile(r"(?=.*[A-Fa-f])[0-9A-Fa-f]+h?|[0-9A-Fa-f]+h")
+
+
+def increments(file: LoggerFile) -> str:
+    """What to do with a file of increments of angle; empty where there are none."""
+    for table in file.tables:
+        for column in table.columns:
+            name, unit, _ = split_unit(column.name)
+            if {"delta", "increment", "incr", "dtheta"} & set(words(name)):
+                angle = column.unit or unit or "rad"
+                return (
+                    f'the increments as rates: --column rate="{column.name}" --rate-unit "{angle} / (0.01 s)" with the '
+                    "row period in place of 0.01 s"
+                )
+    return ""
+
+
+def in_text(file: LoggerFile, kind: str) -> str:
+    """A column that by its name is of that kind, and holds no numbers: what stands there."""
+    for table in file.tables:
+        for column in table.columns:
+            if column.kind == "text" and meaning(column.name, column.unit, table.name).kind == kind:
+                shown = next((cell for cell in reversed(column.sample) if cell), "")
+                if _HEXADECIMAL.fullmatch(shown):
+                    return f"; or, as {column.name} holds {shown[:40]!r}, 0x before each of its numbers"
+                return (
+                    f"; or, as {column.name} holds {shown[:40]!r}, --csv decimal=, (or .) and --csv thousands=. "
+                    "(or another mark), or --csv missing=WORD"
+                )
+    return ""
+
+
+def listed(file: LoggerFile) -> str:
+    names = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def name_it(kind: str) -> str:
+    return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
+
+
+def nameless(file: LoggerFile) -> str:
+    """All that has to be said where no column has a name; empty where one has."""
+    names = [column.name for table in file.tables for column in table.columns]
+    if any(not name.startswith("column ") for name in names):
+        return ""
+    said = (f'--column {kind}="column ..." {OPTIONS[kind]} ...' for kind in ("time", "temperature", "rate"))
+    return f"a line of names above the rows, or {' '.join(said)}"
 
 
 _CHANNELS = {
@@ -244,7 +370,7 @@ def _time(
 
 def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
     """One column of dates and times, or a date and a time of day."""
-    from .forms import forms_of
+    from .stamps import forms_of
 
     parts = [(c, forms_of([s for s in c.sample if s])) for c in stamps]
     if not any(c.sample for c in stamps):

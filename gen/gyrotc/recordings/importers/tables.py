@@ -1,4 +1,4 @@
-"""What every format of a logger becomes: tables of named columns, read in chunks.
+"""What every format of a logger becomes: tables of named columns, read in chunks or whole.
 
 A file holds one table (CSV) or many (the topics of a flight log, the groups of a measurement file). Columns are named
 `table/column` where there are many. An importer knows what its format says of units and of time; it guesses nothing.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -20,7 +20,19 @@ from numpy.typing import NDArray
 
 from ...common.errors import InputError
 
-__all__ = ["CHUNK_ROWS", "Chunk", "Column", "LoggerFile", "LoggerTable", "library"]
+__all__ = [
+    "CHUNK_ROWS",
+    "ArrayTable",
+    "Chunk",
+    "Column",
+    "LoggerFile",
+    "LoggerTable",
+    "Part",
+    "grouped",
+    "library",
+    "part_of",
+    "rate_of",
+]
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
 Array = NDArray[Any]
@@ -144,3 +156,81 @@ def numbers(values: Any) -> Array:
     if array.dtype.byteorder == ">":
         array = array.astype(array.dtype.newbyteorder("="))
     return np.ascontiguousarray(array.reshape(-1))
+
+
+Part = Callable[[int, int], Any]
+"""Gives the values of rows from a first to a last one (exclusive)."""
+
+
+@dataclass(frozen=True)
+class ArrayTable(LoggerTable):
+    """Columns that can be read from any row on.
+
+    Attributes:
+        rows: Number of rows.
+        parts: Reads a part of each column.
+    """
+
+    rows: int = 0
+    parts: Mapping[str, Part] = field(default_factory=dict)
+
+    def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
+        """As `Table.chunks`."""
+        for first in range(0, self.rows, CHUNK_ROWS):
+            last = min(first + CHUNK_ROWS, self.rows)
+            values = {name: np.asarray(self.parts[name](first, last)) for name in names}
+            yield Chunk(values or {"": np.zeros(last - first)}, first, last / self.rows)
+
+
+def part_of(values: Any) -> Part:
+    """Reads an array that is in memory."""
+    return lambda first, last: values[first:last]
+
+
+def grouped(
+    columns: Sequence[tuple[str, str, int, Column, Part]], rates: Mapping[str, tuple[float, str]]
+) -> tuple[LoggerTable, ...]:
+    """Tables of columns of one group and one length.
+
+    Args:
+        columns: Group, name of the table, number of rows, column, and what reads it.
+        rates: Rows per second by group, with the reason.
+    """
+    found: dict[tuple[str, int], list[tuple[Column, Part]]] = {}
+    names: dict[tuple[str, int], str] = {}
+    for group, name, rows, column, part in columns:
+        if rows > 1:
+            found.setdefault((group, rows), []).append((column, part))
+            names[group, rows] = name
+    lengths: dict[str, int] = {}
+    for group, _ in found:
+        lengths[group] = lengths.get(group, 0) + 1
+    tables = []
+    for (group, rows), members in found.items():
+        name = names[group, rows] if lengths[group] == 1 else f"{names[group, rows]} ({rows} rows)".strip()
+        rate, why = rates.get(group, (None, ""))
+        parts = {column.name: part for column, part in members}
+        columns_of = tuple(column for column, _ in members)
+        tables.append(ArrayTable(name, columns_of, rate, why, rows=rows, parts=parts))
+    return tuple(tables)
+
+
+def rate_of(name: str, value: float) -> tuple[float, str] | None:
+    """Rows per second that a single number of that name states, with the reason; None if it does not."""
+    plain = name.lower().rsplit("/", 1)[-1].rsplit(".", 1)[-1]
+    if not np.isfinite(value) or value <= 0.0:
+        return None
+    if plain in (
+        "fs",
+        "fs_hz",
+        "sample_rate",
+        "samplerate",
+        "sampling_rate",
+        "rate_hz",
+        "samplingfrequency",
+        "fsamp",
+    ):
+        return float(value), f"{name} = {value:g} in the file, in Hz"
+    if plain in ("dt", "ts", "dt_s", "ts_s", "sample_time", "sampletime"):
+        return 1.0 / float(value), f"{name} = {value:g} in the file, in s"
+    return None

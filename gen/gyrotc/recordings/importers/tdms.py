@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .arrays import ArrayTable, Part
-from .tables import Column, LoggerFile, LoggerTable, library, numbers
+from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
 __all__ = ["open_tdms"]
 

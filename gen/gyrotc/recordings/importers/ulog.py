@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError
-from .arrays import ArrayTable, part_of
-from .tables import Column, LoggerFile, LoggerTable, library, numbers
+from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, numbers, part_of
 
 __all__ = ["open_ulog"]
 

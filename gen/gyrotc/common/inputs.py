@@ -1,0 +1,341 @@
+"""Files that somebody else may have written: opened as regular files, within limits, refused in one clear message.
+
+A user moves one by `gyrotc --max NAME=VALUE` or by the environment: `GYROTC_MAX="NAME=VALUE NAME=VALUE"`. The option
+writes the environment, so that the processes of a fleet see it too.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import os
+import re
+import stat
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from .errors import InputError
+
+__all__ = [
+    "CEILINGS",
+    "ENVIRONMENT",
+    "Ceiling",
+    "ceiling",
+    "checked",
+    "need_memory",
+    "open_input",
+    "parse_json",
+    "parse_toml",
+    "read_input",
+    "read_json",
+    "read_toml",
+    "refuse_above",
+    "set_ceilings",
+]
+
+ENVIRONMENT = "GYROTC_MAX"
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """A ceiling: its default and what it is of."""
+
+    default: float
+    meaning: str
+
+
+CEILINGS: dict[str, Ceiling] = {
+    "memory_gib": Ceiling(4.0, "memory that the rows of one recording, or its blocks, may take, GiB"),
+    "recording_mib": Ceiling(8192.0, "size of one recording, trace or noise file, MiB"),
+    "rows": Ceiling(1e8, "rows of one recording"),
+    "columns": Ceiling(256.0, "columns of one recording"),
+    "parquet_ratio": Ceiling(250.0, "size of a Parquet file once unpacked over its size, above 64 MiB"),
+    "text_mib": Ceiling(4.0, "size of a dataset.toml, manifest, scenario, limits file or model.json, MiB"),
+    "result_mib": Ceiling(32.0, "size of a JSON result, truth.json, picture or board log, MiB"),
+    "nesting": Ceiling(32.0, "depth of tables and lists within one another in TOML and JSON"),
+    "runs": Ceiling(2000.0, "runs of one data set"),
+    "units": Ceiling(100_000.0, "gyros of one fleet"),
+}
+"""All ceilings by name."""
+
+
+def ceiling(name: str) -> float:
+    """The ceiling in force.
+
+    Raises:
+        InputError: The environment names an unknown one, or no number above 0.
+    """
+    return _moved(os.environ.get(ENVIRONMENT, "")).get(name, CEILINGS[name].default)
+
+
+def set_ceilings(texts: Iterable[str]) -> None:
+    """Moves ceilings, each given as `NAME=VALUE`, for this process and those that it starts.
+
+    Raises:
+        InputError: An unknown name, or no number above 0.
+    """
+    joined = " ".join([os.environ.get(ENVIRONMENT, ""), *texts]).strip()
+    _moved(joined)
+    if joined:
+        os.environ[ENVIRONMENT] = joined
+
+
+@functools.lru_cache(maxsize=8)
+def _moved(text: str) -> dict[str, float]:
+    moved = {}
+    for part in text.replace(",", " ").split():
+        name, _, value = part.partition("=")
+        where = f"--max or {ENVIRONMENT}, {name}"
+        if name not in CEILINGS:
+            raise InputError(where, "is not known", f"one of {', '.join(CEILINGS)}")
+        try:
+            moved[name] = float(value)
+        except ValueError:
+            moved[name] = math.nan
+        if not 0.0 < moved[name] < math.inf:
+            raise InputError(where, repr(value), "a number above 0")
+    return moved
+
+
+def refuse_above(name: str, value: float, where: str, unit: str) -> None:
+    """Raises where `value` (in the ceiling's own measure) is above the ceiling `name`.
+
+    Raises:
+        InputError: It is.
+    """
+    most = ceiling(name)
+    if value > most:
+        raise InputError(where, f"{value:.10g} {unit}", f"at most {most:.10g} (--max {name}=...)")
+
+
+def need_memory(octets: float, where: str, why: str) -> None:
+    """To be called before memory is taken.
+
+    Raises:
+        InputError: More than the ceiling `memory_gib` would be needed.
+    """
+    refuse_above("memory_gib", octets / 2**30, where, f"GiB of memory for {why}")
+
+
+_KINDS = (
+    (stat.S_ISDIR, "is a folder"),
+    (stat.S_ISFIFO, "is a pipe"),
+    (stat.S_ISSOCK, "is a socket"),
+    (stat.S_ISCHR, "is a device"),
+    (stat.S_ISBLK, "is a device"),
+)
+
+
+def open_input(path: Path, where: str, expected: str) -> tuple[BinaryIO, int]:
+    """Opens a regular file (or a link to one) for reading, unbuffered.
+
+    Anything else is not even opened: a pipe without a writer would wait for ever, and a device has no end.
+
+    Args:
+        path: The file.
+        where: Its name in messages.
+        expected: What it should be.
+
+    Returns:
+        The open file and its size, bytes. Reading stops there: what grows meanwhile, and what the kernel makes up
+        under a size of 0 (`/proc/kmsg`), is not read.
+
+    Raises:
+        InputError: It does not exist, cannot be opened, or is no regular file.
+    """
+    try:
+        _refuse_special(path.stat(), where, expected)
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+        try:
+            facts = os.fstat(handle)  # of what was really opened
+            _refuse_special(facts, where, expected)
+            os.set_blocking(handle, True)
+            return os.fdopen(handle, "rb", buffering=0), facts.st_size
+        except BaseException:
+            os.close(handle)
+            raise
+    except FileNotFoundError:
+        raise InputError(where, "does not exist", expected) from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(where, f"cannot be read ({reason})", expected) from error
+
+
+def _refuse_special(facts: os.stat_result, where: str, expected: str) -> None:
+    if not stat.S_ISREG(facts.st_mode):
+        found = next((text for is_one, text in _KINDS if is_one(facts.st_mode)), "is no regular file")
+        raise InputError(where, found, expected)
+
+
+def read_input(path: Path, ceiling_name: str, expected: str, where: str | None = None) -> bytes:
+    """All bytes of a file.
+
+    Args:
+        path: The file.
+        ceiling_name: Ceiling of its size, in MiB.
+        expected: What it should be.
+        where: Its name in messages; default the path.
+
+    Raises:
+        InputError: As `open_input`; or it is larger than the ceiling.
+    """
+    where = where or str(path)
+    file, size = open_input(path, where, expected)
+    with file:
+        if size == 0:
+            raise InputError(where, "is empty", expected)
+        refuse_above(ceiling_name, size / 2**20, where, "MiB")
+        parts = []
+        try:
+            while size > 0 and (part := file.read(size)):
+                parts.append(part)
+                size -= len(part)
+        except OSError as error:
+            raise InputError(where, f"cannot be read ({error.strerror})", expected) from error
+    return b"".join(parts)
+
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+T = TypeVar("T")
+
+_LONGEST_INTEGER = 64  # bits, signed; TOML v1.0.0, "Integer"
+_SHOWN = 60  # characters of what is refused: half a line of a terminal
+# A key of more parts than tables may be nested costs the parser the square of their number.
+_LONG_KEY = r"""(?<![\w-])(?:(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){%d}"""
+
+
+def read_toml(path: Path, expected: str, where: str | None = None) -> dict[str, Any]:
+    """A TOML file of at most `text_mib`.
+
+    Raises:
+        InputError: It cannot be read, is no TOML, is nested too deep, or holds a number of more than 64 bits.
+    """
+    return parse_toml(read_input(path, "text_mib", expected, where), where or str(path), expected)
+
+
+def parse_toml(data: bytes, where: str, expected: str) -> dict[str, Any]:
+    """The content of TOML text in UTF-8, with or without byte order mark. Raises as `read_toml`."""
+    text = _decoded(data, where, expected)
+    deepest = int(ceiling("nesting"))
+    long_key = re.search(_LONG_KEY % (deepest + 1), text)
+    if long_key:
+        line = text.count("\n", 0, long_key.start()) + 1
+        raise InputError(f"{where}, line {line}", "a key of too many parts", f"at most {deepest}")
+    try:
+        content: dict[str, Any] = tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(where, "is nested too deep", f"at most {deepest} levels") from error
+    except ValueError as error:  # also of integers with thousands of digits
+        raise InputError(where, f"no TOML: {error}", expected) from error
+    _look_through(content, where)
+    return content
+
+
+def read_json(path: Path, expected: str, *, ceiling_name: str = "result_mib") -> Any:
+    """A JSON file.
+
+    Raises:
+        InputError: It cannot be read, is no JSON, is nested too deep, or holds NaN, an infinity, an integer of more
+            than 64 bits or half a surrogate pair.
+    """
+    return parse_json(read_input(path, ceiling_name, expected), str(path), expected)
+
+
+def parse_json(data: bytes, where: str, expected: str) -> Any:
+    """The content of JSON text in UTF-8. Raises as `read_json`."""
+    text = _decoded(data, where, expected)
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+    except RecursionError as error:
+        deepest = int(ceiling("nesting"))
+        raise InputError(where, "is nested too deep", f"at most {deepest} levels") from error
+    except ValueError as error:
+        raise InputError(where, f"is not JSON ({error})", expected) from error
+    _look_through(content, where)
+    return content
+
+
+def checked(kind: type[T], content: Any, where: str) -> T:
+    """What JSON content says, as a pydantic model or another type, every field of the type that it should have.
+
+    Raises:
+        InputError: A field is missing or of another type; the message names it.
+    """
+    try:
+        # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
+        return TypeAdapter(kind).validate_json(json.dumps(content))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"])
+        place = f"{where}, field {field}" if field else where
+        if first["type"] == "missing":
+            raise InputError(place, "is missing") from error
+        raise InputError(place, _short(first["input"]), first["msg"].removeprefix("Value error, ")) from error
+
+
+def _decoded(data: bytes, where: str, expected: str) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{where}, line {line}", f"no UTF-8 text ({error.reason})", expected) from error
+
+
+def _refuse_constant(text: str) -> float:
+    raise ValueError(f"{text} is not a finite number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:_SHOWN]} is not a finite number")
+    return value
+
+
+def _look_through(content: Any, where: str) -> None:
+    """Refuses what is nested too deep, integers of more than 64 bits, and text that is no Unicode."""
+    deepest = int(ceiling("nesting"))
+    levels: list[Any] = [content]
+    for depth in range(deepest + 2):
+        below: list[Any] = []
+        for value in levels:
+            if type(value) is float:  # most are
+                continue
+            if isinstance(value, dict):
+                for key, inner in value.items():
+                    _look_at(key, where)
+                    below.append(inner)
+            elif isinstance(value, list):
+                below.extend(value)
+            else:
+                _look_at(value, where)
+        levels = below
+        if not levels:
+            return
+        if depth > deepest:
+            break
+    raise InputError(where, "is nested too deep", f"at most {deepest} levels (--max nesting=...)")
+
+
+def _look_at(value: Any, where: str) -> None:
+    if isinstance(value, str):
+        if not value.isascii() and any("\ud800" <= c <= "\udfff" for c in value):
+            raise InputError(where, "half a surrogate pair in a text", "Unicode text")
+    elif isinstance(value, int) and value.bit_length() >= _LONGEST_INTEGER:
+        raise InputError(where, f"a whole number of {value.bit_length()} bits", "at most 64 with its sign")
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."

@@ -1,0 +1,223 @@
+"""`gyrotc diagnose`: all stages in their order, and the extended model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..common.arrays import Progress
+from ..common.metrics import LEAST_SPAN_C
+from ..model import Model
+from ..quality.events import Event, accepted, events_of
+from ..quality.sign_and_gain import gain_changes, turned_runs
+from ..recordings.records import Dataset, Run, joined_runs
+from ..results.diagnosed import Diagnosed
+from ..results.training import Training
+from ..train.channels import StandIn
+from ..train.cross_validation import training_spans
+from ..train.data import TrainingData
+from ..train.fitting import HOLD_S, FitOptions, front_end, map_method, model_of, training_of
+from ..train.guards import channel_guard, longest_same_s, stuck_after_s
+from ..train.uncertainty import start_sigma
+from .blocks import records_of
+from .extension import Extension, extend, stand_ins_of
+from .noise import declared_noise
+from .pipeline import Analysis, analyse
+from .refit import Effect, added_range, play_runs, terms_of
+from .single_cycle import Cycle, cycle_of, is_single_cycle
+from .summary import holds, not_testable, result_of
+
+__all__ = ["Diagnosis", "diagnose"]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result of a diagnosis, and what its pictures are made of.
+
+    Attributes:
+        result: What `diagnose.json` holds.
+        analysis: Search and statistics; None where the recordings cannot decide anything.
+        extension: Gain; None without an analysis.
+        model: The extended model, None if none is shipped.
+        training: What `training.json` says of it.
+        cycle: What a single chamber cycle tells; None where there are more.
+    """
+
+    result: Diagnosed
+    analysis: Analysis | None
+    extension: Extension | None
+    model: Model | None
+    training: Training | None = None
+    cycle: Cycle | None = None
+
+
+def diagnose(
+    dataset: Dataset,
+    *,
+    model: Model | None = None,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+    accept_events: bool = False,
+) -> Diagnosis:
+    """Runs the whole diagnosis on the training runs; exam runs measure the gain only.
+
+    Args:
+        dataset: Recordings. `truth.json` beside them is never opened.
+        model: A model made before: its method, block and number of centers are those of the refit.
+        options: As for `fit`; default: those of `model`, else of `fit`.
+        progress: Called with what is being done.
+        accept_events: Goes on without what the events that are found say to leave out.
+
+    Raises:
+        InputError: No training run, or nothing usable in them.
+    """
+    say = progress or (lambda _: None)
+    say("reading")
+    whole = replace(dataset, runs=joined_runs(dataset.runs))
+    events = _events(dataset, whole)
+    found = _diagnosed(
+        accepted(whole, events) if accept_events else whole, options or _options_of(model), say
+    )
+    told = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
+    steps = (*_about(events, accept_events), *found.result.next)
+    return replace(found, result=found.result.model_copy(update=told | {"next": steps}))
+
+
+def _events(dataset: Dataset, whole: Dataset) -> list[Event]:
+    """Of whole runs first; a step where a gain changes is that change."""
+    turned = turned_runs(dataset)
+    gains = [e for e in gain_changes(whole) if e.file not in {t.file for t in turned}]
+
+    def of_gain(event: Event) -> bool:
+        times = [gain.time_s for gain in gains if gain.file == event.file]
+        return event.id in ("step", "ramp") and any(
+            a <= event.time_s[2] and event.time_s[1] <= b for _, a, b in times
+        )
+
+    return [*turned, *gains, *(e for e in events_of(whole) if not of_gain(e))]
+
+
+def _about(events: Sequence[Event], accept: bool) -> list[str]:
+    """What to do about events before anything else."""
+    if accept or not any(event.leave_out for event in events):
+        return []
+    return [
+        "First look at the events: what is named may stand for them. Paste their exclude lines into dataset.toml, or "
+        "go on without them (gyrotc diagnose --accept-events)."
+    ]
+
+
+def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis:
+    """All stages behind the events."""
+    records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
+    temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
+    if float(np.ptp(temperature)) < LEAST_SPAN_C:
+        return Diagnosis(not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
+    analysis = analyse(records, declared_noise(dataset), say)
+    cycle = cycle_of(records) if is_single_cycle(records) else None
+    if cycle is not None:
+        analysis = replace(
+            analysis,
+            attribution=cycle.attribution(analysis.attribution),
+            separations=tuple({} for _ in cycle.causes),
+            extended=None,
+        )
+        causes = cycle.causes
+    else:
+        causes = analysis.attribution.causes if holds(analysis.attribution) else ()
+    states = causes if cycle is None else cycle.states
+    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
+    extended, training = _extended_model(dataset, extension, chosen)
+    result = result_of(dataset, analysis, extension, causes, chosen, cycle)
+    return Diagnosis(result, analysis, extension, extended, training, cycle)
+
+
+def _options_of(model: Model | None) -> FitOptions:
+    if model is None:
+        return FitOptions()
+    centers = model.n_centers if map_method(model.method) == model.method else None
+    method = map_method(model.method)
+    return FitOptions(method, model.seed, centers, None, model.block_s, model.average_s)
+
+
+def _extended_model(
+    dataset: Dataset, extension: Extension, options: FitOptions
+) -> tuple[Model, Training] | tuple[None, None]:
+    """The model file of the extension, and what training says of it."""
+    if extension.extended is None:
+        return None, None
+    runs = [r for r in dataset.runs if r.role == "train"]
+    front = front_end(runs, options.block_s)
+    played = play_runs(dataset, runs, front)
+    longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
+    front = replace(front, stuck_s=stuck_after_s(longest_s))
+    bumps = extension.bumps
+    plain = model_of(
+        dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps
+    )
+    stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
+    entries = _entries(extension.shipped, stand_ins)
+    left_out = extension.after if extension.measured_on == "left out" else None
+    spans = training_spans(runs, extension.samples)
+    training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
+    training = _of_whole_map(training, plain)
+    recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
+    guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
+    low, high = added_range(play_runs(dataset, runs, front), extension.shipped)
+    own = [e for e in extension.shipped if e.channel is None]
+    lost = added_range(played, own, sum(s.added for s in stand_ins.values()))
+    told = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
+    content = _with_terms(plain, entries, extension.samples, runs, stand_ins)
+    return Model.from_dict({**content, **told}), training
+
+
+def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:
+    """Terms as a model has them, those of channels last: a stand-in is fitted to what all others leave of the input."""
+    entries = []
+    for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):
+        if effect.term.table is None:
+            continue
+        names = [p.name for p in effect.term.parameters]
+        entry = {
+            "id": effect.id,
+            "parameters": {n: effect.values[n] for n in names},
+            "channel": effect.channel,
+        }
+        if effect.channel is not None and effect.channel in stand_ins:
+            entry["stand_in"] = stand_ins[effect.channel].network
+        entries.append(entry)
+    return entries
+
+
+def _of_whole_map(training: Training, plain: Model) -> Training:
+    """What training says of its map, with the bumps that have joined it."""
+    more = plain.n_centers - training.centers
+    sizes = {"centers": plain.n_centers, "table_bytes": training.table_bytes + 20 * more}
+    return training.model_copy(update={**sizes, "sum_abs_weights_dph": plain.sum_abs_weights_dph})
+
+
+def _with_terms(
+    plain: Model,
+    entries: list[dict[str, Any]],
+    samples: TrainingData,
+    runs: Sequence[Run],
+    stand_ins: Mapping[str, StandIn],
+) -> dict[str, Any]:
+    """The model with its terms, and what its uncertainty says of each."""
+    content = {**plain.to_dict(), "terms": entries}
+    if content["uncertainty_dph"] is not None:
+        rules = content["uncertainty_dph"]["rules"]
+        channels = {
+            e["channel"]: np.concatenate([run.rows().channel(e["channel"]) for run in runs])
+            for e in entries
+            if e["channel"] is not None
+        }
+        at_start = [
+            start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries
+        ]
+        stood = {channel: stand_in.sigma_dph for channel, stand_in in stand_ins.items()}
+        rules["terms"] = [stood.get(e["channel"], s) for e, s in zip(entries, at_start, strict=True)]
+    return content

@@ -1,0 +1,492 @@
+"""How a CSV file is written: encoding, comments, delimiter, decimal mark, header, and what a cell holds.
+
+What is decided can be seen and overruled: it stands in the map under `[csv]`.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from ...common.errors import InputError
+from ..units import kind_of
+from .stamps import forms_of
+
+__all__ = [
+    "HEXADECIMAL",
+    "MISSING",
+    "Dialect",
+    "cells_of",
+    "dialect_of",
+    "facts_above",
+    "header_of",
+    "in_comments",
+    "is_number",
+    "kind_of_cells",
+    "plain_lines",
+    "plain_number",
+    "thousands_of",
+]
+
+MISSING = (
+    "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
+)  # fmt: skip
+HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]{1,15}")  # of a counter; within 63 bits
+_NUMBER = re.compile(r"(?:[+-] *)?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?[iI]nf(inity)?")
+_BLANKS = " \u00a0\u202f\u2009'\u2019"  # between thousands: blanks of all widths, apostrophes
+_GROUPED = {
+    decimal: re.compile(
+        rf"(?:[+-] *)?[0-9]{{1,3}}(?P<mark>[{_BLANKS}{other}])[0-9]{{3}}(?:(?P=mark)[0-9]{{3}})*"
+        rf"{re.escape(decimal)}[0-9]+"
+    )
+    for decimal, other in ((",", "."), (".", ","))
+}  # only with a decimal mark behind it: 1.234 alone may be either
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Cells of a line without the spaces and quotes around them."""
+    if delimiter == "whitespace":
+        return line.split()
+    cells, cell, quoted = [], "", False
+    for mark in line:
+        if mark == '"':
+            quoted = not quoted
+        elif mark == delimiter and not quoted:
+            cells.append(cell.strip())
+            cell = ""
+        else:
+            cell += mark
+    return [*cells, cell.strip()]
+
+
+def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> str:
+    """What cells hold: "number", "stamp", "text", or "empty".
+
+    Args:
+        thousands: The mark between thousands, where it is stated.
+    """
+    held = [cell for cell in cells if cell not in MISSING]
+    if not held:
+        return "empty"
+    if all(is_number(cell, decimal, thousands) for cell in held):
+        return "number"
+    return "stamp" if forms_of(held) else "text"
+
+
+def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
+    """Whether a cell is a number, with marks between thousands where nothing else can be meant, or as stated."""
+    if thousands and re.fullmatch(
+        rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell
+    ):
+        cell = cell.replace(thousands, "")
+    if _GROUPED[decimal].fullmatch(cell) or HEXADECIMAL.fullmatch(cell):
+        return True
+    if decimal == ",":
+        return "." not in cell and bool(_NUMBER.fullmatch(cell.replace(",", ".", 1)))
+    return bool(_NUMBER.fullmatch(cell))
+
+
+def thousands_of(cells: Sequence[str], decimal: str) -> str:
+    """The mark between thousands of numbers, empty where there is none."""
+    for cell in cells:
+        if found := _GROUPED[decimal].fullmatch(cell):
+            return found["mark"]
+    return ""
+
+
+def plain_number(cell: str, decimal: str, thousands: str) -> str:
+    """A number without marks between thousands and without blanks behind its sign, with a point."""
+    plain = cell.replace(thousands, "") if thousands else cell
+    plain = re.sub(r"^([+-]) +", r"\1", plain)
+    return plain.replace(",", ".", 1) if decimal == "," else plain
+
+
+def plain_lines(lines: bytes, delimiter: str, thousands: str, *, apart: bool) -> bytes:
+    """Lines of cells, in UTF-8, likewise; the decimal mark stays.
+
+    Args:
+        apart: Signs stand apart from the digits.
+    """
+    edge = re.escape(delimiter.encode())
+    if apart:
+        lines = re.sub(rb"(?m)(^|" + edge + rb'|")( *[+-]) +(?=[0-9.])', rb"\1\2", lines)
+    if thousands:
+        mark = thousands.encode()
+        start, digits = rb"(?m)(^|" + edge + rb'|")( *[+-]?[0-9]{1,3}', rb"[0-9]{3})+)"
+        grouped = re.compile(start + rb"(?:" + re.escape(mark) + digits + rb'(?=[.,"\r\n]|' + edge + rb"|$)")
+        lines = grouped.sub(lambda found: found[1] + found[2].replace(mark, b""), lines)
+    return lines
+
+
+_FACTS = re.compile(r"^\W*(?P<key>[A-Za-z][\w .#/]{1,40}?)\s*[:=,;\t]+\s*(?P<value>[^;,\t]+?)[\s;,]*$")
+_UNITS_LABEL = re.compile(r"(?:y_)?units?(?:_label)?:?|einheit(?:en)?:?", re.IGNORECASE)
+
+
+def in_comments(
+    lines: Sequence[str], comment: tuple[str, ...], data_line: int, delimiter: str, count: int
+) -> list[tuple[int, list[str]]]:
+    """Commented lines above the rows with as many cells as they: a header that is a comment."""
+    found = []
+    for k, line in enumerate(lines[: data_line - 1], start=1):
+        mark = next((m for m in comment if line.startswith(m)), None)
+        cells = _rejoined(cells_of(line[len(mark) :].strip(), delimiter), count) if mark else []
+        if len(cells) == count and count > 1:
+            found.append((k, cells))
+    return found
+
+
+def _rejoined(cells: list[str], count: int) -> list[str]:
+    """Cells between blanks, each unit in brackets with the name before it, where there are more than columns."""
+    if len(cells) <= count:
+        return cells
+    joined: list[str] = []
+    for cell in cells:
+        if joined and re.fullmatch(r"[\[(].*[\])]", cell):
+            joined[-1] += f" {cell}"
+        else:
+            joined.append(cell)
+    return joined
+
+
+def header_of(
+    above: Sequence[tuple[int, list[str]]], count: int, given: Mapping[str, Any], decimal: str
+) -> tuple[int, int, tuple[str, ...], tuple[str, ...]]:
+    """Line of the names, line of the units, names, units; made-up names where there is no header."""
+    rows = [
+        (k, cells)
+        for k, cells in above
+        if _fits_header(cells, count, decimal) and not _UNITS_LABEL.fullmatch(cells[0])
+    ]
+    rows += [(k, _rejoined(cells, count)) for k, cells in above if len(cells) > count]
+    rows = sorted((k, cells) for k, cells in rows if _fits_header(cells, count, decimal))
+    if "header_line" in given:
+        rows = [(k, cells) for k, cells in above if k == given["header_line"]]
+        rows += [(k, cells) for k, cells in above if k == given.get("units_line", 0)]
+    if not rows:
+        return 0, 0, tuple(f"column {k + 1}" for k in range(count)), ("",) * count
+    units_line, units = _labelled(above, count)
+    of_units = [
+        k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.get("units_line")
+    ]
+    if of_units:
+        units_line, cells = rows[of_units[-1]]
+        rows = rows[: of_units[-1]]
+        units = [cell.strip("[](){} ") for cell in _padded(cells, count)]
+    line, cells = rows[-1]
+    names = _padded(cells, count)
+    if len(set(names) - {""}) < len([n for n in names if n]) and len(rows) > 1:
+        names = _with_group(_padded(rows[-2][1], count), names)
+    names = [name.strip().strip("'\ufeff") for name in names]
+    return line, units_line, tuple(names), tuple("" if u in ("-", "1", "none") else u for u in units)
+
+
+def _labelled(above: Sequence[tuple[int, list[str]]], count: int) -> tuple[int, list[str]]:
+    """Units of a line that says so in its first cell, anywhere above the rows, and that of its abscissa."""
+    line, units = 0, [""] * count
+    for k, cells in above:
+        if cells and _UNITS_LABEL.fullmatch(cells[0]) and any(kind_of(cell) for cell in cells[1:] if cell):
+            line, units = k, ["", *_padded(cells[1:], count - 1)[: count - 1]]
+    if any(cells[:2] == ["X_Dimension", "Time"] for _, cells in above):
+        units[0] = "s"  # of a LabVIEW measurement file
+    return line, units
+
+
+def _fits_header(cells: Sequence[str], count: int, decimal: str) -> bool:
+    """A header has as many cells as the rows (one less where the rows end with a delimiter), and words."""
+    if not (len(cells) == count or (len(cells) == count - 1 and count > 2)):
+        return False
+    return any(cell and not is_number(cell, decimal) for cell in cells)
+
+
+def _padded(cells: Sequence[str], count: int) -> list[str]:
+    return [*cells, *[""] * (count - len(cells))]
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """Whether a line holds units: at least half of its words are, or two fifths and two of them,
+    and one of them is of time, temperature or rate.
+    """
+    words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
+    known = sum(kind_of(word) is not None or _in_brackets(cells, word) for word in words)
+    of_kinds = sum(kind_of(word) is not None for word in words)
+    return (
+        bool(words)
+        and of_kinds > 0
+        and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
+    )
+
+
+def _in_brackets(cells: Sequence[str], word: str) -> bool:
+    """Whether a word stands in brackets of its own."""
+    return any(cell.strip()[:1] in "[(" and word in cell for cell in cells if cell.strip())
+
+
+def _with_group(groups: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Names under headings: each heading holds until the next one."""
+    joined, heading = [], ""
+    for group, name in zip(groups, names, strict=True):
+        heading = group or heading
+        joined.append(f"{heading} {name}".strip() if heading != name else name)
+    return joined
+
+
+def facts_above(lines: Sequence[str], header: int) -> dict[str, str]:
+    """`key: value` lines above the header."""
+    return dict(_fact_pairs([line for k, line in enumerate(lines, start=1) if k != header][:200]))
+
+
+def _fact_pairs(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
+    for line in lines:
+        if found := _FACTS.match(line.lstrip("#%!*/ ")):
+            yield found["key"].strip().lower(), found["value"].strip().strip('"')
+
+
+_DELIMITERS = (";", "\t", ",", "|", "whitespace")
+_COMMENTS = ("#", "%", "//", "!", "*")
+_ENOUGH = 0.8  # share of the rows below a header that must be numbers: loggers leave cells empty
+_LAST, _FEWEST = 60, 5  # lines that are looked at, at most and at least
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a CSV file is written.
+
+    Attributes:
+        encoding: Name of the codec.
+        delimiter: One character, or "whitespace".
+        decimal: "." or ",".
+        comment: Beginnings of lines that hold no rows.
+        header_line: Line of the names, from 1; 0: there is none.
+        units_line: Line of the units, from 1; 0: there is none.
+        data_line: First line of rows, from 1.
+        names: Names of the columns; empty for a column that only ends the lines.
+        units: Units by column, empty where none are given.
+        missing: What cells without a number hold.
+        thousands: The mark between thousands; empty: there is none.
+        apart: Signs stand apart from the digits.
+        facts: `key: value` lines above the header.
+    """
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    comment: tuple[str, ...]
+    header_line: int
+    units_line: int
+    data_line: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    missing: tuple[str, ...] = MISSING
+    thousands: str = ""
+    apart: bool = False
+    facts: dict[str, str] = field(default_factory=dict)
+
+    def to_map(self) -> dict[str, Any]:
+        """The dialect as `[csv]` of a map."""
+        comment: Any = self.comment[0] if len(self.comment) == 1 else list(self.comment)
+        found = {
+            "encoding": self.encoding,
+            "delimiter": self.delimiter,
+            "decimal": self.decimal,
+            "comment": comment,
+            "header_line": self.header_line,
+            "units_line": self.units_line,
+        }
+        extra = [token for token in self.missing if token not in MISSING]
+        found |= {"thousands": self.thousands} if self.thousands else {}
+        return found | ({"missing": extra} if extra else {})
+
+
+def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool) -> Dialect:
+    """The dialect of a file.
+
+    Args:
+        name: Name of the file, for messages.
+        head: Its first bytes.
+        given: `[csv]` of a map; its keys are not guessed.
+        whole: Whether the head is all of the file.
+
+    Raises:
+        InputError: No rows of numbers can be found.
+    """
+    encoding = given.get("encoding") or _encoding(head)
+    text = _text(name, head, encoding)
+    lines = re.split(r"\r\n|\n|\r", text)[: None if whole else -1]
+    comment = _comments(lines, given)
+    kept = _kept(name, lines, comment)
+    delimiter, decimal = _separators(name, [line for _, line in kept], given)
+    split = [(k, cells_of(line, delimiter)) for k, line in kept]
+    count = _usual_count(split)
+    first = _first_row(name, split, count, decimal, int(given.get("header_line") or 0))
+    above = [(k, cells) for k, cells in split if k < split[first][0]]
+    above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
+    header, units_line, names, units = header_of(above, count, given, decimal)
+    _check_commas(name, header, above, count)
+    return Dialect(
+        encoding=encoding,
+        delimiter=delimiter,
+        decimal=decimal,
+        comment=comment,
+        header_line=header,
+        units_line=units_line,
+        data_line=split[first][0],
+        names=names,
+        units=units,
+        missing=(*MISSING, *given.get("missing", ())),
+        **_digits([cell for _, row in split[first:] for cell in row], decimal, given),
+        facts=facts_above(lines[: split[first][0] - 1], header),
+    )
+
+
+def _kept(name: str, lines: Sequence[str], comment: tuple[str, ...]) -> list[tuple[int, str]]:
+    """Lines that hold something, with their numbers.
+
+    Raises:
+        InputError: There is none.
+    """
+    kept = [
+        (k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)
+    ]
+    if not kept:
+        raise InputError(name, "no lines of rows", "a header and rows of numbers")
+    return kept
+
+
+def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]], count: int) -> None:
+    """One mark does not part both columns and decimals.
+
+    Raises:
+        InputError: It does: the rows have two cells for each name.
+    """
+    if not header and above and 2 * len(above[-1][1]) == count > 2:
+        found = f"{count // 2} names above rows of {count} cells: one mark parts columns and decimals"
+        raise InputError(
+            f"{name}, line {above[-1][0]}", found, "the file exported again with semicolons or tabs"
+        )
+
+
+def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """How numbers are written besides their decimal mark."""
+    apart = any(cell[:2] in ("+ ", "- ") for cell in cells)
+    return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "apart": apart}
+
+
+def _encoding(head: bytes) -> str:
+    for mark, encoding in (
+        (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF16_LE, "utf-16"),
+        (codecs.BOM_UTF16_BE, "utf-16"),
+    ):
+        if head.startswith(mark):
+            return encoding
+    if head[1:400:2].count(0) > 0.4 * len(head[1:400:2]):
+        return "utf-16-le"
+    if head[0:400:2].count(0) > 0.4 * len(head[0:400:2]):
+        return "utf-16-be"
+    try:
+        codecs.getincrementaldecoder("utf-8")("strict").decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _text(name: str, head: bytes, encoding: str) -> str:
+    strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
+    if strange > 0.01 * len(head) or (b"\x00" in head and not encoding.startswith("utf-16")):
+        raise InputError(
+            name, "binary data of no known format", "text, or a format that docs/import.md lists"
+        )
+    try:
+        text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
+    except LookupError as error:
+        raise InputError(
+            "[csv] encoding", repr(encoding), "an encoding such as utf-8, utf-16, cp1252"
+        ) from error
+    except UnicodeDecodeError as error:
+        line = head[: error.start].count(b"\n") + 1
+        found = f"bytes that are no {encoding}"
+        choices = "--csv encoding=... with cp932 (Japanese), gb18030 (Chinese), cp1251 (Cyrillic) or latin-1"
+        raise InputError(f"{name}, line {line}", found, choices) from error
+    return text
+
+
+def _comments(lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, ...]:
+    stated = given.get("comment")
+    more = (stated,) if isinstance(stated, str) else tuple(stated or ())
+    seen = tuple(mark for mark in _COMMENTS if any(line.startswith(mark) for line in lines)) or ("#",)
+    return tuple(dict.fromkeys((*seen, *more)))
+
+
+def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, str]:
+    """Delimiter and decimal mark that make numbers of most cells of the last lines."""
+    sample = _last(lines)
+    best: tuple[float, int, tuple[str, str]] = (0.0, 0, ("", ""))
+    for delimiter in [given["delimiter"]] if given.get("delimiter") else _DELIMITERS:
+        split = [cells_of(line, delimiter) for line in sample]
+        count, often = Counter(len(cells) for cells in split).most_common(1)[0]
+        rows = [cells for cells in split if len(cells) == count]
+        for decimal in [given["decimal"]] if given.get("decimal") else (".", ","):
+            stated = given.get("thousands", "")
+            kinds = [kind_of_cells(column, decimal, stated) for column in zip(*rows, strict=True)]
+            numbers = sum(kind in ("number", "stamp") for kind in kinds)
+            texts = sum(kind == "text" for kind in kinds)
+            score = often / len(sample) * (numbers - 0.5 * texts) / max(len(kinds) - kinds.count("empty"), 1)
+            counted = 0 if delimiter == "whitespace" else numbers  # blanks also part a date from its time
+            if any(kind == "number" for kind in kinds) and (score, counted) > best[:2]:
+                best = (score, counted, (delimiter, decimal))
+    if not best[2][0]:
+        raise InputError(name, f"no columns of numbers: {sample[-1][:60]!r}", _instead(name, sample[-1]))
+    return best[2]
+
+
+def _instead(name: str, line: str) -> str:
+    """What goes on where lines are no rows of numbers."""
+    if line.lstrip()[:1] in ("{", "["):
+        return "a table: records of JSON as CSV or Parquet, one column for each field"
+    if re.search(r"\w[=:] ?[-+]?[0-9.]", line):
+        return f"numbers alone: sed -E 's/[A-Za-z_]+ ?[=:] ?//g' {name} > {name}.csv takes the words out"
+    if re.search(r"[0-9] ?[A-DF-Za-df-z°%]", line):
+        sed = f"sed -E 's/([0-9]) ?[A-DF-Za-df-z°%][^,;0-9 ]*/\\1/g' {name} > {name}.csv"
+        return f"numbers alone: {sed} takes the units out, and options state them (--rate-unit, ...)"
+    return "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen"
+
+
+def _last(lines: Sequence[T]) -> Sequence[T]:
+    """The last lines: rows, however many lines stand above them in a short file."""
+    return lines[-min(_LAST, max(len(lines) // 4, _FEWEST)) :]
+
+
+def _usual_count(split: Sequence[tuple[int, list[str]]]) -> int:
+    return Counter(len(cells) for _, cells in _last(split)).most_common(1)[0][0]
+
+
+def _first_row(
+    name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int
+) -> int:
+    """Index of the first row of numbers: it and most of the next lines have the kinds of cells of the last ones."""
+    tail = [cells for _, cells in _last(split) if len(cells) == count]
+    kinds = [kind_of_cells(column, decimal) for column in zip(*tail, strict=True)]
+    for k, (line, _) in enumerate(split):
+        if line > header and all(_like(cells, kinds, decimal, count) for _, cells in split[k : k + 1]):
+            following = [_like(cells, kinds, decimal, count) for _, cells in split[k : k + 8]]
+            if sum(following) >= _ENOUGH * len(following):
+                return k
+    raise InputError(
+        name, "no rows of numbers", "rows of numbers; --csv header_line=N names the line of the header"
+    )
+
+
+def _like(cells: Sequence[str], kinds: Sequence[str], decimal: str, count: int) -> bool:
+    if len(cells) != count:
+        return False
+    for cell, kind in zip(cells, kinds, strict=True):
+        if kind == "number" and cell not in MISSING and not is_number(cell, decimal):
+            return False
+        if kind == "stamp" and not forms_of([cell]):
+            return False
+    return True

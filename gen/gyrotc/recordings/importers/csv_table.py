@@ -1,0 +1,341 @@
+"""CSV of any dialect: what stands above the rows, then blocks of whole lines, read by pyarrow."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+
+from ...common.errors import InputError
+from .csv_dialect import (
+    HEXADECIMAL,
+    MISSING,
+    Dialect,
+    cells_of,
+    dialect_of,
+    kind_of_cells,
+    plain_lines,
+    plain_number,
+)
+from .tables import Chunk, Column, LoggerFile, LoggerTable
+
+__all__ = ["CsvTable", "blocks_of", "lines_of", "open_csv"]
+
+_BLOCK_BYTES = 2**23  # of a read: bounds memory; its whole lines are parsed at once
+_LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
+
+
+def blocks_of(path: Path, dialect: Dialect, size: int) -> Iterator[tuple[bytes, int, float]]:
+    """Blocks of whole lines of rows in UTF-8 with LF, the number of their first line, and the share read.
+
+    Raises:
+        InputError: Bytes that the encoding does not know, or a line without end.
+    """
+    decoder = codecs.getincrementaldecoder(dialect.encoding)("strict")
+    plain = dialect.encoding in ("utf-8", "utf-8-sig", "ascii")
+    rest, number, left = b"", 1, size
+    with path.open("rb") as file:
+        while left:
+            block = file.read(min(_BLOCK_BYTES, left))
+            if not block:
+                break
+            left -= len(block)
+            try:
+                text = block if plain else decoder.decode(block, final=not left).encode()
+            except UnicodeDecodeError as error:
+                found = f"bytes that are no {dialect.encoding}"
+                place = f"{path.name}, after line {number + rest.count(10)}"
+                raise InputError(place, found, "another --csv encoding=...") from error
+            block = _with_lf(rest + text, last=not left)
+            end = len(block) if not left else block.rfind(b"\n") + 1
+            if end == 0 and len(block) > _LONGEST_LINE:
+                raise InputError(
+                    f"{path.name}, line {number}", f"{len(block)} bytes and no end", "lines of cells"
+                )
+            lines, rest = block[:end], block[end:]
+            count = lines.count(b"\n")
+            if number < dialect.data_line:
+                skipped = min(dialect.data_line - number, count)
+                lines = lines.split(b"\n", skipped)[skipped] if skipped else lines
+                number += skipped
+                count -= skipped
+            if number >= dialect.data_line and lines:
+                yield lines.removeprefix(codecs.BOM_UTF8), number, 1.0 - left / size
+            number += count
+
+
+def _with_lf(block: bytes, *, last: bool) -> bytes:
+    """Line ends of any kind as LF; a carriage return that ends the block waits for the next one."""
+    if b"\r" not in block:
+        return block
+    if block.endswith(b"\r") and not last:
+        return block[:-1].replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\r"
+    return block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
+    yield from enumerate(lines.decode("utf-8", "replace").split("\n"), start=number)
+
+
+_HEAD_BYTES = 2**18  # for guessing a dialect: about a thousand lines
+_SAMPLE = 40  # rows, half of them from the end, where formats that change show
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
+    """A CSV file with its dialect, told from its head and `[csv]` of a map.
+
+    Raises:
+        InputError: No rows of numbers can be found.
+    """
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+        whole = not file.read(1)
+    if not head.strip():
+        raise InputError(path.name, "is empty", "a header and rows")
+    dialect = dialect_of(path.name, head, given, whole=whole)
+    rows = _sample_rows(head, dialect, whole)
+    columns = tuple(
+        _column(name, unit, dialect, [row[k] for row in rows])
+        for k, (name, unit) in enumerate(zip(_unique(dialect.names), dialect.units, strict=True))
+    )
+    table = CsvTable(
+        name="",
+        columns=columns,
+        path=path,
+        dialect=dialect,
+        size=path.stat().st_size,
+        **_stated_rate(dialect),
+    )
+    return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.to_map())
+
+
+@dataclass(frozen=True)
+class CsvTable(LoggerTable):
+    """The rows of a CSV file.
+
+    Attributes:
+        path: The file.
+        dialect: How it is written.
+        size: Bytes that are read; what is written meanwhile is not.
+        remarks: What was left out while reading, by what it was.
+    """
+
+    path: Path = Path()
+    dialect: Dialect = field(default_factory=lambda: Dialect("utf-8", ",", ".", (), 0, 0, 1, (), ()))
+    size: int = 0
+    remarks: dict[str, int] = field(default_factory=dict)
+
+    def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
+        """As `Table.chunks`: a chunk for each block of lines."""
+        first = 0
+        for lines, number, done in blocks_of(self.path, self.dialect, self.size):
+            rows = self._rows(lines, number, names, last=done >= 1.0)
+            if rows is not None and len(next(iter(rows.values()))):
+                yield Chunk(rows, first, done)
+                first += len(next(iter(rows.values())))
+
+    def place(self, row: int) -> str:
+        """Number of the line of a row."""
+        at = 0
+        for lines, number, _ in blocks_of(self.path, self.dialect, self.size):
+            for line, text in lines_of(lines, number):
+                if self._is_row(text):
+                    if at == row:
+                        return f"line {line}"
+                    at += 1
+        return f"row {row + 1}"
+
+    def _is_row(self, text: str) -> bool:
+        return bool(text.strip()) and not text.startswith(self.dialect.comment) and not self._is_header(text)
+
+    def _is_header(self, text: str) -> bool:
+        cells = cells_of(text, self.dialect.delimiter)
+        names = [name for name in self.dialect.names if name]
+        return bool(self.dialect.header_line) and [c for c in cells if c] == names and not _numeric(names)
+
+    def _rows(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any] | None:
+        plain = self._without_comments(lines)
+        try:
+            return self._fast(plain, names)
+        except (pa.ArrowInvalid, pa.ArrowKeyError):
+            return self._slow(lines, number, names, last=last)
+
+    def _without_comments(self, lines: bytes) -> bytes:
+        for mark in self.dialect.comment:
+            octets = mark.encode()
+            if lines.startswith(octets) or b"\n" + octets in lines:
+                lines = re.sub(rb"(?m)^" + re.escape(octets) + rb"[^\n]*\n?", b"", lines)
+        if self.dialect.delimiter == "whitespace":
+            lines = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", lines)
+            lines = re.sub(rb"[ \t]+", b" ", lines)
+        elif self.dialect.thousands or self.dialect.apart:
+            one = self.dialect
+            lines = plain_lines(lines, one.delimiter, one.thousands, apart=one.apart)
+        return lines
+
+    def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any]:
+        if not lines.strip():
+            return {name: np.empty(0) for name in names}
+        every = [column.name for column in self.columns]
+        delimiter = " " if self.dialect.delimiter == "whitespace" else self.dialect.delimiter
+        table = pacsv.read_csv(
+            pa.BufferReader(lines),
+            pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=every),
+            pacsv.ParseOptions(delimiter=delimiter, ignore_empty_lines=True),
+            pacsv.ConvertOptions(
+                column_types={name: self._type(name) for name in names},
+                include_columns=list(names),
+                null_values=list(self.dialect.missing),
+                strings_can_be_null=True,
+                quoted_strings_can_be_null=True,
+                decimal_point=self.dialect.decimal,
+                check_utf8=False,
+            ),
+        )
+        return {name: _values(table.column(name)) for name in names}
+
+    def _type(self, name: str) -> pa.DataType:
+        column = self.column(name)
+        if column is None or column.kind != "number":
+            return pa.string()
+        long = [c for c in column.sample if len(c) >= 16]
+        whole = long and all(re.fullmatch(r"[+-]?\d{16,18}|", c) for c in column.sample)
+        counted = any(column.sample) and all(HEXADECIMAL.fullmatch(c) for c in column.sample if c)
+        return pa.int64() if whole or counted else pa.float64()
+
+    def _slow(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any]:
+        """The rows of a block cell by cell.
+
+        Raises:
+            InputError: A line that is no row; it says what goes on.
+        """
+        index = {column.name: k for k, column in enumerate(self.columns)}
+        cells: dict[str, list[Any]] = {name: [] for name in names}
+        every = list(lines_of(lines, number))
+        torn = last and not lines.endswith((b"\n", b"\r"))
+        for k, (line, text) in enumerate(every):
+            if not self._is_row(text):
+                self.remarks["repeated header lines"] = self.remarks.get("repeated header lines", 0) + (
+                    bool(text.strip()) and self._is_header(text)
+                )
+                continue
+            row = cells_of(text, self.dialect.delimiter)
+            try:
+                parsed = self._parsed(line, row, names, index)
+            except InputError:
+                if torn and k == len(every) - 1:
+                    self.remarks["unfinished last line"] = 1
+                    break
+                raise
+            for name, value in parsed.items():
+                cells[name].append(value)
+        return {
+            name: np.array(values) if self._type(name) != pa.string() else pa.array(values, pa.string())
+            for name, values in cells.items()
+        }
+
+    def _parsed(
+        self, line: int, row: list[str], names: Sequence[str], index: dict[str, int]
+    ) -> dict[str, Any]:
+        where = f"{self.path.name}, line {line}"
+        if len(row) != len(self.columns):
+            found = f"{len(row)} cells: {self.dialect.delimiter.join(row)[:60]!r}"
+            hint = f'--csv comment="{_beginning(row)}" leaves out lines that begin so'
+            if row and row[0][:1].isdigit():
+                hint = "mend or delete that line, which looks like a row"
+            raise InputError(where, found, f"{len(self.columns)} as in the first rows; {hint}")
+        values: dict[str, Any] = {}
+        for name in names:
+            cell = row[index[name]]
+            if cell in self.dialect.missing:
+                values[name] = float("nan") if self._type(name) != pa.string() else None
+            elif self._type(name) == pa.string():
+                values[name] = cell
+            elif HEXADECIMAL.fullmatch(cell):
+                values[name] = int(cell, 16)
+            else:
+                plain = plain_number(cell, self.dialect.decimal, self.dialect.thousands)
+                if not _NUMBER.fullmatch(plain) and plain.lower().lstrip("+-") not in ("inf", "infinity"):
+                    hint = f'--csv missing="{cell[:20]}" takes it as no reading'
+                    raise InputError(f"{where}, column {name}", repr(cell[:40]), f"a number; {hint}")
+                values[name] = int(plain) if self._type(name) == pa.int64() else float(plain)
+        return values
+
+
+def _values(column: Any) -> Any:
+    """Numbers as numpy arrays, text as one pyarrow array."""
+    joined = column.combine_chunks()
+    if isinstance(joined, pa.ChunkedArray):
+        joined = pa.concat_arrays(joined.chunks) if joined.num_chunks else pa.array([], joined.type)
+    if pa.types.is_string(joined.type):
+        return joined
+    return joined.to_numpy(zero_copy_only=False)
+
+
+def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:
+    text = codecs.getincrementaldecoder(dialect.encoding)("replace").decode(head)
+    lines = re.split(r"\r\n|\n|\r", text)
+    lines = lines[dialect.data_line - 1 :] if whole else lines[dialect.data_line - 1 : -1]
+    rows = [
+        cells_of(line, dialect.delimiter)
+        for line in lines
+        if line.strip() and not line.startswith(dialect.comment)
+    ]
+    rows = [row for row in rows if len(row) == len(dialect.names)]
+    return rows if len(rows) <= _SAMPLE else [*rows[: _SAMPLE // 2], *rows[-_SAMPLE // 2 :]]
+
+
+def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Column:
+    kind = kind_of_cells(cells, dialect.decimal, dialect.thousands)
+    why = f"in line {dialect.units_line}" if unit else ""
+    known = tuple("" if cell in MISSING else cell for cell in cells)
+    return Column(name, unit or None, why, "number" if kind in ("number", "empty") else kind, known)  # type: ignore[arg-type]
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Names that differ: one without a name, or there twice, gets its number."""
+    seen: set[str] = set()
+    result = []
+    for k, name in enumerate(names, start=1):
+        one = name if name and name not in seen else f"{name} #{k}".strip()
+        seen.add(one)
+        result.append(one)
+    return result
+
+
+def _numeric(names: Sequence[str]) -> bool:
+    return all(_NUMBER.fullmatch(name) for name in names)
+
+
+def _beginning(row: Sequence[str]) -> str:
+    word = re.match(r"\W*\w*", row[0] if row else "")
+    return word[0][:20] if word else ""
+
+
+def _stated_rate(dialect: Dialect) -> dict[str, Any]:
+    """Rows per second where a line above the header states them: `Sample rate: 100 Hz`."""
+    for key, value in dialect.facts.items():
+        found = re.match(r"([\d.,]+)\s*(k?hz|/s|sps|samples/s)?", value.lower())
+        if (
+            re.search(r"sampl\w*.{0,3}(rate|freq)|abtastrate|^fs$|output data rate|^odr$", key)
+            and found
+            and found[2]
+        ):
+            rate = float(found[1].replace(",", ".")) * (1000.0 if found[2] == "khz" else 1.0)
+            return {"rate_hz": rate, "why_rate": f"{key}: {value}, above the rows"} if rate > 0.0 else {}
+    return {}
+
+
+def _words(dialect: Dialect) -> str:
+    delimiter = {"\t": "tabs", "whitespace": "spaces"}.get(dialect.delimiter, repr(dialect.delimiter))
+    head = f"header in line {dialect.header_line}" if dialect.header_line else "no header"
+    units = f", units in line {dialect.units_line}" if dialect.units_line else ""
+    return f"CSV, {dialect.encoding}, delimiter {delimiter}, decimals with {dialect.decimal!r}, {head}{units}"

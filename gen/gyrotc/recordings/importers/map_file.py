@@ -1,0 +1,181 @@
+"""`map.toml`: how the files of one logger become a data set, kept so that the next file needs nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from ...common.errors import InputError
+from ...common.inputs import read_toml
+from ..description import dataset_toml
+from .tables import Column, LoggerTable
+
+__all__ = [
+    "MAP_FILE",
+    "Choice",
+    "ColumnMap",
+    "CsvMap",
+    "ImportPlan",
+    "Map",
+    "TimeMap",
+    "load_map",
+    "map_text",
+]
+
+MAP_FILE = "map.toml"
+
+Text = Annotated[str, Field(min_length=1, max_length=256)]
+Texts = Annotated[
+    tuple[Text, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else tuple(value))
+]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class ColumnMap(_Part):
+    """`[columns]`: names in the logger's file; `time` may be two, a date and a time of day."""
+
+    time: Texts = ()
+    temperature: Text | None = None
+    rate: Text | None = None
+    rate_x: Text | None = None
+    rate_y: Text | None = None
+    rate_z: Text | None = None
+    pulses: Text | None = None
+
+    def values(self) -> dict[str, str]:
+        """What is measured, by role: rate, rate_x, rate_y, rate_z or pulses."""
+        roles = ("rate", "rate_x", "rate_y", "rate_z", "pulses")
+        return {role: getattr(self, role) for role in roles if getattr(self, role)}
+
+
+class CsvMap(_Part):
+    """`[csv]`: what is not told from the file itself; None where it is."""
+
+    encoding: Text | None = None
+    delimiter: Text | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: Texts = ()
+    header_line: Annotated[int, Field(ge=0, le=10_000)] | None = None
+    units_line: Annotated[int, Field(ge=0, le=10_000)] | None = None
+    missing: Texts = ()
+    thousands: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+
+    def given(self) -> dict[str, Any]:
+        """The keys that are stated."""
+        return {key: value for key, value in self.model_dump().items() if value not in (None, ())}
+
+
+class TimeMap(_Part):
+    """`[time]`: form of date-time stamps, their zone, or rows per second where no column holds times."""
+
+    format: Text | None = None
+    zone: Text | None = None
+    rate_hz: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
+
+
+class Map(_Part):
+    """A map. Keys that are those of `dataset.toml` go there."""
+
+    serial: Text | None = None
+    description: str = ""
+    earth_rate: Literal["removed", "none", "compute"] | None = None
+    latitude_deg: float | None = None
+    pulse_weight_arcsec: float | None = None
+    table: Text | None = None
+    columns: ColumnMap = ColumnMap()
+    channels: dict[Text, Text] | None = None
+    units: dict[Text, Text] = {}
+    meta: dict[str, Any] = {}
+    noise: dict[str, float] | None = None
+    csv: CsvMap = CsvMap()
+    time: TimeMap = TimeMap()
+
+
+def load_map(path: Path) -> Map:
+    """Reads a map.
+
+    Raises:
+        InputError: It is no map; the field is named.
+    """
+    name = path.name
+    content = read_toml(path, "a map that gyrotc import wrote")
+    try:
+        return Map.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            raise InputError(
+                f"{name}, field {field}", "is not known", "a field named in docs/import.md"
+            ) from error
+        expected = first["msg"].removeprefix("Input should be ")
+        raise InputError(f"{name}, field {field}", repr(first["input"])[:80], expected) from error
+
+
+def map_text(chosen: Map) -> str:
+    """A map as TOML, without what is empty."""
+    content = chosen.model_dump()
+    head = {k: v for k, v in content.items() if not isinstance(v, dict) and v not in (None, "")}
+    tables = {}
+    for name, table in content.items():
+        if isinstance(table, dict):
+            kept = {k: v for k, v in table.items() if v not in (None, ())}
+            if kept or (name == "channels" and content["channels"] is not None):
+                tables[name] = {
+                    k: v[0] if isinstance(v, tuple) and len(v) == 1 else v for k, v in kept.items()
+                }
+    return dataset_toml(head, tables)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One column and what it is taken for.
+
+    Attributes:
+        role: "time", "temperature", "rate", "rate_x", ..., "pulses", or the name of a channel.
+        table: The table that holds it.
+        column: The column.
+        unit: Its unit; None for stamps, pulses and channels without one.
+        why: The reasons, in words.
+    """
+
+    role: str
+    table: LoggerTable
+    column: Column
+    unit: str | None
+    why: str
+
+    @property
+    def source(self) -> str:
+        """The column as a map names it."""
+        return f"{self.table.name}/{self.column.name}" if self.table.name else self.column.name
+
+
+@dataclass(frozen=True, slots=True)
+class ImportPlan:
+    """What is read of a file.
+
+    Attributes:
+        main: The table with the rates; its rows are the rows of the run.
+        time: Columns of time, one or two; none where rows are counted.
+        temperature: The temperature; its table may be another one.
+        values: Rates by axis, one rate, or pulses.
+        channels: Auxiliary channels of the main table.
+        rate_hz: Rows per second where rows are counted, with the reason in `why_rate`.
+        left_out: Numeric columns of the main table that are not taken.
+    """
+
+    main: LoggerTable
+    time: tuple[Choice, ...]
+    temperature: Choice
+    values: tuple[Choice, ...]
+    channels: tuple[Choice, ...]
+    rate_hz: float | None
+    why_rate: str
+    left_out: tuple[str, ...]

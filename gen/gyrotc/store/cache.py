@@ -1,0 +1,187 @@
+"""What is kept between calls, by hashes of what it depends on.
+
+A file is the SHA-256 of its content and then the content. What protects whom: the folder is the user's own (made with
+mode 0700; one that belongs to somebody else, or that others may write, is not used), the checksum finds damage, and who
+reads a content takes nothing from it but what it should hold. Whatever does not fit is thrown away and computed again.
+`joblib.Memory` keeps results on disk as well, but has neither: it unpickles whatever lies there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import stat
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .. import __version__, _core
+from ..common.errors import InputError
+from ..common.inputs import read_input
+from ..common.runtime import runtime_folders
+from .files import digest_of, write_atomically
+from .marker import sha256
+
+__all__ = ["clear", "folder", "held", "inputs_of", "keep", "kept", "limit", "program_of", "set_limit"]
+
+_COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures come out of
+
+
+@functools.cache
+def program_of() -> str:
+    """SHA-256 of the program: the package, its compiled core, the C runtime, and what they compute with."""
+    here = Path(__file__).resolve().parents[1]
+    parts: list[Any] = [__version__, {name: metadata.version(name) for name in _COMPUTING}]
+    for folder in (here, *runtime_folders()):
+        files = (path for path in _regular(folder) if "__pycache__" not in path.parts)
+        parts.append({path.relative_to(folder).as_posix(): sha256(path) for path in files})
+    return digest_of([*parts, sha256(Path(_core.__file__))])
+
+
+def inputs_of(dataset: Path) -> dict[str, str]:
+    """Every file of a data set by its path in it, with the SHA-256 of its contents, or why it cannot be read."""
+    found = {}
+    for path in _regular(dataset):
+        try:
+            found[str(path.relative_to(dataset))] = sha256(path)
+        except OSError as error:
+            found[str(path.relative_to(dataset))] = str(error.strerror)
+    return found
+
+
+def _regular(folder: Path) -> Iterator[Path]:
+    """Regular files below a folder in the order of their names; each folder once, also behind links."""
+    seen = set()
+    for root, folders, names in os.walk(folder, followlinks=True):
+        here = Path(root).stat()
+        if (here.st_dev, here.st_ino) in seen:
+            folders.clear()
+            continue
+        seen.add((here.st_dev, here.st_ino))
+        folders.sort()
+        yield from (path for name in sorted(names) if _is_regular(path := Path(root) / name))
+
+
+def _is_regular(path: Path) -> bool:
+    try:
+        return stat.S_ISREG(path.stat().st_mode)
+    except OSError:
+        return False
+
+
+T = TypeVar("T")
+
+_MOST_BYTES = 2 * 10**9  # some dozens of banks of signatures, beside which diagnoses are small
+_LIMIT = "limit_bytes"  # a file beside what is kept that says otherwise
+_MAGIC = b"gyrotc kept\n"
+_SUM_BYTES = hashlib.sha256().digest_size
+
+
+def folder() -> Path:
+    """Where everything is kept."""
+    root = os.environ.get("XDG_CACHE_HOME")
+    return (Path(root) if root else Path.home() / ".cache") / "gyrotc" / "kept"
+
+
+def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
+    """What was kept under a name.
+
+    Args:
+        name: Name of the file: a hash, and the kind after a point.
+        content_of: Makes it of its bytes; may raise anything, or give None, where they are not what they should be.
+
+    Returns:
+        None where there is none, or where the file is not as it was written or does not hold what it should (it is
+        removed).
+    """
+    path = folder() / name
+    return _read(path, content_of) if _is_own() and path.is_file() else None
+
+
+def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
+    try:
+        data = read_input(path, "recording_mib", "what was kept")
+        head, content = data[: len(_MAGIC) + _SUM_BYTES], data[len(_MAGIC) + _SUM_BYTES :]
+        if head == _MAGIC + hashlib.sha256(content).digest():
+            found = content_of(content)
+            if found is not None:
+                os.utime(path, follow_symlinks=False)
+                return found
+    except (InputError, OSError):
+        return None
+    except Exception:  # written by another program or version: reading it may raise anything
+        pass
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+    return None
+
+
+def keep(name: str, content: bytes) -> None:
+    """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
+    with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
+        if _is_own():
+            write_atomically(folder() / name, _packed(content))
+            _trim()
+
+
+def _packed(content: bytes) -> bytes:
+    return _MAGIC + hashlib.sha256(content).digest() + content
+
+
+def _is_own() -> bool:
+    """Whether the folder is there, is the user's and nobody else may write into it."""
+    try:
+        folder().mkdir(parents=True, exist_ok=True, mode=0o700)
+        facts = folder().stat()
+    except OSError:
+        return False
+    return facts.st_uid == os.geteuid() and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def limit() -> int:
+    """Most bytes that everything may take."""
+    try:
+        return min(int((folder() / _LIMIT).read_text("ascii")[:20]), 10**15)
+    except (OSError, ValueError):
+        return _MOST_BYTES
+
+
+def set_limit(most: int) -> None:
+    """Keeps to another limit from now on.
+
+    Raises:
+        InputError: The folder is not there and cannot be made, or is not the user's own.
+    """
+    if not _is_own():
+        raise InputError(str(folder()), "is not a folder that only this user may write", "such a folder")
+    write_atomically(folder() / _LIMIT, f"{most}\n")
+    _trim()
+
+
+def held(kind: str = "*") -> tuple[int, int]:
+    """How many files there are of a kind, and their bytes."""
+    sizes = [path.stat().st_size for path in _files(kind)]
+    return len(sizes), sum(sizes)
+
+
+def clear() -> None:
+    """Removes all of it."""
+    for path in _files():
+        path.unlink(missing_ok=True)
+
+
+def _trim() -> None:
+    """Drops what was not used for longest, down to the limit."""
+    most = limit()
+    total = 0
+    for path in sorted(_files(), key=lambda p: p.stat().st_mtime, reverse=True):
+        total += path.stat().st_size
+        if total > most:
+            path.unlink(missing_ok=True)
+
+
+def _files(kind: str = "*") -> list[Path]:
+    return list(folder().glob(f"*.{kind}"))

@@ -1,0 +1,349 @@
+"""Write the C files of a model: tables, runtime, image, vectors, board test, example.
+
+A pure function of the model: no date,
+no path, no host, no version, so one model gives the same bytes on every machine. All arithmetic was
+done in `tables.quantise`; here integers are printed.
+"""
+
+from __future__ import annotations
+
+import functools
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal, localcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import CheckFailed, InputError
+from ..common.runtime import runtime_folders
+from ..common.texts import CText, c_code, c_environment, c_literal
+from ..model import Model
+from ..store.files import write_own
+from ..store.folder import result_folder
+from ..target.history import answers
+from ..target.table import LAYOUT, Table
+from .amalgamate import amalgamate
+from .error_bounds import MARGIN, channel_error_dph
+from .quantise import NUMERICS, quantise
+from .record import RECORD, Options, read_options, record_text
+from .rounding import channel_names
+from .text import example_values, table_text
+from .vectors import MISSING, Vectors, answers_text, make_vectors
+
+__all__ = [
+    "Emission",
+    "board_test_text",
+    "emit",
+    "emit_texts",
+    "emitted_tables",
+    "expected_answers",
+    "quantise_all",
+    "write_texts",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What was written: the tables by arithmetic, and the arithmetics that `quantise` refused, with why."""
+
+    tables: dict[str, Table]
+    refused: dict[str, str]
+
+
+def quantise_all(
+    model: Model, numerics: Sequence[str] | None, say: Callable[[str], None] = lambda _: None
+) -> Emission:
+    """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
+
+    Raises:
+        InputError: An unknown arithmetic, or a method that has no table.
+        CheckFailed: An arithmetic asked for by name is refused, or none remains.
+    """
+    if model.method in ("poly", "poly_slope"):
+        raise InputError(
+            "model.json, field method", f"{model.method!r} is for comparison only", "a network (mrbf, ...)"
+        )
+    unknown = sorted(set(numerics or ()) - set(NUMERICS))
+    if unknown:
+        raise InputError("--numeric", repr(unknown[0]), " or ".join(NUMERICS))
+    tables: dict[str, Table] = {}
+    refused: dict[str, str] = {}
+    for numeric in NUMERICS if numerics is None else tuple(dict.fromkeys(numerics)):
+        say(f"rounding to {numeric}")
+        try:
+            tables[numeric] = quantise(model, numeric)
+        except CheckFailed as error:
+            if numerics is not None:
+                raise
+            refused[numeric] = str(error)
+    if not tables:
+        raise CheckFailed("; ".join(refused.values()))
+    return Emission(tables, refused)
+
+
+def emit(
+    model: Model,
+    out: Path,
+    *,
+    numerics: Sequence[str] | None = None,
+    zero_at: float | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Emission:
+    """Writes `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced."""
+    emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics, progress)
+    progress("answering the vectors")
+    texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at)
+    write_texts(out, texts, model)
+    return emission
+
+
+def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
+    """The tables that an emitted folder must hold: made again from the model, with the same options.
+
+    Raises:
+        InputError: There is no emitted code, or its record is damaged.
+    """
+    options = read_options(folder)
+    return quantise_all(options.shifted(model), options.numeric).tables
+
+
+def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
+    """Puts a folder with exactly these files in place of `out/c`.
+
+    Raises:
+        InputError: Something in `out/c` was not written by gyrotc, or was changed since.
+    """
+    with result_folder(out, "emit", entries=("c",)) as stage:
+        stage.of(model.serial, model.axis)
+        (stage.folder / "c").mkdir()
+        for name, data in texts.items():
+            write_own(stage.folder / "c" / name, data)
+
+
+def emit_texts(
+    model: Model,
+    emission: Emission,
+    *,
+    asked: bool = False,
+    zero_at: float | None = None,
+) -> dict[str, bytes]:
+    """All files of `c/` by name.
+
+    Args:
+        model: The model, before `zero_at` shifts it.
+        emission: Its tables.
+        asked: The arithmetics were asked for by name.
+        zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+    """
+    return dict(_texts(_Made(model.hash, model, emission), asked, zero_at))
+
+
+def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.uint32]]:
+    """Answers of the tables to the model's vectors by arithmetic: (status, bits), shape (n, 2), not to write to."""
+    return dict(_expected(_Made(model.hash, model, emission)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A model and its tables; another one is the same if the model's hash is, and the tables are the same objects."""
+
+    hash: str
+    model: Model
+    emission: Emission
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Made) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self.hash, tuple((numeric, id(table)) for numeric, table in self.emission.tables.items())
+
+
+@functools.lru_cache(maxsize=2)
+def _vectors(made: _Made) -> Vectors:
+    return make_vectors(made.model, tuple(made.emission.tables))
+
+
+@functools.lru_cache(maxsize=2)
+def _expected(made: _Made) -> dict[str, NDArray[np.uint32]]:
+    """Kept for the next stages of the same job, which ask again; so are the texts."""
+    found = {numeric: answers(table, _vectors(made)) for numeric, table in made.emission.tables.items()}
+    for rows in found.values():
+        rows.flags.writeable = False
+    return found
+
+
+@functools.lru_cache(maxsize=2)
+def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
+    model, emission = made.model, made.emission
+    numerics = tuple(emission.tables)
+    options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
+    vectors = _vectors(made)
+    texts = _from_templates(model, emission, options, vectors)
+    header, source = amalgamate(
+        *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
+    )
+    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
+    texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
+    for numeric, table in emission.tables.items():
+        suffix = "" if numeric == numerics[0] else f"_{numeric}"
+        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
+    texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
+    texts[RECORD] = record_text(model, options, texts)
+    return texts
+
+
+def _from_templates(model: Model, emission: Emission, options: Options, vectors: Vectors) -> dict[str, bytes]:
+    """Header, table, vectors and example of a model."""
+    numerics = tuple(emission.tables)
+    values: dict[str, Any] = {
+        "id": model.id,
+        "symbol": model.symbol,
+        "serial": model.serial,
+        "axis": model.axis,
+        "model_hash": model.hash,
+        "options": options.text,
+        "layout": LAYOUT,
+        "numerics": numerics,
+        "v": vectors,
+        "n": numerics[0],
+        "n_channels": vectors.n_channels,
+        "id_code": emission.tables[numerics[0]].id,
+        "tables": [table_text(t, model) for t in emission.tables.values()],
+        "facts": list(_facts(model)),
+        "valid": _valid(model),
+        "block_s": f"{model.block_s:g}",
+        "sizes": list(_sizes(model, emission)),
+        "macros": list(_macros(model, emission)),
+        "warnings": list(model.warnings),
+        **example_values(model),
+    }
+    named = {
+        f"gtc_{model.id}.h": "table.h.j2",
+        f"gtc_{model.id}.c": "table.c.j2",
+        f"vectors_{model.id}.h": "vectors.h.j2",
+        "main.c": "main.c.j2",
+    }
+    return {name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+
+
+def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
+    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
+    template = c_environment().get_template("board_test.c.j2")
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
+    )
+    return text.encode("ascii")
+
+
+def _facts(model: Model) -> Iterator[str]:
+    """Calibration date and meta, one line each; the template makes them safe."""
+    for key, value in sorted(model.meta.items()):
+        if key in ("warnings", "environments") or isinstance(value, (dict, list)):
+            continue
+        text = " ".join(str(value).split())
+        yield f"{key[:24] + ':':<12} {text[:120]}"
+
+
+def _valid(model: Model) -> str:
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    return f"{t0:.2f} ... {t1:.2f} C, {r0:.3f} ... {r1:.3f} C/min"
+
+
+def _sizes(model: Model, emission: Emission) -> Iterator[str]:
+    for numeric, table in emission.tables.items():
+        of_channels = channel_error_dph(model, table.numeric, table.bias_frac_bits)
+        beside = f", curves and products of channels: {_upwards(of_channels)}" if of_channels else ""
+        yield (
+            f"{numeric + ':':<12} {table.read_only_bytes} bytes of read-only data, "
+            f"{table.table_bytes} of them parameters; "
+            f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded{beside})"
+        )
+        if table.n_stand_ins:
+            yield (
+                f"{numeric} stand-ins: {table.stand_in_bytes} of these parameters stand in for channels that are "
+                f"lost; of each |error| <= {_upwards(max(table.stand_in_bounds_dph))} deg/h"
+            )
+
+
+def _upwards(bound: float) -> str:
+    """A bound with three digits, never below itself."""
+    with localcontext() as context:
+        context.rounding = ROUND_CEILING
+        return f"{float(f'{Decimal(bound):.2e}'):.2e}"
+
+
+def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
+    """What a program needs of a table before it runs: name behind GTC_<ID>_, text, comment."""
+
+    def number(name: str, text: str, comment: str) -> dict[str, str]:
+        return {"name": name, "text": c_code(text), "comment": comment}
+
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    yield number("BLOCK_US", f"{round(model.block_s * 1e6)}UL", "block length, microseconds")
+    edges = (("T_MIN_C", t0), ("T_MAX_C", t1), ("SLOPE_MIN_C_PER_MIN", r0), ("SLOPE_MAX_C_PER_MIN", r1))
+    for name, value in edges:
+        text = CText(f"({c_code(f'{value:#.7g}F')})")
+        yield {"name": name, "text": text, "comment": "envelope: beyond it GTC_CLAMPED"}
+    yield from _time_macros(model)
+    yield from _authority_macros(emission)
+    names = channel_names(model)
+    yield number("N_CHANNELS", f"{1 + len(names)}", "numbers of a sample")
+    channels = [("temperature_c", "C, of the gyro's own sensor"), *((n, "unit as recorded") for n in names)]
+    for k, (name, unit) in enumerate(channels):
+        yield {"name": f"CHANNEL_{k}", "text": CText(f'"{c_literal(name)}"'), "comment": unit}
+    for numeric, table in emission.tables.items():
+        if numeric == "q31":
+            yield number("Q31_BIAS_FRAC_BITS", f"{table.bias_frac_bits}", "bias in 2^-this deg/h")
+        size = f"{table.read_only_bytes}UL"
+        yield number(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
+
+
+def _macro(name: str, text: CText, comment: str) -> dict[str, str]:
+    return {"name": name, "text": text, "comment": comment}
+
+
+def _time_macros(model: Model) -> Iterator[dict[str, str]]:
+    block_us = max(1, round(model.block_s * 1e6))
+    longest, shortest = block_us + block_us // 1000, max(1, -(-block_us // 2**20))
+    yield _macro("PERIOD_MIN_US", c_code(f"{shortest}UL"), "shortest sample period, microseconds")
+    yield _macro("PERIOD_MAX_US", c_code(f"{longest}UL"), "longest sample period")
+    stuck = f"{round(model.stuck_s * 1e6)}UL"
+    told = (
+        "a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck"
+    )
+    yield _macro("STUCK_US", c_code(stuck), told)
+
+
+def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
+    """The widest of the arithmetics."""
+    ends = [table.decode_bias(table.authority) for table in emission.tables.values()]
+    values = {"MIN": min(low for low, _ in ends), "MAX": max(high for _, high in ends)}
+    for name, value in values.items():
+        text = CText(f"({c_code(f'{value:#.9g}F')})")
+        told = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of the range"
+        yield _macro(f"AUTHORITY_{name}_DPH", text, told)
+
+
+def _image(table: Table) -> bytes:
+    return struct.pack(f"<{len(table.words)}I", *table.words)
+
+
+def _intel_hex(data: bytes) -> str:
+    def record(kind: int, address: int, payload: bytes) -> str:
+        body = bytes([len(payload), address >> 8 & 255, address & 255, kind]) + payload
+        return ":" + (body + bytes([-sum(body) & 255])).hex().upper() + "\n"
+
+    lines = []
+    for start in range(0, len(data), 16):
+        if start and start % 65536 == 0:
+            lines.append(record(4, 0, struct.pack(">H", start >> 16)))
+        lines.append(record(0, start & 0xFFFF, data[start : start + 16]))
+    return "".join(lines) + record(1, 0, b"")

@@ -1,0 +1,413 @@
+"""What both arithmetics' tables share: settings, coverage bits, guards, terms, sigma, exact solving.
+
+A table is a pure function of its model, whatever processor makes it; `np.exp`, `@` and LAPACK are not.
+Here are the few functions needed, in operations that IEEE 754 defines, in a fixed order.
+
+The sum of the single Gaussians' slopes is far too large a bound where weights of opposite sign stand side
+by side; here the slope of the whole map is taken on a grid, plus what it can grow between the grid's points.
+
+A cause says what its record holds (`causes.base`); here are the numbers of both arithmetics.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import zlib
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.errors import CheckFailed
+from ..model import Guard, Model, Rules, Term, Uncertainty
+from ..target.recursions import TableKind
+from ..target.table import SERIAL_WORDS, Numeric, Words, f32_words
+from ..train.samples import PLAUSIBLE_C
+
+__all__ = [
+    "STEEPEST",
+    "TEMPERATURE",
+    "Shared",
+    "channel_names",
+    "coverage_words",
+    "exp2_of_minus",
+    "f32_terms",
+    "gram",
+    "guard_of",
+    "guard_words",
+    "largest_gradient",
+    "q31_terms",
+    "shared",
+    "sigma_cells",
+    "sigma_values",
+    "solve",
+    "term_size_dph",
+]
+
+_S_PER_MIN = 60.0  # a minute
+_S_PER_H = 3600.0  # an hour
+
+
+def sigma_cells(model: Model) -> tuple[int, int]:
+    """Cells of T and of the slope; 0, 0 where the model does not say how uncertain it is."""
+    known = model.uncertainty_dph
+    return known.cells if known and known.rules else (0, 0)
+
+
+def sigma_values(model: Model, frac_bits: int | None = None) -> NDArray[np.float64]:
+    """The words as numbers, in the units of gtc_sigma.inl; empty where the model does not say.
+
+    Args:
+        frac_bits: Fraction bits of a bias in fixed point: numbers are whole then. None: float32.
+    """
+    known = model.uncertainty_dph
+    if known is None or known.rules is None:
+        return np.zeros(0)
+    biases = [*_grids(known, known.rules), *_rules(known.rules, model.block_s), *known.rules.terms]
+    values = np.array(biases)
+    correlation = 2 * known.cells[0] * known.cells[1] + len(_rules(known.rules, model.block_s)) - 1
+    if frac_bits is None:
+        return values
+    scale = np.full(values.size, 2.0**frac_bits)
+    scale[correlation] = 1.0
+    return np.asarray(np.rint(np.minimum(values * scale, 2.0**31 - 1)))
+
+
+def _grids(known: Uncertainty, rules: Rules) -> list[float]:
+    """Covered cells, uncovered ones, without the constant from power-on to power-on."""
+    both = np.array([known.rows, known.uncovered or known.rows])
+    apart = np.sqrt(np.maximum(both**2 - rules.between_dph**2, 0.0))
+    return [float(sigma) for sigma in apart.reshape(-1)]
+
+
+def _rules(rules: Rules, block_s: float) -> list[float]:
+    """In the order of gtc_sigma.inl; the last one is a time."""
+    per_min = block_s / _S_PER_MIN
+    return [
+        rules.hold_dph_per_c,
+        rules.rest_dph_per_min * per_min,
+        rules.slope_dph_per_c_per_min / per_min,
+        rules.start_dph,
+        rules.beyond_dph_per_c,
+        rules.beyond_dph_per_c_per_min / per_min,
+        rules.fallback_dph,
+        rules.none_dph,
+        rules.between_dph,
+        rules.noise_deg_per_sqrt_h * np.sqrt(_S_PER_H),
+        rules.correlation_s,
+    ]
+
+
+#: Largest derivative of exp(-x²): at x = 1/√2.
+STEEPEST = 0.8577638849607068
+
+
+class Shared(TypedDict):
+    """Members of a table that are integers in every arithmetic."""
+
+    name: str
+    id: int
+    calibrated: int
+    block_us: int
+    slope_blocks: int
+    lead_blocks: int
+    coverage_cells: tuple[int, int]
+    sigma_cells: tuple[int, int]
+    serial: Words
+    coverage: Words
+
+
+def shared(model: Model) -> Shared:
+    """The members that need no rounding."""
+    coverage = model.coverage
+    return Shared(
+        name=model.id,
+        id=zlib.crc32(model.id.encode("ascii")),
+        calibrated=_date(model),
+        block_us=max(1, round(model.block_s * 1e6)),
+        slope_blocks=model.slope_blocks,
+        lead_blocks=model.lead_blocks,
+        coverage_cells=coverage.cells if coverage else (0, 0),
+        sigma_cells=sigma_cells(model),
+        serial=_serial_words(model.serial),
+        coverage=coverage_words(model),
+    )
+
+
+def coverage_words(model: Model) -> Words:
+    """One bit a cell, T fastest, 32 cells a word, low bit first."""
+    if model.coverage is None:
+        return np.zeros(0, dtype=np.uint32)
+    bits = [c == "1" for c in itertools.chain.from_iterable(model.coverage.rows)]
+    padded = np.zeros(-(-len(bits) // 32) * 32, dtype=np.uint32)
+    padded[: len(bits)] = bits
+    words: Any = padded.reshape(-1, 32) << np.arange(32, dtype=np.uint32)
+    return np.asarray(np.bitwise_or.reduce(words, axis=1), dtype=np.uint32)
+
+
+def _serial_words(serial: str) -> Words:
+    """Four characters a word, the first one lowest; zeros behind the end."""
+    octets = serial.encode("ascii").ljust(4 * SERIAL_WORDS, b"\0")
+    return np.frombuffer(octets, dtype="<u4").astype(np.uint32)
+
+
+def _date(model: Model) -> int:
+    """Date of calibration as a decimal number yyyymmdd; 0 where `[meta]` has none in ISO 8601."""
+    found = re.match(r"(\d{4})-(\d{2})-(\d{2})", str(model.meta.get("calibrated_on", "")))
+    return int("".join(found.groups())) if found else 0
+
+
+Floats = NDArray[np.floating[Any]]
+
+_LN2 = 0.6931471805599453  # ln 2
+_DEGREE = 17  # of the series of e^y, |y| < ln 2: what is left out is below 2^-60
+
+
+def exp2_of_minus(u: Any) -> Floats:
+    """2^-u for u >= 0, to about 3e-16; 0 beyond 1000."""
+    x = np.minimum(np.asarray(u, dtype=np.float64), 1000.0)
+    whole = np.floor(x)
+    y = (x - whole) * -_LN2
+    total = np.ones_like(y)
+    for n in range(_DEGREE, 0, -1):
+        total = total * y / n + 1.0
+    return np.asarray(np.where(x < 1000.0, np.ldexp(total, -whole.astype(np.int64)), 0.0))
+
+
+def gram(a: Floats, b: Floats) -> Floats:
+    """Σ over rows of a[k, i] · b[k, j], added row after row: shape (a.shape[1], b.shape[1])."""
+    total = np.zeros((a.shape[1], b.shape[1]))
+    for row_a, row_b in zip(a, b, strict=True):
+        total = total + row_a[:, None] * row_b[None, :]
+    return total
+
+
+def solve(matrix: Floats, right: Floats) -> Floats:
+    """x of matrix · x = right for a symmetric positive definite matrix, by Cholesky.
+
+    Raises:
+        ArithmeticError: The matrix is not positive definite to working precision.
+    """
+    n = len(right)
+    left = matrix.copy()
+    x = right.copy()
+    for j in range(n):
+        pivot = left[j, j]
+        if not pivot > 0.0:
+            raise ArithmeticError("matrix is not positive definite")
+        column = left[j:, j] / math.sqrt(pivot)
+        left[j:, j] = column
+        left[j + 1 :, j + 1 :] -= column[1:, None] * column[None, 1:]
+    for j in range(n):
+        x[j] = x[j] / left[j, j]
+        x[j + 1 :] -= x[j] * left[j + 1 :, j]
+    for j in range(n - 1, -1, -1):
+        x[j] = x[j] / left[j, j]
+        x[:j] -= x[j] * left[j, :j]
+    return np.asarray(x)
+
+
+# Of T and of dT/dt: the bound is loose by what a slope grows between them, the time grows with their number
+_POINTS = (513, 257)
+_STEEPEST = 0.8577638849607068  # largest |d/dx exp(-x²)|, at x = 1/√2
+_MOST_CURVED = 2.0  # largest |d²/dx² exp(-x²)|
+_LOG2E = 1.4426950408889634  # log2(e)
+
+
+def largest_gradient(
+    linear: Floats, centers: Floats, inverse_widths: Floats, weights: Floats, low: Floats, high: Floats
+) -> NDArray[np.float64]:
+    """Upper bounds of |∂f/∂z_T| and |∂f/∂z_r| over a box of normalised inputs, deg/h, shape (2,).
+
+    The same bits on every machine.
+
+    Args:
+        linear: Linear part, shape (2,).
+        centers: Normalised centers, shape (n, 2).
+        inverse_widths: 1/δ, 0 where a width is infinite, shape (n, 2).
+        weights: Weights, deg/h, shape (n,).
+        low, high: Corners of the box, shape (2,).
+    """
+    bounds = np.zeros(2)
+    for axis in (0, 1):
+        other = 1 - axis
+        moving = [np.linspace(low[k], high[k], _POINTS[k]) for k in (0, 1)]
+        slope = np.full((_POINTS[axis], _POINTS[other]), linear[axis])
+        product = np.empty_like(slope)
+        for center, inverse, weight in zip(centers, inverse_widths, weights, strict=True):
+            a = (moving[axis] - center[axis]) * inverse[axis]
+            b = (moving[other] - center[other]) * inverse[other]
+            steep = weight * (-2.0 * a * inverse[axis]) * exp2_of_minus(a * a * _LOG2E)
+            slope += np.multiply(steep[:, None], exp2_of_minus(b * b * _LOG2E), out=product)
+        half = (high - low) / (np.array(_POINTS) - 1.0) / 2.0
+        size = np.abs(weights) * inverse_widths[:, axis]
+        growth = _MOST_CURVED * half[axis] * size * inverse_widths[:, axis]
+        growth = growth + _STEEPEST**2 * half[other] * size * inverse_widths[:, other]
+        bounds[axis] = np.max(np.abs(slope, out=slope)) + math.fsum(growth)
+    return bounds
+
+
+_PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, section 3
+_LIMIT = 2**30  # of parameters in fixed point that are multiplied
+
+_PER_C = {TableKind.MEMORY: 1, TableKind.PLAY: 1}  # which parameter is an amplitude in deg/h/C
+_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}  # ... in deg/h; the line of a channel has no bound
+_BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
+"""What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
+
+Record = tuple[TableKind, int, list[float]]
+
+
+def channel_names(model: Model) -> list[str]:
+    """Auxiliary channels of a model, in the order in which the target passes them, from channel 1 on."""
+    return sorted({t.channel for t in model.terms if t.channel is not None})
+
+
+def term_size_dph(model: Model) -> float:
+    """What the terms may add, as far as the envelope bounds it, deg/h."""
+    low, high = model.envelope.temperature_c
+    sizes = []
+    for kind, _, values in (_term_record(model, term) for term in model.terms):
+        if kind in _PER_C:
+            sizes.append(abs(values[_PER_C[kind]]) * (high - low))
+        elif kind in _ALONE:
+            sizes.append(abs(values[_ALONE[kind]]))
+        elif kind == TableKind.CURVE:  # each weight has half a word; a slope, whatever the unit, one
+            sizes.append(max(2.0 * abs(values[3]), 2.0 * abs(values[5]), abs(values[0])))
+        elif kind == TableKind.PRODUCT:
+            slopes = [values[0] + values[2] * (t - values[3]) for t in (low, high)]
+            sizes.append(max(map(abs, (values[0], values[2], *slopes))))
+    return math.fsum(sizes)
+
+
+def f32_terms(model: Model) -> Words:
+    """Records in float32."""
+    records = [_term_record(model, term) for term in model.terms]
+    words = np.zeros((len(records), 2 + _PARAMETERS), dtype=np.uint32)
+    heads = _heads(model)
+    for row, head, (kind, _, values) in zip(words, heads, records, strict=True):
+        scaled = [_BY.get((kind, k), 1.0) * value for k, value in enumerate(values)]
+        row[:2] = kind, head
+        row[2 : 2 + len(values)] = f32_words(scaled)
+    return words.reshape(-1)
+
+
+def q31_terms(model: Model, frac_bits: int) -> Words:
+    """Records in fixed point.
+
+    Raises:
+        CheckFailed: A parameter does not fit its word.
+    """
+    unit = 2.0**frac_bits
+    scales = {
+        TableKind.MEMORY: (2.0**31, unit, 2.0**24),
+        TableKind.PLAY: (2.0**16, unit),
+        TableKind.WARM_UP: (2.0**28, unit),
+        TableKind.HARMONIC: (2.0**32, 2.0**32, unit),
+        TableKind.AUXILIARY: (unit, 2.0**16),
+        TableKind.CURVE: (unit, 2.0**24, 2.0**16, unit, 2.0**16, unit),
+        TableKind.PRODUCT: (unit, 2.0**16, unit, 2.0**16),
+    }
+    words = np.zeros((len(model.terms), 2 + _PARAMETERS), dtype=np.uint32)
+    for row, head, term in zip(words, _heads(model), model.terms, strict=True):
+        kind, _, values = _term_record(model, term)
+        row[:2] = kind, head
+        for k, (value, scale) in enumerate(zip(values, scales[kind], strict=True)):
+            row[2 + k] = _whole(kind, k, term.id, value * scale)
+    return words.reshape(-1)
+
+
+def _whole(kind: TableKind, k: int, id: str, value: float) -> int:
+    whole = round(value)
+    if (kind, k) == (TableKind.HARMONIC, 1):
+        return whole & 0xFFFFFFFF
+    if whole == 2**31:  # a gain of 1
+        whole -= 1
+    half = kind.reads_channel and (kind, k) != (TableKind.CURVE, 1)
+    if abs(whole) >= (_LIMIT if half else 2**31):
+        raise CheckFailed(f"q31: a parameter of term {id} leaves the range of 32 bits")
+    return whole & 0xFFFFFFFF
+
+
+def _heads(model: Model) -> list[int]:
+    """Second words of the records: channel, and number of the stand-in among the networks in the upper half."""
+    heads, last = [], len(model.networks)
+    for term in model.terms:
+        last += term.stand_in is not None
+        heads.append(_term_record(model, term)[1] + 65536 * (last if term.stand_in is not None else 0))
+    return heads
+
+
+def _term_record(model: Model, term: Term) -> Record:
+    channel = 0 if term.channel is None else 1 + channel_names(model).index(term.channel)
+    return term.table.kind, channel, term.table.parameters(term.parameters, model.block_s)
+
+
+TEMPERATURE = "temperature_c"
+"""Name of the temperature among the guards of a model."""
+
+_US_PER_MIN = 60e6  # microseconds in a minute
+_LARGEST = 2**31 - 1  # a signed 32-bit word
+_MOST_BLOCKS = 100000  # libc/gtc_limits.inl
+
+
+def guard_of(model: Model, channel: str | None) -> Guard:
+    """The guard of a channel; None: of the temperature. Without one in the model every reading passes."""
+    missing_s = model.hold_blocks * model.block_s
+    if channel is None:
+        if TEMPERATURE in model.guards and TEMPERATURE not in channel_names(model):
+            return model.guards[TEMPERATURE]
+        low, high = PLAUSIBLE_C
+        return Guard(
+            low=low,
+            high=high,
+            max_step=model.max_step_c,
+            max_rate_per_min=model.max_rate_c_per_min,
+            agree_s=model.agree_s,
+            stuck_s=model.stuck_s,
+            missing_s=missing_s,
+            fallback=0.0,
+        )
+    if channel in model.guards:
+        return model.guards[channel]
+    reference = next(t.parameters["reference"] for t in model.terms if t.channel == channel)
+    return Guard(
+        low=-1e9,
+        high=1e9,
+        max_step=1e9,
+        max_rate_per_min=0.0,
+        agree_s=0.0,
+        stuck_s=0.0,
+        missing_s=missing_s,
+        fallback=reference,
+    )
+
+
+def guard_words(model: Model, numeric: Numeric) -> Words:
+    """One record for each channel, the temperature first."""
+    guards = [guard_of(model, channel) for channel in (None, *channel_names(model))]
+    return np.concatenate([_guard_record(guard, numeric, model.block_s) for guard in guards])
+
+
+def _guard_record(guard: Guard, numeric: Numeric, block_s: float) -> Words:
+    values = [guard.low, guard.high, guard.max_step, guard.max_rate_per_min / _US_PER_MIN, guard.fallback]
+    if numeric == "f32":
+        numbers = f32_words(values)
+    else:
+        scales = (2.0**16, 2.0**16, 2.0**16, 2.0**40, 2.0**16)
+        whole = [_held(value * scale) for value, scale in zip(values, scales, strict=True)]
+        numbers = np.array([w & 0xFFFFFFFF for w in whole], dtype=np.uint32)
+    blocks = min(max(1, round(guard.missing_s / block_s)), _MOST_BLOCKS)
+    times = [_microseconds(guard.agree_s), _microseconds(guard.stuck_s), blocks]
+    return np.concatenate([numbers[:4], np.array(times, dtype=np.uint32), numbers[4:]])
+
+
+def _held(value: float) -> int:
+    """The nearest number that the word has: a wider range than 32 bits hold is none."""
+    return int(math.copysign(min(round(abs(value)), _LARGEST), value))
+
+
+def _microseconds(seconds: float) -> int:
+    return min(round(seconds * 1e6), _LARGEST)

@@ -1,0 +1,348 @@
+"""From samples to the sequence of corrections: counting, blocks, slopes, holds, restarts, fallback.
+
+docs/numerics.md, section 1, for a whole history at once: blocks are columns of arrays, and every
+float32 operation is the one that the target does, in its order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.inputs import need_memory
+from .arithmetic import Arithmetic, Numbers
+from .recursions import Course
+from .samples import HELD, RESTART, Guarded, believe
+from .status import WARMING
+
+__all__ = [
+    "FALLBACK",
+    "KEEP",
+    "MAP",
+    "Settings",
+    "Steps",
+    "Stream",
+    "expand_missed",
+    "follow",
+    "period_us",
+    "positions",
+    "samples_per_block",
+    "with_missing",
+]
+
+MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
+_SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
+_LARGEST = 2**31 - 1  # of a number in fixed point
+_PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Members of the table that the front end uses, as numbers of the arithmetic."""
+
+    samples_per_block: int
+    period_us: int  # of the samples
+    block_us: int
+    slope_blocks: int
+    guard: Guarded  # of the temperature
+    longest_blocks: int  # the longest missing_blocks of all guards
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The corrections of a history, in the order in which they come into force.
+
+    `believed[i]`: sample i was believed. For correction k: it is in force from sample `at[k]` on (at the
+    same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
+    before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
+    GTC_WARMING or 0. Where `kind` is not MAP, temperature,
+    slope and remarks are those of the last map, 0 where there was none. Before the first one the correction is
+    0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete; its missing end counts
+    as not valid).
+    """
+
+    believed: NDArray[np.bool_]
+    at: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    temperature: Numbers
+    slope: Numbers
+    remarks: NDArray[np.int32]
+    is_restart: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
+    mean: Numbers
+
+    def led(self, blocks: int) -> Steps:
+        """The same corrections with every mean where its slope brings it within `blocks` (0 or 1) blocks.
+
+        A correction is in force for the block after the one that it was made of; so it is not late.
+        """
+        if blocks == 0:
+            return self
+        slope = np.where(self.kind == MAP, self.slope, self.slope.dtype.type(0))
+        temperature = self.temperature + slope
+        if np.issubdtype(temperature.dtype, np.integer):
+            temperature = np.clip(temperature, -_LARGEST, _LARGEST)
+        return replace(self, temperature=temperature)
+
+    def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Index of the correction in force at each of the ascending `samples`; -1 before the first."""
+        first = np.searchsorted(samples, self.at, side="left")
+        count = np.bincount(first, minlength=samples.size + 1)[: samples.size]
+        np.cumsum(count, out=count)
+        count -= 1
+        return count
+
+
+def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
+    """Counts of missing samples, shortened by whole blocks where nothing changes any more but the time."""
+    n = settings.samples_per_block
+    most = settings.longest_blocks + 2
+    many = np.flatnonzero(missed >= (most + 1) * n)
+    shortened = missed.copy() if many.size else missed
+    shortened[many] -= (missed[many] // n - most) * n
+    return shortened
+
+
+def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.int64]:
+    """Number of each row's sample where `missed` samples come before the row.
+
+    Raises:
+        InputError: Rows and gaps together are more samples than memory is granted for.
+    """
+    need_memory(_SAMPLE_BYTES * float(missed.size + missed.sum()), where, "its rows and gaps as samples")
+    position = np.arange(missed.size)
+    if missed.any():
+        position += np.cumsum(missed)
+    return position
+
+
+def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.int64]) -> Numbers:
+    """Samples at their positions, missing ones between them."""
+    n = int(position[-1]) + 1 if position.size else 0
+    if n == x.size:
+        return x
+    samples = arithmetic.missing(n)
+    samples[position] = x
+    return samples
+
+
+def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
+    """Follows samples x, shape (n,), from the start of a state on."""
+    verdict, fallback = _believed(arithmetic, x, settings)
+    x = settings.guard.limited(x)
+    valid, mean = _block_means(arithmetic, x, verdict, settings.samples_per_block)
+    restarts = np.flatnonzero(verdict == RESTART)
+    # A block closes when the next sample arrives.
+    n_closed = max(0, x.size - 1) // settings.samples_per_block
+    closings = _closings(arithmetic, valid[:n_closed], mean, fallback, restarts, settings)
+    starts = _Corrections(
+        at=restarts,
+        kind=np.zeros(restarts.size, dtype=np.int8),
+        temperature=x[restarts],
+        slope=np.zeros_like(x[restarts]),
+        remarks=np.full(restarts.size, WARMING, dtype=np.int32),
+    )
+    # Stable: a block closes before the sample that opens the next one is judged.
+    order = np.argsort(np.concatenate([closings.at, starts.at]), kind="stable")
+    kind = np.concatenate([closings.kind, starts.kind])[order]
+    made = order[np.maximum.accumulate(np.where(kind == MAP, np.arange(kind.size), 0))]
+    return Steps(
+        believed=verdict != HELD,
+        at=np.concatenate([closings.at, starts.at])[order],
+        kind=kind,
+        temperature=np.concatenate([closings.temperature, starts.temperature])[made],
+        slope=np.concatenate([closings.slope, starts.slope])[made],
+        remarks=np.concatenate([closings.remarks, starts.remarks])[made],
+        is_restart=order >= closings.at.size,
+        valid=valid,
+        mean=mean,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Corrections:
+    at: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    temperature: Numbers
+    slope: Numbers
+    remarks: NDArray[np.int32]
+
+
+def _block_means(
+    arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
+) -> tuple[NDArray[np.bool_], Numbers]:
+    """Which blocks are valid, and their means (0 where no sample was believed)."""
+    used = _used(verdict, n)
+    step = n * max(1, _PART // n)
+    parts = [
+        _means(arithmetic, x[start : start + step], used[start : start + step], n)
+        for start in range(0, max(x.size, 1), step)
+    ]
+    valid, mean = zip(*parts, strict=True)
+    return np.concatenate(valid), np.concatenate(mean)
+
+
+def _means(
+    arithmetic: Arithmetic, x: Numbers, used: NDArray[np.bool_], n: int
+) -> tuple[NDArray[np.bool_], Numbers]:
+    """`_block_means` of a part that begins with a block."""
+    blocks = -(-x.size // n)
+    if blocks == 1:
+        n, whole = x.size, n  # a block may be far longer than the recording
+    else:
+        whole = n
+    values, there = np.zeros((blocks, n), dtype=x.dtype), np.zeros((blocks, n), dtype=np.bool_)
+    values.reshape(-1)[: x.size] = np.where(used, x, 0)
+    there.reshape(-1)[: x.size] = used
+    count = np.count_nonzero(there, axis=1)
+    base = values[np.arange(blocks), np.argmax(there, axis=1)]
+    d = np.where(there, arithmetic.diff(values, base[:, None]), values.dtype.type(0))
+    mean = arithmetic.mean(base, arithmetic.running_sum(d), np.maximum(count, 1))
+    return 2 * count >= whole, mean
+
+
+def _believed(
+    arithmetic: Arithmetic, x: Numbers, settings: Settings
+) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    """Verdict on every sample, and blocks after which the fallback is in force.
+
+    What is believed after a loss depends on when the blocks made it one: judged again from each loss on.
+    """
+    n = settings.samples_per_block
+    lost: list[int] = []
+    while True:
+        verdict = believe(arithmetic, x, settings.guard, period_us=settings.period_us, lost=lost)
+        fallback = _fallen(verdict, settings)
+        starts = (1 + np.flatnonzero(fallback & ~np.concatenate([[False], fallback[:-1]]))) * n
+        new = [int(start) for start in starts if start < x.size and start not in lost]
+        if not new:
+            return verdict, fallback
+        lost.append(new[0])
+
+
+def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
+    """Blocks after which the fallback is in force."""
+    n = settings.samples_per_block
+    used = _used(verdict, n)
+    blocks = max(1, -(-verdict.size // n))
+    valid = 2 * np.bincount(np.flatnonzero(used) // n, minlength=blocks) >= n
+    restarted = np.zeros(blocks, dtype=np.bool_)
+    restarted[np.flatnonzero(verdict == RESTART) // n] = True
+    fallback = np.zeros(blocks, dtype=np.bool_)
+    held, previous = 0, -2
+    for block in np.flatnonzero(~valid).tolist():
+        if block != previous + 1 or restarted[block]:
+            held = 0
+        held += 1
+        fallback[block] = held > settings.guard.missing_blocks
+        previous = block
+    return fallback
+
+
+def _used(verdict: NDArray[np.int8], n: int) -> NDArray[np.bool_]:
+    """Samples that count for their block: believed, and none before a restart in it."""
+    used: NDArray[np.bool_] = verdict != HELD
+    for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
+        used[i - i % n : i] = False
+    return used
+
+
+def _closings(
+    arithmetic: Arithmetic,
+    valid: NDArray[np.bool_],
+    mean: Numbers,
+    fallback: NDArray[np.bool_],
+    restarts: NDArray[np.int64],
+    settings: Settings,
+) -> _Corrections:
+    """The corrections made by blocks that close: before the first restart only those that fall back."""
+    n, window = settings.samples_per_block, settings.slope_blocks
+    first = min(int(restarts[0]) // n, valid.size) if restarts.size else valid.size
+    before = np.flatnonzero(fallback[:first])
+    blocks = np.arange(first, valid.size)
+    latest = (restarts // n)[np.searchsorted(restarts, (blocks + 1) * n) - 1]
+    good = valid[blocks]
+    full = good & (blocks - latest + 1 >= window)
+    slope = np.zeros_like(mean[blocks])
+    last = blocks[full]
+    at = last - (window - 1) + np.arange(window)[:, None]
+    used = valid[at]
+    d = arithmetic.diff(mean[at], mean[last])
+    steep = arithmetic.slope(d, used)
+    sure = np.count_nonzero(used, axis=0) >= max(2, (window + 1) // 2)
+    slope[full] = np.where(sure, steep, slope.dtype.type(0))
+    warming = ~full
+    warming[full] = ~sure
+    kind = np.where(good, MAP, np.where(fallback[blocks], FALLBACK, KEEP)).astype(np.int8)
+    none = np.zeros(before.size)
+    return _Corrections(
+        at=(np.concatenate([before, blocks]) + 1) * n,
+        kind=np.concatenate([none + FALLBACK, kind]).astype(np.int8),
+        temperature=np.concatenate([none.astype(mean.dtype), mean[blocks]]),
+        slope=np.concatenate([none.astype(slope.dtype), slope]),
+        remarks=np.concatenate([none, np.where(good & warming, WARMING, 0)]).astype(np.int32),
+    )
+
+
+def samples_per_block(block_s: float, row_period_s: float) -> int:
+    """Rows per block, at least 1."""
+    return max(1, round(block_s / row_period_s))
+
+
+def period_us(block_us: int, samples_per_block: int) -> int:
+    """Sample period of a target with so many samples in a block, microseconds; at least 1."""
+    return max(1, (block_us + samples_per_block // 2) // samples_per_block)
+
+
+_MAX_ELAPSED = 0xFFFFFF  # blocks since power-on that a target counts
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """Samples, missing ones among them.
+
+    `samples`: temperatures; `position[k]`: sample number of row k; `missed[k]`: samples missed before it,
+    shortened, and `dropped[k]`: whole blocks that were left out of them.
+    """
+
+    samples: Numbers
+    position: NDArray[np.int64]
+    missed: NDArray[np.int64]
+    dropped: NDArray[np.int64]
+
+    @staticmethod
+    def of_rows(
+        arithmetic: Arithmetic,
+        settings: Settings,
+        temperature: Numbers,
+        missed: NDArray[np.int64],
+        where: str = "the recording",
+    ) -> Stream:
+        """Samples of rows, shape (n,), with `missed` samples before each.
+
+        Raises:
+            InputError: Rows and gaps of `where` together are more samples than memory is granted for.
+        """
+        shortened = expand_missed(missed, settings)
+        position = positions(shortened, where)
+        samples = with_missing(arithmetic, temperature, position)
+        dropped = (missed - shortened) // settings.samples_per_block
+        return Stream(samples, position, shortened, dropped)
+
+    def course(self, steps: Steps, samples_per_block: int, blocks_before: int = 0) -> Course:
+        """The corrections as terms see them, `blocks_before` blocks after power-on at the first sample."""
+        return Course(
+            temperature=steps.temperature,
+            closes=~steps.is_restart,
+            elapsed=np.minimum(self._elapsed(steps.at, samples_per_block) + blocks_before, _MAX_ELAPSED),
+        )
+
+    def _elapsed(self, at: NDArray[np.int64], samples_per_block: int) -> NDArray[np.int64]:
+        """Blocks since the start at each sample number, with those that were left out."""
+        if not self.dropped.any():
+            return np.asarray(at // samples_per_block)
+        total = np.concatenate([[0], np.cumsum(self.dropped)])
+        runs = self.position - self.missed  # where the missing samples before each row begin
+        return np.asarray(at // samples_per_block + total[np.searchsorted(runs, at, side="right")])

@@ -1,0 +1,280 @@
+"""Terms on the target: the one text of each recursion, and the operators with memory that they share.
+
+`diagnose` runs it in float64 on training and exam runs, `target.history` in float32 and in fixed point against the
+compiled code. libc/gtc_terms.inl is the same in C; docs/numerics.md, section 8, says it in words.
+
+A term sees the corrections of a history (`Course`) and changes what the map gets or adds to it (`Outcome`).
+Only what depends on the order is done one correction after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.arrays import FloatArray
+from .arithmetic import Operations
+
+__all__ = [
+    "Course",
+    "CourseChannel",
+    "Recursion",
+    "TableKind",
+    "TermOutcome",
+    "delayed",
+    "first_order",
+    "play",
+    "recursion_of",
+]
+
+Number = TypeVar("Number", bound=np.generic)
+
+_UNIFORM = 1e-6  # largest departure of a row period from their mean that still counts as even, relative
+
+
+def first_order(tau_s: float, time_s: FloatArray, driven: FloatArray) -> FloatArray:
+    """tau dz/dt = driven − z, exact for an input linear between the samples; starts at rest on the first one.
+
+    Args:
+        tau_s: Time constant, s; 0 gives the input itself.
+        time_s: Ascending times, s, shape (n,).
+        driven: Input, shape (n,).
+
+    Returns:
+        z, shape (n,).
+    """
+    if tau_s == 0.0 or len(driven) < 2:
+        return np.array(driven)
+    x = np.diff(time_s) / tau_s
+    lost = -np.expm1(-x)
+    late = 1.0 - lost / x  # weight of an interval's end point
+    forced = late * driven[1:] + (lost - late) * driven[:-1]
+    if np.ptp(x) <= _UNIFORM * float(x.mean()):
+        return _even_lag(1.0 - float(lost.mean()), np.concatenate((driven[:1], forced)))
+    return _affine_scan(np.concatenate(([0.0], 1.0 - lost)), np.concatenate((driven[:1], forced)))
+
+
+def _even_lag(decay: float, offset: FloatArray) -> FloatArray:
+    """z_k = decay z_(k−1) + offset_k, as a triangular band of equations: `scipy.signal` takes 0.7 s to import."""
+    from scipy.linalg.lapack import dtbtrs  # which commands that filter nothing need not spend time on
+
+    band = np.empty((2, len(offset)))
+    band[0], band[1] = 1.0, -decay
+    return np.asarray(dtbtrs(band, offset[:, None], uplo="L", diag="U")[0][:, 0])
+
+
+def _affine_scan(factor: FloatArray, offset: FloatArray) -> FloatArray:
+    """z_k = factor_k z_(k−1) + offset_k for all k: affine maps composed over distances 1, 2, 4, ..."""
+    step = 1
+    while step < len(factor):
+        offset = np.concatenate((offset[:step], offset[step:] + factor[step:] * offset[:-step]))
+        factor = np.concatenate((factor[:step], factor[step:] * factor[:-step]))
+        step *= 2
+    return offset
+
+
+def play(width: Any, temperature: NDArray[Number]) -> NDArray[Number]:
+    """Play (backlash) operator z ← max(T − w, min(T + w, z)), from z = T on, shape (n,), in the type of T.
+
+    A step clamps z to T ± w. Clamps composed are a clamp again, so they are composed over 1, 2, 4, ... steps:
+    nothing is rounded but T ± w.
+    """
+    low, high = temperature - width, temperature + width
+    step = 1
+    while step < len(low):
+        after_low, after_high = low[step:], high[step:]
+        low = np.concatenate((low[:step], np.clip(low[:-step], after_low, after_high)))
+        high = np.concatenate((high[:step], np.clip(high[:-step], after_low, after_high)))
+        step *= 2
+    return np.asarray(np.clip(temperature[0], low, high))
+
+
+def delayed(shift_s: float, time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """values(t − shift), linear between samples; beyond the record its first and last value."""
+    return np.interp(time_s - shift_s, time_s, values)
+
+
+Numbers = NDArray[Any]
+
+
+class TableKind(IntEnum):
+    """Kinds of terms that a table can hold, as in gtc_table.h."""
+
+    MEMORY = 1
+    PLAY = 2
+    WARM_UP = 3
+    HARMONIC = 4
+    AUXILIARY = 5
+    CURVE = 6
+    PRODUCT = 7
+
+    @property
+    def reads_channel(self) -> bool:
+        """Whether it reads an auxiliary channel."""
+        return self >= TableKind.AUXILIARY
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The corrections of a history as terms see them, one entry each, in numbers of one arithmetic.
+
+    Attributes:
+        temperature: Mean of the block that ended (of the last valid block where it is not valid itself), or the
+            sample that started the front end, shape (n,).
+        closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
+        elapsed: Blocks since power-on, shape (n,).
+    """
+
+    temperature: Numbers
+    closes: NDArray[np.bool_]
+    elapsed: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class CourseChannel:
+    """An auxiliary channel at the corrections of a history, one entry each.
+
+    Attributes:
+        mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
+        remarks: Status bits: held, lost, clamped, shape (n,).
+        is_away: Where nothing of it is believed, so that something stands for it, shape (n,).
+    """
+
+    mean: Numbers
+    remarks: NDArray[np.int32]
+    is_away: NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class TermOutcome:
+    """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits.
+
+    `away`: of each term that reads a channel, where nothing of the channel is believed.
+    """
+
+    temperature: Numbers
+    slope: Numbers
+    added: Numbers
+    remarks: NDArray[np.int32]
+    away: list[NDArray[np.bool_]] = field(default_factory=list)
+
+
+class Recursion:
+    """A term of one kind with its parameters, numbers of an arithmetic as docs/FORMAT.md, section 3, lists them."""
+
+    def __init__(self, do: Operations, parameters: Sequence[Any]) -> None:
+        self.do = do
+        self.p = parameters
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        """Changes the outcome of every correction; `channel`: that of the term."""
+        raise NotImplementedError
+
+
+class _Memory(Recursion):
+    """z <- z + gain (T - z) once a block, at rest on T where the front end starts; adds amplitude (z - T).
+
+    Where rate is not 0 the map sees z and (T - z) rate instead of T and its slope.
+    """
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        _, amplitude, rate = self.p[:3]
+        x, z = course.temperature, self.do.reading(self._states(course))
+        if rate != 0:
+            outcome.temperature, outcome.slope = z, self.do.slope_of(x, z, rate)
+        outcome.added = outcome.added + self.do.scaled_difference(z, x, amplitude)
+
+    def _states(self, course: Course) -> Numbers:
+        follow, gain, z = self.do.follow, self.p[0], None
+        states = []
+        for x, closes in zip(self.do.scalars(course.temperature), course.closes.tolist(), strict=True):
+            z = follow(z, x, gain) if closes and z is not None else self.do.settle(x)
+            states.append(z)
+        return self.do.array(states)
+
+
+class _Play(Recursion):
+    """z <- max(T - width, min(T + width, z)) once a block, from T at a start; adds amplitude (z - T)."""
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        starts = np.union1d(np.flatnonzero(~course.closes), [0])[: course.closes.size]
+        parts = np.split(course.temperature, starts[1:])
+        z = np.concatenate([play(self.p[0], part) for part in parts])
+        outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, self.p[1])
+
+
+class _WarmUp(Recursion):
+    """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        outcome.added = outcome.added + self.do.fading(course.elapsed, self.p[0], self.p[1])
+
+
+class _Harmonic(Recursion):
+    """Adds amplitude cos(2 pi (T frequency + phase)), phase in turns."""
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        outcome.added = outcome.added + self.do.wave(course.temperature, *self.p[:3])
+
+
+class _OfChannel(Recursion):
+    """Adds a function of what a channel shows, and of the temperature."""
+
+    def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
+        if channel is None:
+            raise ValueError("a term of a channel without its channel")
+        added = self._added(channel.mean, course.temperature)
+        outcome.added = outcome.added + np.where(np.isnan(added), added.dtype.type(0), added)
+        outcome.remarks = outcome.remarks | channel.remarks
+        outcome.away.append(channel.is_away)
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        raise NotImplementedError
+
+
+class _Auxiliary(_OfChannel):
+    """Adds slope (mean - reference)."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, reference = self.p[:2]
+        return self.do.scaled_difference(mean, reference, slope)
+
+
+class _Curve(_OfChannel):
+    """Adds slope (mean - reference) and two Gaussians of one gain, the first of them at the reference."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, gain, reference, first, center, second = self.p[:6]
+        x = self.do.limited(mean)
+        line = self.do.scaled_difference(x, reference, slope)
+        return np.asarray(line + self.do.bells(x, gain, ((reference, first), (center, second))))
+
+
+class _Product(_OfChannel):
+    """Adds (slope + growth (T - middle)) (mean - reference)."""
+
+    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+        slope, reference, growth, middle = self.p[:4]
+        here = self.do.limited(slope + self.do.scaled_difference(temperature, middle, growth))
+        return self.do.scaled_difference(mean, reference, here)
+
+
+_RECURSIONS: dict[TableKind, type[Recursion]] = {
+    TableKind.MEMORY: _Memory,
+    TableKind.PLAY: _Play,
+    TableKind.WARM_UP: _WarmUp,
+    TableKind.HARMONIC: _Harmonic,
+    TableKind.AUXILIARY: _Auxiliary,
+    TableKind.CURVE: _Curve,
+    TableKind.PRODUCT: _Product,
+}
+
+
+def recursion_of(kind: TableKind, do: Operations, parameters: Sequence[Any]) -> Recursion:
+    """A term of a kind in an arithmetic."""
+    return _RECURSIONS[kind](do, parameters)

@@ -1,0 +1,161 @@
+"""Samples as the front end sees them: counted, with the missing ones, and which of them are believed.
+
+Long stretches without events are done at once; one sample at a time is looked at only from an event
+(a jump, a missing or stuck sample) until a sample is believed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arithmetic import Arithmetic, Numbers
+
+__all__ = ["BELIEVED", "HELD", "RESTART", "Guarded", "believe"]
+
+HELD, BELIEVED, RESTART = 0, 1, 2  # any three numbers
+_LONGEST_US = 2**32 - 1  # that the target counts
+
+
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """A guard of one channel as the target has it, its numbers in the numbers of the arithmetic.
+
+    Attributes:
+        low, high: Range of the readings.
+        max_step: Believable change between two of them, besides ...
+        max_rate: ... this much for each microsecond since the last believed one (fixed point: 2^-40).
+        agree_us: How long readings must agree that do not follow the last one.
+        stuck_us: How long a reading may stay the same; 0: for ever.
+        missing_blocks: Blocks in a row with too few readings that are bridged.
+        takes_edge: A reading outside the range is taken as its edge; False: it is none.
+    """
+
+    low: Any
+    high: Any
+    max_step: Any
+    max_rate: Any
+    agree_us: int
+    stuck_us: int
+    missing_blocks: int
+    takes_edge: bool = False
+
+    def limited(self, x: Numbers) -> Numbers:
+        """Readings as they are judged; missing ones may be anything."""
+        return np.clip(x, self.low, self.high) if self.takes_edge else x
+
+
+def believe(
+    arithmetic: Arithmetic, x: Numbers, guard: Guarded, *, period_us: int, lost: Sequence[int] = ()
+) -> NDArray[np.int8]:
+    """Verdict on every reading: HELD, BELIEVED, or RESTART (readings that agreed with one another for long enough).
+
+    Args:
+        arithmetic: The numbers that the target computes with.
+        x: Readings, shape (n,); missing ones as `arithmetic.missing`.
+        guard: What is believed.
+        period_us: Time from reading to reading, microseconds.
+        lost: Readings before which the channel was lost, ascending: what was believed is forgotten.
+    """
+    judged, sound = guard.limited(x), _sound(arithmetic, x, guard, period_us)
+    judge = _Judge(arithmetic, guard, period_us)
+    verdict = np.zeros(x.size, dtype=np.int8)
+    events = _events(arithmetic, judged, sound, judge.near, lost)
+    waiting = list(lost)
+    i = 0
+    while i < x.size:
+        while waiting and waiting[0] <= i:
+            judge.last = None
+            del waiting[0]
+        if not sound[i]:
+            rest = sound[i:]
+            gap = int(np.argmax(rest)) if rest.any() else rest.size
+            judge.hold(gap)
+            i += gap
+            continue
+        verdict[i] = judge.take(judged[i])
+        i += 1
+        if verdict[i - 1] != HELD:
+            k = np.searchsorted(events, i)
+            event = int(events[k]) if k < events.size else x.size
+            verdict[i:event] = BELIEVED
+            judge.last = judged[event - 1]
+            i = event
+    return verdict
+
+
+def _events(
+    arithmetic: Arithmetic, x: Numbers, sound: NDArray[np.bool_], near: Any, lost: Sequence[int]
+) -> NDArray[np.intp]:
+    """Readings that are not believed just because their predecessor is."""
+    regular = np.zeros(x.size, dtype=np.bool_)
+    if x.size > 1:
+        pair = sound[1:] & sound[:-1]
+        with np.errstate(invalid="ignore", over="ignore"):
+            regular[1:] = pair & arithmetic.is_near(x[1:], x[:-1], near)
+    regular[list(lost)] = False
+    return np.flatnonzero(~regular)
+
+
+def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -> NDArray[np.bool_]:
+    """Readings that are there, in their range or taken as its edge, and not stuck."""
+    there = ~arithmetic.is_missing(x)
+    with np.errstate(invalid="ignore"):
+        sound = there & (x >= guard.low) & (x <= guard.high) if not guard.takes_edge else there.copy()
+    if guard.stuck_us:
+        received = np.flatnonzero(there)
+        bits = x[received].view(f"u{x.itemsize}")
+        index = np.arange(received.size)
+        fresh = np.ones(received.size, dtype=np.bool_)
+        fresh[1:] = bits[1:] != bits[:-1]
+        repeats = index - np.maximum.accumulate(np.where(fresh, index, 0))
+        sound[received[repeats * period_us >= guard.stuck_us]] = False
+    return np.asarray(sound)
+
+
+class _Judge:
+    """The state of the target between events: last believed reading, gap, suspects."""
+
+    def __init__(self, arithmetic: Arithmetic, guard: Guarded, period_us: int) -> None:
+        self._arithmetic = arithmetic
+        self._guard = guard
+        self._period_us = period_us
+        self.near = self._limit(1)
+        self.last: Any = None
+        self._gap = 1
+        self._candidate: Any = None
+        self._suspects = 0
+
+    def _limit(self, gap: int) -> Any:
+        """Believable change after so many samples."""
+        us = min(gap * self._period_us, _LONGEST_US)
+        return self._arithmetic.limit(self._guard.max_step, self._guard.max_rate, us)
+
+    def hold(self, count: int) -> None:
+        """`count` readings that are missing, impossible or stuck."""
+        self._suspects = 0
+        self._gap += count
+
+    def take(self, x: Any) -> int:
+        if self._follows(x):
+            return self._believed(x, BELIEVED)
+        agrees = self._suspects and self._arithmetic.is_near(x, self._candidate, self.near)
+        self._suspects = self._suspects + 1 if agrees else 1
+        self._candidate = x
+        if (self._suspects - 1) * self._period_us >= self._guard.agree_us:
+            return self._believed(x, RESTART)
+        self._gap += 1
+        return HELD
+
+    def _follows(self, x: Any) -> bool:
+        if self.last is None:
+            return False
+        return bool(self._arithmetic.is_near(x, self.last, self._limit(self._gap)))
+
+    def _believed(self, x: Any, verdict: int) -> int:
+        self.last, self._gap, self._suspects = x, 1, 0
+        return verdict

@@ -1,0 +1,202 @@
+"""Noise of a gyro in the terms of IEEE Std 647 and 952, and the noise that a model leaves.
+
+The Allan variance of a rate ω averaged over τ is, as a sum of independent noises (IEEE Std 952-2020, annex C):
+
+    σ²(τ) = 3 Q²/τ² + N²/τ + (2 ln 2/π) B² + K² τ/3
+
+with quantisation Q, angle random walk N, bias instability B and rate random walk K.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from ..common.arrays import FloatArray
+from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
+from ..results.training import AllanPoint, BiasPlane, NoiseTerms
+from .data import TrainingData, average
+
+__all__ = [
+    "allan_variance",
+    "difference_sigma",
+    "floor_dph",
+    "noise_terms",
+    "not_white",
+    "sensitivities",
+    "stretches",
+]
+
+_FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
+_LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
+_LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
+_S_PER_H = 3600.0  # s in an hour
+
+
+def stretches(
+    values: FloatArray, time_s: FloatArray, run: NDArray[np.int64], step_s: float
+) -> list[FloatArray]:
+    """Values of gap-free stretches: cut where the run changes or a step of time is longer than 1.5 `step_s`."""
+    cuts = np.flatnonzero((np.diff(run) != 0) | (np.diff(time_s) > 1.5 * step_s)) + 1
+    return list(np.split(values, cuts))
+
+
+def allan_variance(residuals: Sequence[FloatArray], step_s: float) -> list[AllanPoint]:
+    """Overlapping Allan deviation at octaves of the step, pooled over gap-free stretches (NIST SP 1065, eq. 11).
+
+    Args:
+        residuals: Mean rates over `step_s`, one array for each stretch, deg/h.
+        step_s: Length of a mean, s.
+    """
+    total: dict[int, tuple[float, int]] = {}
+    for stretch in residuals:
+        factors = [2**k for k in range(32) if 2 ** (k + 1) <= len(stretch) // 2]
+        for factor in factors:
+            differences = _differences(stretch, factor)
+            square, count = total.get(factor, (0.0, 0))
+            total[factor] = (square + 0.5 * float(differences @ differences), count + len(differences))
+    return [
+        AllanPoint(
+            tau_s=factor * step_s, deviation_dph=float(np.sqrt(square / count)), freedom=count / factor
+        )
+        for factor, (square, count) in sorted(total.items())
+        if count / factor >= _LEAST_PAIRS
+    ]
+
+
+def _differences(rates: FloatArray, factor: int) -> FloatArray:
+    """Every difference of two means over `factor` rates that follow one another: two of sums of sums."""
+    angle = np.concatenate([[0.0], np.cumsum(rates - rates.mean())])
+    return np.asarray(angle[2 * factor :] - 2.0 * angle[factor:-factor] + angle[: -2 * factor]) / factor
+
+
+def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
+    """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
+
+    Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
+    not show is 0; all are None where the record is too short.
+
+    Args:
+        residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
+        step_s: Length of a mean, s.
+    """
+    from scipy.optimize import nnls  # 0.2 s to import, which who fits nothing need not wait for
+
+    points = allan_variance(residuals, step_s)
+    names = (
+        "quantisation_arcsec",
+        "arw_deg_per_sqrt_h",
+        "bias_instability_dph",
+        "rate_random_walk_dph_per_sqrt_h",
+    )
+    terms: dict[str, float | None] = dict.fromkeys(names)
+    if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
+        tau = np.array([p.tau_s for p in points])
+        square = np.array([p.deviation_dph for p in points]) ** 2
+        weight = np.sqrt(np.array([p.freedom for p in points]) / 2.0) / square
+        # 1 arcsec/s is 1 deg/h, so that Q in arcsec goes with τ in s, and N, K with τ in h.
+        shapes = np.stack(
+            [3.0 / tau**2, _S_PER_H / tau, np.full(len(tau), _FLICKER), tau / _S_PER_H / 3.0], axis=1
+        )
+        scale = shapes.max(axis=0)
+        squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
+        terms = dict(zip(names, (float(v) for v in np.sqrt(squares / scale)), strict=True))
+    return NoiseTerms(**terms, allan=tuple(points))
+
+
+def sensitivities(
+    temperature_c: FloatArray, slope_c_per_min: FloatArray, bias_dph: FloatArray, weight: FloatArray
+) -> BiasPlane:
+    """Slopes of the uncompensated bias per C and per C/min, by least squares of a plane."""
+    root = np.sqrt(weight)
+    inputs = {"bias_dph_per_c": temperature_c, "bias_dph_per_c_per_min": slope_c_per_min}
+    least = {"bias_dph_per_c": LEAST_SPAN_C, "bias_dph_per_c_per_min": _LEAST_SPAN_C_PER_MIN}
+    used = [name for name, values in inputs.items() if len(values) and np.ptp(values) >= least[name]]
+    columns = [np.ones(len(bias_dph)), *(inputs[name] - inputs[name].mean() for name in used)]
+    design = np.stack(columns, axis=1)
+    solution, *_ = np.linalg.lstsq(design * root[:, None], bias_dph * root, rcond=None)
+    residual = bias_dph - design @ solution
+    slopes = dict(zip(used, (float(value) for value in solution[1:]), strict=True))
+    return BiasPlane(
+        bias_dph_per_c=slopes.get("bias_dph_per_c"),
+        bias_dph_per_c_per_min=slopes.get("bias_dph_per_c_per_min"),
+        residual_rms_dph=float(np.sqrt(np.average(residual**2, weights=weight))),
+    )
+
+
+_CLIP = 4.5  # robust σ, as outliers are dropped in training (process.py)
+_SIGNIFICANCE = 1e-3  # of each test: docs/training.md, section 1, step 5
+_LAGS = 10  # of the autocorrelation, Ljung and Box 1978
+_LEAST_DIFFERENCES = 6  # with fewer a median says nothing
+
+
+def robust_sigma(x: FloatArray) -> float:
+    """RMS of the bulk of x: what lies within 4.5 σ of 0, σ from the median."""
+    if len(x) == 0:
+        return 0.0
+    limit = _CLIP * MAD_TO_SIGMA * median(np.abs(x))
+    inside = x[np.abs(x) <= limit]
+    return float(np.sqrt(np.mean(inside**2))) if limit > 0.0 else float(np.sqrt(np.mean(x**2)))
+
+
+def floor_dph(data: TrainingData, residual: FloatArray, average_s: float) -> float:
+    """Noise of means over `average_s`, deg/h, from first differences of the residual within runs.
+
+    Slow structure that the map leaves does not count; samples longer than `average_s` are taken as they are.
+    """
+    means = average(replace(data, bias_dph=residual), average_s)
+    differences = np.diff(means.bias_dph)[np.diff(means.run) == 0]
+    if len(differences) == 0:
+        return robust_sigma(means.bias_dph)
+    return robust_sigma(differences) / float(np.sqrt(2.0))
+
+
+def difference_sigma(means: TrainingData, y: FloatArray, weight: FloatArray) -> float:
+    """σ of y at weight 1 from differences of neighbouring means; 0 where too few of them, or none differ.
+
+    First differences count a steady slope as noise, second differences count it as nothing: the smaller of the two.
+
+    Args:
+        means: Means in order of run and time, as `average` returns them.
+        y: Their bias in any unit.
+        weight: The noise variance of a mean is σ²/weight.
+    """
+    next_to = (np.diff(means.run) == 0) & (np.diff(means.time_s) < 1.5 * median(means.duration_s))
+    first = np.diff(y) / np.sqrt(1.0 / weight[1:] + 1.0 / weight[:-1])
+    both = next_to[1:] & next_to[:-1]
+    second = np.diff(y, 2) / np.sqrt(1.0 / weight[2:] + 4.0 / weight[1:-1] + 1.0 / weight[:-2])
+    found = [robust_sigma(x) for x in (first[next_to], second[both]) if len(x) >= _LEAST_DIFFERENCES]
+    return min(found, default=0.0)
+
+
+def not_white(residual: FloatArray, run: NDArray[np.int64], weight: FloatArray) -> str:
+    """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
+
+    Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box). A
+    single run passes neither: what another run would bring was never seen.
+    """
+    n = len(residual)
+    scaled = residual * np.sqrt(weight)
+    sigma = robust_sigma(scaled)
+    if sigma == 0.0 or n < 4 * _LAGS:
+        return "too few samples to test the residual"
+    runs, index = np.unique(run, return_inverse=True)
+    if len(runs) < 2:
+        return "a single run does not show how runs differ"
+    total = np.bincount(index, weight * residual) / np.sqrt(np.bincount(index, weight))
+    if chdtrc(len(runs), float(np.sum((total / sigma) ** 2))) < _SIGNIFICANCE:
+        return "run means of the residual scatter more than its noise allows"
+    clipped = np.clip(scaled / sigma, -_CLIP, _CLIP)
+    power = float(np.sum(clipped**2))
+    statistic = 0.0
+    for lag in range(1, _LAGS + 1):
+        pairs = run[lag:] == run[:-lag]
+        rho = float(np.sum(clipped[lag:][pairs] * clipped[:-lag][pairs])) / power
+        statistic += n * (n + 2) * rho**2 / (n - lag)
+    if chdtrc(_LAGS, statistic) < _SIGNIFICANCE:
+        return "the residual is correlated in time"
+    return ""

@@ -1,0 +1,189 @@
+"""Bytes of code, data and stack: of each public function, and of table and runtime as a program links them.
+
+gcc writes the graph of calls with the stack of each function (`-fcallgraph-info=su`). A call through a pointer goes to
+a hook of a term; the deepest of them all counts, whichever terms a table has. Functions of the compiler's own library
+(64-bit division and the like) stand in no graph: they are named, not counted.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..common.errors import CheckFailed
+from ..common.texts import c_environment
+from ..model import Model
+from ..results.verification import FunctionCost
+from ..store.files import write_own
+from ..store.scratch import scratch_folder
+from ..tables.text import example_period_us
+from ..target.table import Table
+from .emitted import checked_sources, table_files
+from .toolchain import Target, all_targets, compile_objects, link, symbols
+
+__all__ = ["PUBLIC", "TERM_CODES", "Footprint", "Graph", "footprint", "function_costs", "parse_graph"]
+
+_TARGETS = ("cortex-m4f", "host-gcc-O2")  # the first that can be built here
+_STATE = "footprint_state"
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """Bytes on a target: code and constants of everything linked; the caller's state."""
+
+    target: str
+    rom_bytes: int
+    ram_bytes: int
+
+
+def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = False) -> Footprint | None:
+    """Links self-test, init, sample and bias of a table for a Cortex-M4F, or the host where there is none.
+
+    Returns:
+        The sizes; None where nothing can be compiled.
+
+    Raises:
+        CheckFailed: The compiler refused the emitted code, or it is not gyrotc's and not `trusted`.
+    """
+    target = next((t for name in _TARGETS if (t := all_targets()[name]).missing() is None), None)
+    if target is None:
+        return None
+    text = (
+        c_environment()
+        .get_template("footprint.c.j2")
+        .render(
+            id=model.id,
+            symbol=model.symbol,
+            n=table.numeric,
+            n_channels=table.n_channels,
+            period_us=example_period_us(model),
+        )
+    )
+    with scratch_folder() as work:
+        source = work / "footprint.c"
+        write_own(source, text)
+        c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
+        return _measured(target, c, [c / "gtc.c", c / f"gtc_{model.id}.c"], source)
+
+
+def _measured(target: Target, c_folder: Path, sources: list[Path], main: Path) -> Footprint:
+    objects = compile_objects(target, sources, main.parent, include=c_folder)
+    program = main.parent / "footprint"
+    link(target, [*objects, *compile_objects(target, [main], main.parent, include=c_folder)], program)
+    own = {symbol.name for symbol in symbols(target, *objects)}
+    linked = symbols(target, program)
+    state = next(symbol.size for symbol in linked if symbol.name == _STATE)
+    return Footprint(target.name, sum(symbol.size for symbol in linked if symbol.name in own), state)
+
+
+PUBLIC = (
+    "check", "open", "map", "init", "sample", "sample_at", "missed", "bias", "snapshot", "rezero", "unzero",
+    "angle", "save", "restore",
+)  # fmt: skip
+"""Every function that gtc.h declares, without its prefix (`tests/py/test_functions.py`)."""
+_NODE = re.compile(
+    r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
+)
+_EDGE = re.compile(
+    r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
+)
+_INDIRECT = "__indirect_call"
+_CODES = "memory|play|warm_up|harmonic|auxiliary|curve|product"  # of terms in gtc_terms.inl
+TERM_CODES = tuple(_CODES.split("|"))  # by the kind of a term, from 1 on
+_HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{_CODES})_(?:begin|take|step|apply))$")
+
+
+@dataclass(slots=True)
+class Graph:
+    """Bytes of stack of each function by name, and whom it calls."""
+
+    stack: dict[str, int] = field(default_factory=dict)
+    calls: dict[str, set[str]] = field(default_factory=dict)
+
+    def callees(self, name: str) -> set[str]:
+        """Whom a function calls, pointers to hooks of its arithmetic resolved."""
+        found = {self._folded(callee) for callee in self.calls.get(name, set())}
+        if _INDIRECT not in found:
+            return found
+        hooks = {n for n in self.stack if _HOOK.match(n) and n[:8] == name[:8]}
+        return (found - {_INDIRECT}) | hooks
+
+    def _folded(self, name: str) -> str:
+        """Functions that are the same in both arithmetics are one, which has one of the two names."""
+        twin = name.replace("_q31_", "_f32_") if "_q31_" in name else name.replace("_f32_", "_q31_")
+        return twin if name not in self.stack and twin in self.stack else name
+
+    def reached(self, name: str) -> set[str]:
+        """The function and all that it calls on the way."""
+        return {name}.union(*(self.reached(callee) for callee in self.callees(name)))
+
+    def deepest(self, name: str, above: tuple[str, ...] = ()) -> int:
+        """Bytes of stack of a function and the deepest chain of calls from it.
+
+        Raises:
+            CheckFailed: A function calls itself, so that no bound exists.
+        """
+        if name in above:
+            raise CheckFailed(f"{name} calls itself by way of {' and '.join(above)}: its stack has no bound")
+        below = [self.deepest(callee, (*above, name)) for callee in self.callees(name)]
+        return self.stack.get(name, 0) + max(below, default=0)
+
+    def helpers(self, name: str) -> set[str]:
+        """Functions from outside that are called on the way: their stack is not in `deepest`."""
+        if name not in self.stack:
+            return {name}
+        return set().union(*(self.helpers(callee) for callee in self.callees(name)))
+
+
+def parse_graph(text: str) -> Graph:
+    """The graph in a file that gcc wrote.
+
+    Raises:
+        CheckFailed: The stack of a function depends on its arguments.
+    """
+    graph = Graph()
+    for line in text.splitlines():
+        if node := _NODE.match(line):
+            if node["how"] != "static":
+                raise CheckFailed(f"the stack of {node['name']} is {node['how']}")
+            graph.stack[node["name"]] = int(node["bytes"])
+        elif edge := _EDGE.match(line):
+            graph.calls.setdefault(edge["caller"], set()).add(edge["callee"])
+    return graph
+
+
+def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
+    """Costs by arithmetic and public function; empty without a gcc that tells.
+
+    It leaves the runtime's object, with lines of its text, as `functions/gtc.o` in `work`.
+
+    Raises:
+        CheckFailed: The compiler refused, or a stack has no bound.
+    """
+    if not target.compiler.endswith("-gcc") or target.counts != "instructions":
+        return {}
+    own = work / "functions"
+    own.mkdir()
+    told = target.model_copy(update={"flags": (*target.flags, "-g", "-fstack-usage", "-fcallgraph-info=su")})
+    objects = compile_objects(told, [c_folder / "gtc.c"], own, include=c_folder)
+    graph = parse_graph((own / "gtc.ci").read_text(encoding="utf-8", errors="replace"))
+    sizes = {s.name: s.size for s in symbols(target, *objects)}
+    return {
+        n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)
+    }
+
+
+def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, FunctionCost]:
+    costs: dict[str, FunctionCost] = {}
+    for function in PUBLIC:
+        linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
+        name = next((n for n in sizes if linked.match(n)), None)
+        if name is not None:
+            costs[function] = FunctionCost(
+                code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),
+                stack_bytes=graph.deepest(name),
+                helpers=tuple(sorted(graph.helpers(name))),
+            )
+    return costs
