@@ -182,7 +182,7 @@ def test_every_doubt_says_what_to_do_next() -> None:
     judge = Path(doubts_file).parent
     texts = "".join(
         (judge / f"{name}.py").read_text("utf-8")
-        for name in ("doubts", "recorded", "thermometers", "timing", "orientation")
+        for name in ("findings", "recorded", "thermometers", "timing", "orientation")
     )
     ids = set(re.findall(r'(?:Doubt\(|"id": )"(\w+)"', texts)) | {"axes_exchanged", "jump_in_temperature"}
     assert len(ids) > 20
