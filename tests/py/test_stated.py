@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import run_gyrotc
+from conftest import quick_and_slow, run_gyrotc
 from gyrotc.dataset import load
 from gyrotc.errors import GyrotcError, InputError
 from gyrotc.jobs.build import build_into
@@ -197,7 +197,9 @@ def test_a_reason_without_a_fail_is_refused(passing: Path) -> None:
         release_of(passing, "why not")
 
 
-@pytest.mark.parametrize("text", ["schema = 1", 'schema = 1\nproduct = "NAV"\n[interval]\ndays = 365'])
+@pytest.mark.parametrize(
+    "text", quick_and_slow(["schema = 1"], ['schema = 1\nproduct = "NAV"\n[interval]\ndays = 365'])
+)
 def test_no_limits_are_no_pass(
     tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
