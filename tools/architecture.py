@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import functools
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,8 @@ def stage(path: Path, package: Path = PACKAGE) -> str:
     return path.relative_to(package).parts[0].removesuffix(".py")
 
 
-def imported(path: Path, package: Path = PACKAGE) -> set[str]:
+@functools.cache
+def imported(path: Path, package: Path = PACKAGE) -> frozenset[str]:
     """Rooms that a module imports, relative or absolute, at any depth of its functions."""
     found: set[str] = set()
     depth = len(path.relative_to(package).parts)
@@ -45,7 +47,7 @@ def imported(path: Path, package: Path = PACKAGE) -> set[str]:
             found.update(names)
         elif isinstance(node, ast.Import):
             found.update(a.name.split(".")[1] for a in node.names if a.name.startswith("gyrotc."))
-    return {name for name in found if not name.startswith("__")}
+    return frozenset(name for name in found if not name.startswith("__"))
 
 
 def modules(package: Path = PACKAGE) -> list[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import gc
 import hashlib
 import io
 import os
@@ -34,6 +35,11 @@ EXAMPLE = ROOT / "examples" / "minimal"
 HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests stay to the end: a collection of garbage need not look at them each time."""
+    gc.freeze()
 
 
 def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

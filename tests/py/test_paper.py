@@ -72,6 +72,7 @@ def test_a_figure_that_moves_is_told_with_its_place(now: dict[str, Any]) -> None
     assert sum("None recorded" in line for line in departures(other, now)) > 100
 
 
+@pytest.mark.slow
 def test_a_page_or_a_figure_of_another_record_is_told(drawn: Path, tmp_path: Path) -> None:
     docs = tmp_path / "docs"
     (docs / "results").mkdir(parents=True)
