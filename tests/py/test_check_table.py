@@ -91,6 +91,7 @@ def uncertain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return emitted(tmp_path_factory.mktemp("uncertain"), load_model(UNCERTAIN))
 
 
+@pytest.mark.slow
 def test_a_table_with_uncertainties_is_the_model(uncertain: Path) -> None:
     done = _check(uncertain)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -128,6 +129,7 @@ def test_a_wrong_macro_of_the_header_is_seen(macro: str, uncertain: Path, tmp_pa
     assert done.returncode == 1 and ("header" in done.stdout), done.stdout
 
 
+@pytest.mark.slow
 def test_a_bound_that_proves_nothing_is_seen(uncertain: Path, tmp_path: Path) -> None:
     shutil.copytree(uncertain, tmp_path / "spoilt")
     spoil(tmp_path / "spoilt" / "c" / "gtc_sim_0003.h", r"\|error\| <= \S+", "|error| <= 1.00e-03")

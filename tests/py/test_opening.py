@@ -78,7 +78,9 @@ COMMANDS = {
 }
 
 
-@pytest.fixture(params=quick_and_slow([name for name in COMMANDS if name != "report"], ["report"]))
+@pytest.fixture(
+    params=quick_and_slow([name for name in COMMANDS if name not in ("report", "shard")], ["report", "shard"])
+)
 def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
     found: tuple[str, ...] = COMMANDS[request.param]
     return found
