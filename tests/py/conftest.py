@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import gc
+import hashlib
 import io
 import os
+import re
+import shutil
 import subprocess
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest import mock
@@ -31,6 +35,11 @@ EXAMPLE = ROOT / "examples" / "minimal"
 HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests stay to the end: a collection of garbage need not look at them each time."""
+    gc.freeze()
 
 
 def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -139,6 +148,50 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
             make(folder)
             (folder / ".made").touch()
     return folder
+
+
+def _read_by(command: list[str]) -> str:
+    """Hash of what a compiler reads: itself, its options, the source, the headers that it finds beside it."""
+    folders = [Path(word[2:]) for word in command if word.startswith("-I")]
+    source = Path(command[command.index("-c") + 1])
+    program = Path(shutil.which(command[0]) or command[0]).resolve()
+    options = [word for word in command[1:-1] if not word.startswith("-I") and word != str(source)]
+    digest = hashlib.sha256(repr((program, options)).encode())
+    files = [source]
+    for path in files:  # grows as headers are found
+        content = path.read_bytes()
+        digest.update(f"\0{path.name} {len(content)}\0".encode() + content)
+        names = re.findall(rb'^[ \t]*#[ \t]*include[ \t]*["<]([^">]+)', content, re.MULTILINE)
+        found = [folder / os.fsdecode(name) for folder in (path.parent, *folders) for name in names]
+        files += [header for header in found if header.is_file() and header not in files]
+    return digest.hexdigest()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What this process compiles twice from the same bytes with the same command is compiled once.
+
+    Builds of different gyros have the same `gtc.c`, at which a compiler works for a second.
+    """
+    from gyrotc.verify import toolchain
+
+    compiled = toolchain._command
+    kept = made_once(tmp_path_factory, "objects", lambda folder: None)
+
+    def command(target: toolchain.Target, words: list[str], folder: Path) -> None:
+        if "-c" not in words or "-fcallgraph-info=su" in words:  # links, or writes more than an object
+            return compiled(target, words, folder)
+        known = kept / f"{_read_by(words)}.o"
+        if not known.exists():
+            compiled(target, words, folder)
+            part = known.with_suffix(f".{os.getpid()}")
+            shutil.copyfile(words[-1], part)
+            part.replace(known)
+        shutil.copyfile(known, words[-1])
+        return None
+
+    with mock.patch.object(toolchain, "_command", command):
+        yield
 
 
 def _demo(folder: Path) -> None:

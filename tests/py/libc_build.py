@@ -163,9 +163,13 @@ def _address(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-@lru_cache
 def runtime(compiler: str = "gcc", options: tuple[str, ...] = ("-O2",)) -> Runtime:
     """Compiles `libc/` and loads it."""
+    return _compiled(compiler, options)
+
+
+@lru_cache
+def _compiled(compiler: str, options: tuple[str, ...]) -> Runtime:
     folder = Path(tempfile.mkdtemp(prefix="gyrotc-test-"))
     library = folder / "libgtc.so"
     sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "py" / "libc_shim.c"]

@@ -36,6 +36,7 @@ def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:
                 assert node.level <= 1 and not str(node.module).startswith(("gyrotc", "tests")), name
 
 
+@pytest.mark.slow
 def test_heat_comes_to_rest_at_the_air_and_keeps_its_balance() -> None:
     """Without a discharge all volumes end at the air; with it, the case is above by power / to_air."""
     rng = np.random.default_rng(3)
@@ -64,6 +65,7 @@ def test_noise_has_the_covariance_that_the_yardstick_counts_on() -> None:
     assert drawn[0, 5] == pytest.approx(wanted[0, 5], abs=0.2 * wanted[0, 0])
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_recording_and_foreign_ones_are_foreign() -> None:
     one, again = (draw_recording(11, 4, "foreign", "", hours=2.0) for _ in range(2))
     for a, b in zip(one.tables, again.tables, strict=True):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _RUNS, _BLOCKS = 6, 720  # two hours of 10 s each
+SEED = 20
 
 
 def wander(rng: np.random.Generator, tau: float = 150.0) -> Array:
@@ -74,9 +74,8 @@ def verdicts(samples: TrainingData, columns: dict[str, Array]) -> dict[str, tupl
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    seed = secrets.randbelow(2**32)
-    print("seed", seed)
-    return np.random.default_rng(seed)
+    print("seed", SEED)
+    return np.random.default_rng(SEED)
 
 
 def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.Generator) -> None:

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import Command, quick_and_slow
+from conftest import HOST, Command, quick_and_slow
 from gyrotc.cli import main
 from gyrotc.store.files import Lock
 from gyrotc.store.marker import MARKER, faults
@@ -192,7 +192,7 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(
     program = Path(sys.executable).with_name("gyrotc")
     # A job in the background of a shell inherits that SIGINT is ignored; env undoes it, and becomes the program.
     job = subprocess.Popen(
-        ["env", "--default-signal", program, "build", made / "A", "--out", place / "out"],
+        ["env", "--default-signal", program, "build", made / "A", *HOST, "--out", place / "out"],
         env=os.environ | {"PATH": f"{tools}:{os.environ['PATH']}"},
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

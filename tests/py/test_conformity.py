@@ -13,6 +13,7 @@ from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.results.evaluation import EvaluatedRun, FigureUncertainty, RunStatistics, Statistics
 
 KNOWN = FigureUncertainty(standard=0.05, freedom=None, method="noise")
+SEED = 20
 
 CASES = [  # measured, rule, verdict, met; the limit is at most 1, U = 0.1
     (0.89, "guard_band", "PASS", True),
@@ -88,9 +89,8 @@ def exam(draw: np.random.Generator, hours: int, correlation_s: float) -> list[Av
 @pytest.mark.parametrize("correlation_s", [1.0, 1200.0])
 def test_stated_uncertainties_cover_the_truth(correlation_s: float) -> None:
     """95 % of exams hold the true RMS, mean and standard deviation within U, also where the noise is not white."""
-    seed = int(np.random.default_rng().integers(2**31))
-    print("seed", seed)
-    draw = np.random.default_rng(seed)
+    print("seed", SEED)
+    draw = np.random.default_rng(SEED)
     inside = {"rms_dph": 0, "mean_dph": 0}
     exams = 300
     for _ in range(exams):

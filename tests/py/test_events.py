@@ -58,6 +58,7 @@ def only(folder: Path) -> Event:
     return event
 
 
+@pytest.mark.slow
 def test_recordings_without_steps_have_none() -> None:
     """Forty sets of six runs, half of them with a random walk, at a false-alarm rate of one in a hundred."""
     rng = np.random.default_rng(SEED)

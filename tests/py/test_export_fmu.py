@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from conftest import ROOT, Command
+from conftest import ROOT, Command, quick_and_slow
 from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.deliver.export import export
@@ -130,7 +130,7 @@ def bits(values: Any) -> NDArray[np.uint32]:
     return np.array(values, dtype=np.float32).view(np.uint32)
 
 
-@pytest.mark.parametrize("which", ["plain", "channels"])
+@pytest.mark.parametrize("which", quick_and_slow(["channels"], ["plain"]))
 def test_every_step_gives_the_references_bits(
     which: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:

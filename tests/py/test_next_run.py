@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
@@ -21,6 +19,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 ENVELOPE = ((-40.0, 60.0), (-5.0, 5.0))
+SEED = 20
 NOISE, MEAN_S = 7e-4, 50.0
 
 
@@ -73,9 +72,8 @@ def random_run(rng: np.random.Generator, hours: float) -> list[ChamberStep]:
 
 def test_the_proposal_tells_more_than_a_random_run_of_its_price() -> None:
     """Squared error of the map over the envelope once the run was measured, of units not drawn from the prior."""
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    rng = np.random.default_rng(seed)
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
     owns = 0.5 * rng.normal(size=(12, 5))
     known = known_of(rng, owns[0])  # its covariance is that of all: the same temperatures
     proposed = next_run(random_model(1), known, NOISE, MEAN_S, "paper", Price())

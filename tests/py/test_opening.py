@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, run_gyrotc
+from conftest import ROOT, quick_and_slow, run_gyrotc
 from gyrotc.common.errors import InputError
 from gyrotc.store.files import Lock, write_atomically
 from recordings import columns, toml, write_csv
@@ -78,7 +78,9 @@ COMMANDS = {
 }
 
 
-@pytest.fixture(params=COMMANDS)
+@pytest.fixture(
+    params=quick_and_slow([name for name in COMMANDS if name not in ("report", "shard")], ["report", "shard"])
+)
 def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
     found: tuple[str, ...] = COMMANDS[request.param]
     return found

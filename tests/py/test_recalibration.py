@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -41,6 +40,7 @@ Floats = NDArray[np.float64]
 Change = Callable[[Floats, Floats], Floats]
 
 NOISE = 7e-4  # deg/h of a mean of 50 s
+SEED = 20
 STEP_S = 50.0
 ENVELOPE = ((-20.0, 50.0), (-2.4, 2.4))
 CALIBRATION = ((20.0, 50.0, -20.0, 20.0), (-20.0, 40.0, 0.0, 50.0), (50.0, -10.0, 30.0, -20.0))
@@ -112,9 +112,8 @@ def test_units_as_the_model_says_have_uniform_p_values() -> None:
 
 def test_unchanged_units_are_confirmed() -> None:
     """Calibrations and check runs of one map: false alarms at about the stated 1 %."""
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    rng = np.random.default_rng(seed)
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
     priors = [earlier(rng) for _ in range(4)]
     found = [checked(rng, prior) for prior in priors for _ in range(5)]
     assert sum(one.change is not None for one in found) <= 4  # of 20: beyond it once in a million times
@@ -123,9 +122,8 @@ def test_unchanged_units_are_confirmed() -> None:
 
 @pytest.mark.parametrize("kind", CHANGES)
 def test_a_planted_change_is_named_with_its_region(kind: str) -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    found = checked(np.random.default_rng(seed), one(), CHANGES[kind])
+    print("seed", SEED)
+    found = checked(np.random.default_rng(SEED), one(), CHANGES[kind])
     assert found.p_value < 0.01 and found.change is not None
     change = found.change
     assert change.kind == kind, change.text
@@ -140,9 +138,8 @@ def test_a_planted_change_is_named_with_its_region(kind: str) -> None:
 
 
 def test_ageing_that_is_stated_is_no_finding() -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
-    rng = np.random.default_rng(seed)
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
     known = posterior_of_means(means(recorded(rng, CALIBRATION)), ENVELOPE, 0.0)
     aged = widened(known, 6e-4, "as stated", "a" * 64, None)
     assert checked(rng, aged, CHANGES["offset"]).change is None

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import quick_and_slow
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.history import replay
 from gyrotc.target.maps import evaluate_map
@@ -27,7 +28,7 @@ BUILDS = [
 
 @pytest.mark.parametrize("numeric", NUMERICS)
 @pytest.mark.parametrize("build", BUILDS, ids=str)
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", quick_and_slow(range(6), range(6, 12)))
 def test_maps_agree_bit_for_bit(numeric: str, build: tuple[str, tuple[str, ...]], seed: int) -> None:
     model = random_model(seed)
     table = quantise(model, numeric)
@@ -45,7 +46,7 @@ def test_maps_agree_bit_for_bit(numeric: str, build: tuple[str, tuple[str, ...]]
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", quick_and_slow(range(16), range(16, 40)))
 def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> None:
     model = random_model(seed)
     table = quantise(model, numeric)
@@ -63,7 +64,7 @@ def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> Non
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", quick_and_slow(range(16), range(16, 40)))
 def test_terms_agree_bit_for_bit(numeric: str, seed: int) -> None:
     model = random_model(seed, terms=random_terms(seed))
     table = quantise(model, numeric)

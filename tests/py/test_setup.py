@@ -92,6 +92,7 @@ def test_no_release_stands_in_a_package_name() -> None:
     assert numbered == []
 
 
+@pytest.mark.slow
 def test_proofs_whose_tool_is_missing_are_skipped_by_its_name(tmp_path: Path) -> None:
     files = ("test_rounding.py", "test_run_time_errors.py")
     done = subprocess.run(

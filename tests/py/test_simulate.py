@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -340,7 +339,7 @@ profiles = ["hold", "hold", "hold", "hold"]
 
 def test_allantools_finds_the_declared_noise_in_a_recording(tmp_path: Path) -> None:
     """Allan variance of whole recordings: the sum of the four declared terms, each of which rules somewhere."""
-    seed = secrets.randbits(32)
+    seed = 20
     print(f"seed {seed}")
     path = tmp_path / "long.toml"
     path.write_text(LONG, "utf-8")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SEED = 20
 SHORT = """
 title = "A short run"
 
@@ -52,10 +52,9 @@ def spread(found: Array) -> float:
 
 
 def test_family_is_the_correlation_of_a_parameter_between_two_units() -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
+    print("seed", SEED)
     pairs = [
-        [list(u.lot.scores.values()) for u in draw_lot(read("paper")[1], LotOrder(2, 0.7), seed + k) if u.lot]
+        [list(u.lot.scores.values()) for u in draw_lot(read("paper")[1], LotOrder(2, 0.7), SEED + k) if u.lot]
         for k in range(40)
     ]
     one, other = np.array(pairs)[:, 0], np.array(pairs)[:, 1]
@@ -65,13 +64,12 @@ def test_family_is_the_correlation_of_a_parameter_between_two_units() -> None:
 
 
 def test_units_of_a_stronger_family_differ_less() -> None:
-    seed = secrets.randbits(30)
-    print("seed", seed)
+    print("seed", SEED)
     strengths = (0.0, 0.5, 0.8, 0.94, 0.99)
-    found = [np.median([spread(maps(LotOrder(16, f), seed + k)) for k in range(3)]) for f in strengths]
+    found = [np.median([spread(maps(LotOrder(16, f), SEED + k)) for k in range(3)]) for f in strengths]
     assert found == sorted(found, reverse=True)
     assert 0.1 < found[3] < 0.5 < found[0]  # medians of many lots: docs/simulation.md, section 6
-    assert np.ptp(maps(LotOrder(3, 1.0), seed), axis=0).max() < 1e-15
+    assert np.ptp(maps(LotOrder(3, 1.0), SEED), axis=0).max() < 1e-15
 
 
 def test_a_stranger_is_no_unit_of_its_lot() -> None:

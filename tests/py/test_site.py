@@ -53,6 +53,7 @@ def test_links_of_a_page_lead_to_what_the_site_has(page: Path) -> None:
             assert site_pages.source(there).is_file(), f"{target} is no file of the site"
 
 
+@pytest.mark.slow
 def test_the_picture_shows_every_room_and_no_reader_fetches_its_painter() -> None:
     graph = architecture.packages()
     drawn = site_pages.picture(graph)

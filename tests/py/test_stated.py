@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import run_gyrotc
+from conftest import quick_and_slow, run_gyrotc
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import GyrotcError, InputError
 from gyrotc.deliver import certificate as printing
@@ -198,7 +198,9 @@ def test_a_reason_without_a_fail_is_refused(passing: Path) -> None:
         release_of(passing, "why not")
 
 
-@pytest.mark.parametrize("text", ["schema = 1", 'schema = 1\nproduct = "NAV"\n[interval]\ndays = 365'])
+@pytest.mark.parametrize(
+    "text", quick_and_slow(["schema = 1"], ['schema = 1\nproduct = "NAV"\n[interval]\ndays = 365'])
+)
 def test_no_limits_are_no_pass(
     tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from conftest import Command
+from conftest import Command, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
 from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, StageLine, folded, time_left
@@ -119,6 +119,7 @@ COMMANDS = {
     "verify": ("verify", "made"),
     "export": ("export", "made", "--format", "fmu", "--out", "out"),
 }
+_QUICK = ("fit", "fleet", "verify")
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +132,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="there is no /proc")
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", quick_and_slow(_QUICK, [name for name in COMMANDS if name not in _QUICK]))
 def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
     """At a moment drawn within the first second and a half: imports, work, or its end."""
     seed = random.SystemRandom().randrange(10**6)

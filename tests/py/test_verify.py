@@ -21,7 +21,7 @@ from gyrotc.verify.board_log import compared_words, read_output
 from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 
-FAST = "host-gcc-O2"
+FAST = "host-gcc-O0"
 
 
 @pytest.fixture(scope="module")
