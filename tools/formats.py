@@ -16,12 +16,12 @@ from gyrotc.results.describe import schema_text, tables
 from gyrotc.results.diagnosed import Diagnosed
 from gyrotc.results.evaluation import Changes, Comparison, Evaluation
 from gyrotc.results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
-from gyrotc.results.folder import Manifest, MapOnGrid, Marker
+from gyrotc.results.folder import MapOnGrid, Marker
 from gyrotc.results.lot import Lot
 from gyrotc.results.planned import LotPlan, NextRun, Plan
 from gyrotc.results.recordings import Checked, ImportedFiles, SimulatedTruth
 from gyrotc.results.release import Budget, HeldLimits, Release
-from gyrotc.results.training import Training
+from gyrotc.results.training import Manifest, Training
 from gyrotc.results.verification import Emitted, JointVerification, Verification
 from gyrotc.tables.record import EmissionRecord
 from pydantic import BaseModel

@@ -30,9 +30,8 @@ from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.folder import Manifest
 from gyrotc.results.planned import Plan
-from gyrotc.results.training import DeclaredUnits
+from gyrotc.results.training import DeclaredUnits, Manifest
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read as read_scenario
 from gyrotc.simulate.truth import simulated_floor

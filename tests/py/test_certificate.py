@@ -16,7 +16,7 @@ from gyrotc.jobs.build import build_into
 from gyrotc.pages.words import digits_of
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
-from gyrotc.results.folder import Manifest
+from gyrotc.results.training import Manifest
 from gyrotc.store.folder import result_folder
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv

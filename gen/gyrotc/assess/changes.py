@@ -30,7 +30,7 @@ from ..results.evaluation import (
     NameChanges,
     TextChange,
 )
-from ..results.folder import Manifest
+from ..results.training import Manifest
 from ..results.verification import Verification
 from .evaluate import evaluate
 from .limits import Limits, held_against

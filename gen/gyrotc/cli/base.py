@@ -18,8 +18,6 @@ from rich.text import Text
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..store.files import check_replaceable, json_text
-from ..store.folder import write_result
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
@@ -169,6 +167,9 @@ OutOption = Annotated[Path, typer.Option("--out", help="Folder for the result.")
 
 def written_place(path: Path | None) -> Path | None:
     """Checks, before the work begins, that gyrotc wrote what stands in the place of the result."""
+
+    from ..store.files import check_replaceable
+
     if path is not None:
         check_replaceable(path)
     return path
@@ -322,6 +323,9 @@ def show(table: Table) -> None:
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
+    from ..store.files import json_text
+    from ..store.folder import write_result
+
     if path is not None:
         write_result(path, json_text(result))
 

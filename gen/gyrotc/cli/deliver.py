@@ -11,8 +11,6 @@ from typing import Annotated, cast, get_args
 import typer
 
 from ..common.errors import InputError
-from ..store.files import json_text, write_own
-from ..store.folder import result_folder
 from .base import AcceptOption, DirArg, OutOption, app, progress, tell, written_place
 
 _MOST_POINTS = 1000  # of an axis: a table of a million is more than any control unit holds
@@ -123,8 +121,11 @@ def sign(
 
     Example: gyrotc sign result --key lab.pem
     """
+
     from ..jobs.axes import check_emitted
     from ..jobs.release import release_of
+    from ..store.files import json_text, write_own
+    from ..store.folder import result_folder
     from ..tables.record import RELEASE, SIGNATURE
     from ..verify.signatures import load_private_key, sign_record
 

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..store.files import json_text
-from ..store.folder import write_result
 from .base import (
     LOT,
     JsonOption,
@@ -212,7 +210,10 @@ def lot(
 
     Example: gyrotc lot fleet --out lot.json
     """
+
     from ..lot.job import lot_of
+    from ..store.files import json_text
+    from ..store.folder import write_result
 
     with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, progress=say)

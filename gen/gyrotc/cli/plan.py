@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ..causes import CATALOGUE
 from ..common.errors import InputError
-from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder
 from .base import PLAN, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
+
+if TYPE_CHECKING:
+    from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
 
 __all__ = ["limits_of", "pair_of", "plan_parts"]
 
@@ -113,6 +112,8 @@ def _limits(result: Plan) -> Table:
 
 
 def _over(id: str, limit: DetectionLimit) -> str:
+    from ..causes import CATALOGUE
+
     points = limit.over
     if CATALOGUE[id].kind == "input":
         return "shortest that shows in this gyro"
@@ -123,6 +124,8 @@ def _over(id: str, limit: DetectionLimit) -> str:
 
 
 def _separability(result: Plan) -> Table:
+    from ..causes import CATALOGUE
+
     rows = result.separability
     others = [i for i in CATALOGUE if any(i in row.d for row in rows)]
     title = "d at which a cause (row) is told from another (column); detection itself takes d = 6"
@@ -219,6 +222,9 @@ def plan(
     Example: gyrotc plan paper --lot lot.json --require accuracy=2e-4 --out programme
     Example: gyrotc plan paper --unit build/RLG-0042 --price-per-hour 90 --price-per-run 150
     """
+
+    from ..store.folder import result_folder
+
     if unit is not None:
         if require:
             raise InputError("--require", ", ".join(require), "with --unit: a price; it proposes one run")
@@ -261,9 +267,12 @@ def _next_run(
     json_file: Path | None,
 ) -> None:
     """`gyrotc plan --unit`: the run that tells most of a unit for its price, as a file and in words."""
+
     from ..jobs.recalibration import unit_in
     from ..lot.job import load_lot
     from ..lot.planning import Price, next_run, programme_csv, programme_text
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
 
     with result_folder(out, "plan") if out else nullcontext() as stage:
         model, known, means = unit_in(unit, load_lot(lot) if lot else None)
@@ -290,8 +299,11 @@ def _plan_with_lot(
     scenario: str, path: Path, require: Sequence[str], out: Path | None, json_file: Path | None
 ) -> None:
     """`gyrotc plan --lot`: the shortest chamber programme of an accuracy, as a file and in words."""
+
     from ..lot.job import load_lot
     from ..lot.planning import plan_with_lot, programme_csv, programme_text
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
 
     required = limits_of(require)
     if set(required) != {"accuracy"}:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..pages.comparison import ENVIRONMENTS
-from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
-from ..results.release import HeldLimits
-from ..results.training import Training
-from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
+if TYPE_CHECKING:
+    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
+    from ..results.release import HeldLimits
+    from ..results.training import Training
+    from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
 
 
 def _e(value: float | None, digits: int = 2) -> str:
@@ -170,6 +170,9 @@ def _log_notes(log: ReadLog) -> Iterator[str]:
 
 def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
+
+    from ..results.verification import Verification
+
     for file in result.emitted:
         if file.verdict == "foreign":
             yield f"{file.file}: foreign; gyrotc did not write it, move it elsewhere"
@@ -207,6 +210,9 @@ def summary(result: Evaluation) -> str:
 
     The paper's own figure stands beside it for the paper's scenario.
     """
+
+    from ..pages.comparison import ENVIRONMENTS
+
     found = result.judged()
     if found is None or not found[1].improvement:
         return "no sample to judge by"

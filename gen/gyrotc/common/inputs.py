@@ -18,8 +18,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
-
 from .errors import InputError
 
 __all__ = [
@@ -272,6 +270,8 @@ def checked(kind: type[T], content: Any, where: str) -> T:
     Raises:
         InputError: A field is missing or of another type; the message names it.
     """
+    from pydantic import TypeAdapter, ValidationError  # half of the time that `gyrotc --help` may take
+
     try:
         # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
         return TypeAdapter(kind).validate_json(json.dumps(content))

@@ -28,8 +28,8 @@ from ..jobs.release import accepted, unit_of
 from ..pages.report import page_environment
 from ..pages.unit import UnitResults
 from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
-from ..results.folder import Manifest
 from ..results.release import Budget, Limit
+from ..results.training import Manifest
 from ..store.files import write_atomically, write_own
 from ..store.folder import result_folder
 from ..store.marker import sha256

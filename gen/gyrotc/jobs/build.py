@@ -24,9 +24,8 @@ from ..recordings.load import axes_of, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
-from ..results.folder import Manifest
 from ..results.release import HeldLimits
-from ..results.training import Training
+from ..results.training import Manifest, Training
 from ..results.verification import Verification
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder

@@ -10,9 +10,8 @@ from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation, Pooled
-from ..results.folder import Manifest
 from ..results.release import Budget, HeldLimits, Limit, Verdict
-from ..results.training import Rung, Training
+from ..results.training import Manifest, Rung, Training
 from ..results.verification import Verification
 from .words import limit_words, plain, words
 

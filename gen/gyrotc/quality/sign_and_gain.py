@@ -6,7 +6,7 @@ where the factors differ by far more than their errors, and these are stretched 
 themselves, at the best place of each. It also has to explain the run better than any memory of the temperature does
 (`remembered`): in a unit with hysteresis one branch is the curve of the others with a factor.
 
-Sign and axes are those of the checks of recordings (`quality.orientation`, `quality.recorded`). A gain is found where the
+Sign and axes are those of the checks of recordings (`orientation`, `recorded`). A gain is found where the
 mean rate over temperature is that of the other runs with a factor, where these agree with one another, and where no
 memory of the temperature explains the run as well.
 """

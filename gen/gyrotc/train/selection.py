@@ -1,7 +1,7 @@
 """Model selection: the simplest correction that does on unseen thermal history what the best one does.
 
 Rungs: nothing, constant, linear, cubic in T, cubic with a slope in dT/dt, map of T, map of (T, dT/dt). Each is fitted
-with every stretch of history left out in turn (`cross_validation.history_folds`) and judged on that stretch by means over
+with every stretch of history left out in turn (`history_folds`) and judged on that stretch by means over
 `average_s`. Two questions decide:
 
 1. *Which rung?* The yardstick is the best of what anyone would fit: a constant, a cubic in T, a cubic with a slope in
