@@ -6,7 +6,7 @@ wave adds. Such a model fits, and is no explanation; on other temperatures it go
 
 All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
 change of the map's input the same number of map functions is fitted before and after (equal flexibility),
-on the blocks where the changed input is known. A cause that would have to be larger than is believed (`size_limit`)
+on the blocks where the changed input is known. A cause that would have to be larger than is believed (`SizeLimit`)
 gains nothing.
 """
 

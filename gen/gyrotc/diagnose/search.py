@@ -3,7 +3,7 @@
 The likelihood of a colour is the residual one (Patterson and Thompson 1971): everything that may be an effect is
 projected out first, so that no effect is taken for noise.
 
-Everything that is asked of the data afterwards (`project`, `detection`) is algebra on these inner products.
+Everything that is asked of the data afterwards (`detection`) is algebra on these inner products.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Signature:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A shape that no cause has (`alternatives.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
+    """A shape that no cause has (`candidates.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
 
     name: str
     parameters: int

@@ -122,7 +122,7 @@ class CycleFits:
         return np.asarray(np.triu(out, 1) if kinds[0] == kinds[1] else out)
 
     def _apart(self, kind: str) -> NDArray[np.bool_]:
-        """Which two states of a kind are far enough apart to be two, as in `pairs`."""
+        """Which two states of a kind are far enough apart to be two, as in `gains`."""
         logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
         return np.asarray(np.abs(logs[:, None] - logs[None, :]) > APART)
 

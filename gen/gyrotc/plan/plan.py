@@ -108,7 +108,7 @@ def _distance(sensitivity: Sensitivity, runs: list[int], required: Mapping[str, 
     )
 
 
-_D_FOUND = 6.0  # about where most causes are found, as in `separate`
+_D_FOUND = 6.0  # about where most causes are found, as in `sensitivity`
 _LEAST_C = 1e-4  # no thermometer tells less than this
 
 

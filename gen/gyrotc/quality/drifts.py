@@ -3,7 +3,7 @@
 What relaxes after a change of temperature or after power-on slows down; a drift that begins does the reverse: nothing
 before, and then it goes on. So only kinks behind which the slope is several times the one before count, and only
 where the temperature has not moved for as long as is looked at: a play that is pushed again, or a lag behind a corner
-of the programme, make kinks too. Places, lengths and the level of the noise are as for steps (`lasting_steps`).
+of the programme, make kinks too. Places, lengths and the level of the noise are as for steps (`steps`).
 """
 
 from __future__ import annotations

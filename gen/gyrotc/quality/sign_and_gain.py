@@ -1,14 +1,13 @@
 """Runs with a reversed sign, exchanged axes or another gain, as a whole or from a time on.
 
-The yardstick is the other runs' mean rate over temperature, as for runs that are another gyro's as a whole (`turned`).
-On either side of every time of a run a level, a factor on that curve and one on dT/dt are fitted; a change is told
-where the factors differ by far more than their errors, and these are stretched by what the other runs show among
-themselves, at the best place of each. It also has to explain the run better than any memory of the temperature does
-(`remembered`): in a unit with hysteresis one branch is the curve of the others with a factor.
+Sign and axes of whole runs are those of the checks of recordings (`orientation`, `recorded`). A run as a whole has
+another gain where its mean rate over temperature is that of the other runs with a factor, where these agree with one
+another, and where no memory of the temperature explains the run as well (`evidence_beside_memories`): in a unit with
+hysteresis one branch is the curve of the others with a factor.
 
-Sign and axes are those of the checks of recordings (`orientation`, `recorded`). A gain is found where the
-mean rate over temperature is that of the other runs with a factor, where these agree with one another, and where no
-memory of the temperature explains the run as well.
+For a change within a run a level, a factor on the other runs' mean curve and one on dT/dt are fitted on either side of
+every time. A change is reported where the factors differ by far more than their errors, stretched by what the other
+runs show among themselves, and where it explains the run better than any memory.
 """
 
 from __future__ import annotations

@@ -1,18 +1,18 @@
 """Recorded channels as inputs: what the target would see of each, its shape, and what stands in where it is lost.
 
-Each is the record of one term, whose columns at fixed centers and width are linear in their weights; `parts` says
-which is earned. The centers lie at a quarter and three quarters of what training showed, 0.9 of its half range wide:
-of squares, cubes, saturations and exponentials over the range that leaves one to two hundredths of the variance that a
-line leaves, of a corner a twentieth.
-
-It is fitted to what map and other terms leave of the training samples, so that map and stand-in together are the best
-correction of one thermometer that these samples give. The fit is that of a map, which takes no more Gaussians than
-the noise can tell.
-
-A table holds functions of up to four channels: straight lines, and where they are earned bent ones or a slope that
-depends on the temperature (`shapes`). Candidates are the recorded channels as they are, and of thermometers their
+A table holds functions of up to four channels: straight lines, and where cross-validation shows it bent ones or a slope
+that depends on the temperature. Candidates are the recorded channels as they are, and of thermometers their
 differences: to the gyro's own, and between any two of them, for what one thermometer shows the map holds already. Of a
 difference the firmware passes the difference. `parts` chooses.
+
+A shape is the record of one term, whose columns at fixed centers and width are linear in their weights. The centers lie
+at a quarter and three quarters of what training showed, 0.9 of its half range wide: of squares, cubes, saturations and
+exponentials over the range that leaves one to two hundredths of the variance that a line leaves, of a corner a
+twentieth.
+
+A stand-in is fitted to what map and other terms leave of the training samples, so that map and stand-in together are
+the best correction of one thermometer that these samples give. The fit is that of a map, which takes no more Gaussians
+than the noise can show.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ weights are those of generalised least squares, β = (Uᵀ E U + Λ)⁻¹ Uᵀ E
 stretch that is left out; after that any set of parts costs a small linear system.
 
 Choice: forward, then the fewest parts that are not worse than the best number of them by more than one standard error
-of the paired difference over stretches, in score and in mean square, as rungs of the ladder are (`ladder`); and with
+of the paired difference over stretches, in score and in mean square, as rungs of the ladder are (`selection`); and with
 these the correction must be better than without any by a t test at 5 % over independent pieces of history.
 """
 
