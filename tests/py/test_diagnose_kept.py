@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 from campaigns import GRADIENT, simulated
-from gyrotc.diagnose.diagnosis import Diagnosis
+from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.jobs import diagnosis
-from gyrotc.jobs import diagnosis as kept_diagnosis
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.store import cache
@@ -83,7 +82,7 @@ class _Counted:
 @pytest.fixture
 def counted(data: Path, monkeypatch: pytest.MonkeyPatch) -> _Counted:
     still = load(_still(data.parent / "still"))
-    counted = _Counted(diagnosis.diagnose(still))
+    counted = _Counted(diagnose(still))
     monkeypatch.setattr("gyrotc.diagnose.diagnosis.diagnose", counted)
     return counted
 
@@ -110,7 +109,7 @@ def test_whatever_a_diagnosis_depends_on_makes_another_one(
     options = FitOptions()
 
     def ask(**more: object) -> None:
-        kept_diagnosis.diagnosed(load(folder), **({"options": options} | more))  # type: ignore[arg-type]
+        diagnosis.diagnosed(load(folder), **({"options": options} | more))  # type: ignore[arg-type]
 
     def asked_anew(what: str, call: Callable[[], None]) -> None:
         before = counted.count
@@ -133,7 +132,7 @@ def test_whatever_a_diagnosis_depends_on_makes_another_one(
     (folder / "dataset.toml").write_text(description.replace("[meta]\n", "[meta]\noperator = 'M. Curie'\n"))
     asked_anew("the description", ask)
     (folder / "dataset.toml").write_text(description)
-    monkeypatch.setattr(kept_diagnosis, "_code", lambda: "another version of gyrotc")
+    monkeypatch.setattr(diagnosis, "_code", lambda: "another version of gyrotc")
     asked_anew("another gyrotc", ask)
     before = counted.count
     ask(fresh=True)
@@ -142,7 +141,7 @@ def test_whatever_a_diagnosis_depends_on_makes_another_one(
 
 def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, counted: _Counted) -> None:
     recordings = load(data)
-    kept_diagnosis.diagnosed(recordings)
+    diagnosis.diagnosed(recordings)
     [path] = cache.folder().glob("*.diagnosis")
     whole = path.read_bytes()
     content = json.loads(whole[len(cache._packed(b"")) :])
@@ -157,5 +156,5 @@ def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, co
     ):
         path.write_bytes(damaged)
         before = counted.count
-        assert kept_diagnosis.diagnosed(recordings) == counted.found.result
+        assert diagnosis.diagnosed(recordings) == counted.found.result
         assert counted.count == before + 1

@@ -1,10 +1,9 @@
-"""`gyrotc diagnose --out`: the diagnosis with pictures, page and extended model, kept between calls.
+"""`gyrotc diagnose`: the diagnosis with pictures, page and extended model; repeated ones come from the cache.
 
-Data flows one way: `diagnose` finds, `diagnosis_plots` draws, `diagnosis_page` writes the page from what
-stands in the folder.
-
-What a diagnosis depends on makes its name there: the bytes of the recordings and of their description, the options,
-every file of gyrotc and the versions of what computes and draws beside it.
+Diagnosis finds, the page draws what it found and is written from what stands in the folder. What was diagnosed before
+is neither computed nor drawn, and nothing that does so is loaded. What a diagnosis depends on makes its name in the
+cache: the bytes of the recordings and of their description, the options, every file of gyrotc and the versions of what
+computes and draws beside it.
 """
 
 from __future__ import annotations
@@ -18,14 +17,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
-from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..model import Model
-from ..pages.diagnosis import PICTURES, draw, write_diagnosis_page
 from ..recordings.description import FILE
 from ..recordings.records import Dataset
 from ..results.base import checked_result
@@ -34,6 +31,9 @@ from ..store import cache
 from ..store.files import digest_of, json_text, write_atomically
 from ..store.folder import result_folder
 from ..train.fitting import FitOptions
+
+if TYPE_CHECKING:
+    from ..diagnose.diagnosis import Diagnosis
 
 __all__ = ["diagnose_into", "diagnosed", "extended_scenario", "save"]
 
@@ -54,6 +54,9 @@ def diagnose_into(
     Raises:
         InputError: As `diagnose` and `result_folder`.
     """
+
+    from ..diagnose.diagnosis import diagnose
+
     with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
         stage.of(dataset.serial, dataset.axis)
         found = diagnose(
@@ -64,6 +67,9 @@ def diagnose_into(
 
 def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
+
+    from ..pages.diagnosis import PICTURES, draw, write_diagnosis_page
+
     if progress:
         progress("drawing")
     result = found.result
@@ -178,8 +184,6 @@ def _anew(
     accept_events: bool,
 ) -> Diagnosed:
     from ..diagnose.diagnosis import diagnose
-
-    pass
 
     into = diagnose if out is None else functools.partial(diagnose_into, out)
     return into(dataset, model=model, options=options, progress=progress, accept_events=accept_events).result
