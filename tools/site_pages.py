@@ -91,6 +91,14 @@ def linked(text: str, page: Path, name: str) -> str:
     return re.sub(r"\0(\d+)\0", lambda m: parts[int(m[1])], _LINK.sub(link, whole))
 
 
+def drawn(block: str) -> dict[str, set[str]]:
+    """Packages by name, with those from which an arrow of the drawing leads to them."""
+    found = re.findall(r"^ *(\w+) --> (\w+)$", block, re.MULTILINE)
+    return {
+        name: {a for a, b in found if b == name} for name in sorted({n for arrow in found for n in arrow})
+    }
+
+
 def picture(graph: dict[str, set[str]]) -> str:
     """The packages as an SVG drawing: each in the row below the last package that it imports."""
     depth: dict[str, int] = {}
@@ -134,8 +142,7 @@ def _box(name: str, x: int, y: int) -> str:
 
 def prepared(text: str, page: Path, name: str) -> str:
     """The text of a page as the site takes it."""
-    if _PICTURE.search(text):
-        text = _PICTURE.sub(lambda _: picture(architecture.packages()), text)
+    text = _PICTURE.sub(lambda block: picture(drawn(block[0])), text)
     return _WORDS.sub(r"\1", linked(text, page, name))
 
 
