@@ -37,7 +37,7 @@ else
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
 endif
 
-## from the code: docs/FORMAT.md's tables of fields, the JSON Schemas, the pages docs/reference-*.md
+## from the code: docs/FORMAT.md's tables of fields, the pages docs/reference-*.md
 formats:
 	@.venv/bin/python tools/formats.py
 	@.venv/bin/python tools/reference.py

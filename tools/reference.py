@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -87,15 +86,17 @@ def _cell(text: str) -> str:
 
 def schemas_page() -> str:
     """Every JSON Schema with its first fields; docs/FORMAT.md has what each field means."""
+    from gyrotc.cli.schemas import KINDS
+
     parts = [
         "# JSON reference\n",
         "Made from the schemas by `tools/reference.py`. `gyrotc schema NAME` prints one; fields within objects",
         "and what they mean: [FORMAT.md](FORMAT.md).\n",
     ]
-    for path in sorted((ROOT / "gen" / "gyrotc" / "results" / "schemas").glob("*.json")):
-        schema = json.loads(path.read_text("utf-8"))
+    for kind, described in KINDS.items():
+        schema = described.model_json_schema(by_alias=True)
         required = set(schema.get("required", []))
-        parts += [f"## {path.stem}\n", _cell(schema.get("description", "")) + "\n"]
+        parts += [f"## {kind}\n", _cell(schema.get("description", "")) + "\n"]
         parts += ["| field | always there | meaning |", "| --- | --- | --- |"]
         for name, field in schema.get("properties", {}).items():
             parts.append(

@@ -1,4 +1,4 @@
-"""What is written about the classes of results: JSON Schemas, and the tables of docs/FORMAT.md."""
+"""What is written about the classes of results: JSON Schemas, and tables of their fields."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PLAIN = {str: "text", int: "integer", float: "number", bool: "true or false", t
 
 
 def schema_text(kind: type[BaseModel]) -> str:
-    """JSON Schema of a result, as it stands in its file."""
+    """JSON Schema of a result, as `gyrotc schema` prints it."""
     return json.dumps(kind.model_json_schema(by_alias=True), indent=1, ensure_ascii=True) + "\n"
 
 
