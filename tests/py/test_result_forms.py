@@ -1,18 +1,15 @@
-"""Results are typed: what is shipped about their forms is made from the classes, and each is read back as written."""
+"""Results are typed: what is printed about their forms is made from the classes, and each is read back as written."""
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 import pkgutil
 import re
-import sys
 from collections.abc import Iterator
-from pathlib import Path
-from types import ModuleType
 
 import pytest
-from conftest import ROOT, Command
+from conftest import Command
 from gyrotc import results
 from gyrotc.cli.schemas import KINDS
 from gyrotc.common.errors import InputError
@@ -26,18 +23,6 @@ from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError
 from pydantic_core import PydanticUndefined
 
-
-def _tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("formats", Path(ROOT) / "tools" / "formats.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["formats"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-FORMATS = _tool()
-
 LIMITS = HeldLimits(
     gyrotc_version="0.1.0", serial="A", axis=None, product="NAV", sha256="00", met=False,
     limits=(
@@ -46,10 +31,6 @@ LIMITS = HeldLimits(
         Limit(limit="at_most.rms_dph", measured=None, bound=1.0, met=False),
     ),
 )  # fmt: skip
-
-
-def test_format_is_what_the_classes_give() -> None:
-    assert FORMATS.made() == FORMATS.FORMAT.read_text("utf-8"), "run `make formats`"
 
 
 def _all(kind: type[Numbered]) -> Iterator[type[Numbered]]:
