@@ -37,11 +37,6 @@ else
 	@$(GYROTC) build build/demo-data --out build/demo --any-serial
 endif
 
-## from the code: docs/FORMAT.md's tables of fields, the JSON Schemas, the pages docs/reference-*.md
-formats:
-	@.venv/bin/python tools/formats.py
-	@.venv/bin/python tools/reference.py
-
 # The C library's tests and its fuzzers' saved inputs, built as far as something changed.
 define c-tests
 @tools/setup.sh test
@@ -209,8 +204,8 @@ lock:
 offline: dist
 	@tools/offline.sh
 
-## all pages as a site, with search, in build/site
-site:
+## all pages as a site, with search and the reference made from the code, in build/site
+site: setup
 	@[ -x build/site-tools/bin/mkdocs ] || { python3 -m venv build/site-tools && \
 	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
 	@build/site-tools/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
@@ -223,4 +218,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo formats test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other odd cycles packages dist release lock offline site clean

@@ -11,8 +11,6 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import grimp
-
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "architecture.md"
 
@@ -27,6 +25,8 @@ are left out of the drawing; the table has all imports.
 
 def packages() -> dict[str, set[str]]:
     """Packages and top-level modules of gyrotc by name, with those that their modules import."""
+    import grimp  # not where the site is made
+
     graph = grimp.build_graph("gyrotc")
     names = {child.split(".")[1]: child for child in graph.find_children("gyrotc")}
     return {

@@ -23,10 +23,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import reference
 import version
 
 ROOT = version.ROOT
-#: Manual pages that go into the package: those that a user needs without the sources.
+#: Manual pages that go into the package: those that a user needs without the sources; besides, those of reference.py.
 PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "results.md")
 LIBRARIES = (
     # Compiled into the core: name, licence, where it comes from.
@@ -59,6 +60,7 @@ def staged(folder: Path) -> Path:
     manual.mkdir()
     for name in PAGES:
         shutil.copy(ROOT / "docs" / name, manual)
+    reference.write(manual)
     for name in ("LICENSE", "README.md", "CHANGELOG.md", "SECURITY.md"):
         shutil.copy(ROOT / name, top)
     shutil.copy(ROOT / "LICENSE", top / "gyrotc" / "runtime")

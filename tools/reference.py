@@ -1,22 +1,28 @@
-"""Reference pages made from the code: docs/reference-{c,cli,schemas,python}.md.
+"""Pages made from the code: reference-{c,cli,schemas,python}.md, and docs/FORMAT.md with its tables of fields.
 
-`make formats` writes them; with `--check` nothing is written, and the exit status is 1 where a page is stale
-(tests/py/test_reference_pages.py).
+    python tools/reference.py OUT
+
+writes them into a folder. They are no part of the sources: the site (tools/site_pages.py) and the archives
+(tools/archives.py) have them.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import inspect
-import json
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
+#: Results whose objects are told in the tables of another result on the page.
+TOLD_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
+#: Where FORMAT.md has the table of a result's fields.
+PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
 #: Modules that may be imported by users' programs; what stands in their `__all__`.
 PYTHON = (
     "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
@@ -86,16 +92,18 @@ def _cell(text: str) -> str:
 
 
 def schemas_page() -> str:
-    """Every JSON Schema with its first fields; docs/FORMAT.md has what each field means."""
+    """Every JSON Schema with its first fields; FORMAT.md has those within objects."""
+    from gyrotc.cli.schemas import KINDS
+
     parts = [
         "# JSON reference\n",
         "Made from the schemas by `tools/reference.py`. `gyrotc schema NAME` prints one; fields within objects",
         "and what they mean: [FORMAT.md](FORMAT.md).\n",
     ]
-    for path in sorted((ROOT / "gen" / "gyrotc" / "results" / "schemas").glob("*.json")):
-        schema = json.loads(path.read_text("utf-8"))
+    for kind, described in KINDS.items():
+        schema = described.model_json_schema(by_alias=True)
         required = set(schema.get("required", []))
-        parts += [f"## {path.stem}\n", _cell(schema.get("description", "")) + "\n"]
+        parts += [f"## {kind}\n", _cell(schema.get("description", "")) + "\n"]
         parts += ["| field | always there | meaning |", "| --- | --- | --- |"]
         for name, field in schema.get("properties", {}).items():
             parts.append(
@@ -130,22 +138,42 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
         yield "A constant or a type.\n"
 
 
-PAGES = {"c": c_page, "cli": cli_page, "schemas": schemas_page, "python": python_page}
+def format_page() -> str:
+    """docs/FORMAT.md with the tables of fields."""
+    from gyrotc.cli.schemas import KINDS
+    from gyrotc.results.describe import tables
+
+    def table(place: re.Match[str]) -> str:
+        other = TOLD_BY.get(place[1])
+        return tables(KINDS[place[1]], [KINDS[other]] if other else []).rstrip()
+
+    return PLACE.sub(table, (ROOT / "docs" / "FORMAT.md").read_text("utf-8"))
+
+
+PAGES = {
+    "FORMAT.md": format_page,
+    "reference-c.md": c_page,
+    "reference-cli.md": cli_page,
+    "reference-python.md": python_page,
+    "reference-schemas.md": schemas_page,
+}
+
+
+def write(out: Path, python: str | Path = sys.executable) -> None:
+    """All pages into a folder, by a Python that has what gyrotc needs."""
+    subprocess.run([python, Path(__file__).resolve(), out], check=True)
 
 
 def main() -> int:
-    """Writes the pages, or says which are stale."""
-    stale = []
+    """Writes the pages from the sources beside this file, whichever are installed: of these only the core is taken."""
+    parser = argparse.ArgumentParser(prog="tools/reference.py", description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    out = parser.parse_args().out
+    sys.path.insert(0, str(ROOT / "gen"))
+    sys.meta_path.sort(key=lambda finder: "gyrotc" in type(finder).__module__)
+    out.mkdir(parents=True, exist_ok=True)
     for name, made in PAGES.items():
-        page = DOCS / f"reference-{name}.md"
-        text = made().rstrip() + "\n"
-        if not page.exists() or page.read_text("utf-8") != text:
-            stale.append(page.name)
-            if "--check" not in sys.argv[1:]:
-                page.write_text(text, "utf-8")
-    if stale and "--check" in sys.argv[1:]:
-        print(f"stale, `make formats` writes them: {', '.join(stale)}")
-        return 1
+        (out / name).write_text(made().rstrip() + "\n", "utf-8")
     return 0
 
 

@@ -1,8 +1,9 @@
 """What the pages need to become a site (`make site`): MkDocs calls `on_files` and `on_page_markdown` (docs/mkdocs.yml).
 
 Pages that stand beside `docs/` come along below `sources/`, as do files that a page links to, so that no link is dead;
-words behind the language of a block, which say how a test runs it, go; the drawing of the packages is made here, since
-what draws it on a server would be fetched by every reader.
+words behind the language of a block, which say how a test runs it, go; pages that are made from the code
+(tools/reference.py) are made by the Python of .venv; the drawing of the packages is made here, since what draws it on a
+server would be fetched by every reader.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ import html
 import os
 import re
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import architecture
+import reference
 
 ROOT = architecture.ROOT
 DOCS = ROOT / "docs"
@@ -91,6 +94,14 @@ def linked(text: str, page: Path, name: str) -> str:
     return re.sub(r"\0(\d+)\0", lambda m: parts[int(m[1])], _LINK.sub(link, whole))
 
 
+def drawn(block: str) -> dict[str, set[str]]:
+    """Packages by name, with those from which an arrow of the drawing leads to them."""
+    found = re.findall(r"^ *(\w+) --> (\w+)$", block, re.MULTILINE)
+    return {
+        name: {a for a, b in found if b == name} for name in sorted({n for arrow in found for n in arrow})
+    }
+
+
 def picture(graph: dict[str, set[str]]) -> str:
     """The packages as an SVG drawing: each in the row below the last package that it imports."""
     depth: dict[str, int] = {}
@@ -134,8 +145,7 @@ def _box(name: str, x: int, y: int) -> str:
 
 def prepared(text: str, page: Path, name: str) -> str:
     """The text of a page as the site takes it."""
-    if _PICTURE.search(text):
-        text = _PICTURE.sub(lambda _: picture(architecture.packages()), text)
+    text = _PICTURE.sub(lambda block: picture(drawn(block[0])), text)
     return _WORDS.sub(r"\1", linked(text, page, name))
 
 
@@ -143,6 +153,13 @@ def on_files(files: Any, config: Any) -> Any:
     """MkDocs: the files of the site."""
     from mkdocs.structure.files import File
 
+    with tempfile.TemporaryDirectory() as folder:
+        reference.write(Path(folder), ROOT / ".venv" / "bin" / "python")
+        for path in sorted(Path(folder).iterdir()):
+            written = files.get_file_from_path(path.name)  # without tables
+            if written is not None:
+                files.remove(written)
+            files.append(File.generated(config, path.name, content=path.read_text("utf-8")))
     for path in sorted(beside()):
         name = place(path)
         assert name is not None

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
 import archives  # noqa: E402
+import reference  # noqa: E402
 import version  # noqa: E402
 
 pytestmark = pytest.mark.slow
@@ -58,6 +59,9 @@ def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unp
         assert (unpacked / inside).read_bytes() == (ROOT / name).read_bytes(), name
     for name in ("LICENSE", "README.md", "PKG-INFO", "gyrotc/manual/porting.md", "gyrotc/runtime/LICENSE"):
         assert (unpacked / name).is_file()
+    for name in reference.PAGES:
+        page = unpacked / "gyrotc" / "manual" / name
+        assert page.read_text("utf-8") == reference.PAGES[name]().rstrip() + "\n"
     assert not [p for p in unpacked.rglob("*") if p.suffix in (".so", ".pyc")]
 
 

@@ -1,29 +1,76 @@
-"""Reference pages are what the code says, and the site has every page."""
+"""Reference pages made from the code are whole and the same every time, and the site has every page."""
 
 from __future__ import annotations
 
 import re
 import sys
+from pathlib import Path
 
+import pytest
 from conftest import ROOT
+from gyrotc.cli.commands import app
+from gyrotc.cli.schemas import KINDS
+from gyrotc.results.describe import tables
 from gyrotc.verify.sizes import PUBLIC
+from typer.main import get_command
 
 sys.path.insert(0, str(ROOT / "tools"))
 
 import reference
 
 
-def test_no_reference_page_is_stale() -> None:
-    """`make formats` writes them."""
-    for name, made in reference.PAGES.items():
-        page = ROOT / "docs" / f"reference-{name}.md"
-        assert page.read_text("utf-8") == made().rstrip() + "\n", page.name
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("reference")
+    reference.write(folder)
+    return folder
 
 
-def test_every_public_function_of_c_has_its_heading() -> None:
-    headings = re.findall(r"^## (.+)$", reference.c_page(), re.MULTILINE)
-    named = [name for heading in headings for name in re.findall(r"gtc_<n>_(\w+)", heading)]
+def _headings(page: Path, level: int = 2) -> list[str]:
+    return re.findall(rf"^{'#' * level} (.+)$", page.read_text("utf-8"), re.MULTILINE)
+
+
+def test_pages_are_the_same_every_time(made: Path) -> None:
+    """In another process, where hashes of texts and places of objects in memory differ."""
+    assert {page.name for page in made.iterdir()} == set(reference.PAGES)
+    for name, page in reference.PAGES.items():
+        assert (made / name).read_text("utf-8") == page().rstrip() + "\n", name
+
+
+def test_every_public_function_of_c_has_its_heading(made: Path) -> None:
+    named = [
+        name
+        for heading in _headings(made / "reference-c.md")
+        for name in re.findall(r"gtc_<n>_(\w+)", heading)
+    ]
     assert sorted(named) == sorted(PUBLIC)
+
+
+def test_every_command_has_its_heading(made: Path) -> None:
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    assert _headings(made / "reference-cli.md") == [f"gyrotc {name}" for name in sorted(commands)]
+
+
+def test_every_result_has_its_heading_and_its_table(made: Path) -> None:
+    assert _headings(made / "reference-schemas.md") == list(KINDS)
+    text = (made / "FORMAT.md").read_text("utf-8")
+    assert not reference.PLACE.search(text)
+    for name, kind in KINDS.items():
+        first = tables(kind).split("\n\n")[0].strip()
+        assert name == "model" or first in text, f"FORMAT.md has no place for the fields of {name}"
+
+
+def test_every_public_name_of_python_has_its_heading(made: Path) -> None:
+    """Of the modules that programs may import; `__all__` of each."""
+    assert _headings(made / "reference-python.md") == [f"gyrotc.{name}" for name in reference.PYTHON]
+    names = set(_headings(made / "reference-python.md", 3))
+    assert {"Model", "load_model", "emit", "InputError"} <= names
+
+
+def test_every_place_of_a_table_names_a_command_that_prints_it() -> None:
+    text = (ROOT / "docs" / "FORMAT.md").read_text("utf-8")
+    places = reference.PLACE.findall(text)
+    assert sorted(places) == sorted(set(KINDS) - {"model"})
 
 
 def test_the_site_has_every_page() -> None:
@@ -32,4 +79,4 @@ def test_the_site_has_every_page() -> None:
     listed = set(re.findall(r": ([\w/-]+\.md)$", text, re.MULTILINE))
     pages = {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}
     decisions = {p for p in pages if re.match(r"adr/\d", p)}  # listed by adr/README.md
-    assert listed == pages - decisions
+    assert listed == (pages | set(reference.PAGES)) - decisions

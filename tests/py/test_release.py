@@ -13,7 +13,7 @@ from conftest import ROOT
 
 pytestmark = pytest.mark.slow
 
-TOOLS = ("release.sh", "version.py", "archives.py", "packages.py")
+TOOLS = ("release.sh", "version.py", "archives.py", "packages.py", "reference.py")
 
 
 def _run(*command: str, cwd: Path, status: int = 0, python: str = sys.executable) -> str:
@@ -55,6 +55,8 @@ def test_from_tag_to_archives(clone: Path) -> None:
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
     emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
     emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
+    command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
+    command.write_text(command.read_text("utf-8").replace("fish.", "fish of the tag."), "utf-8")
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
@@ -69,6 +71,8 @@ def test_from_tag_to_archives(clone: Path) -> None:
     with zipfile.ZipFile(arduino) as archive:
         source = archive.read("gyrotc/src/gtc.c").decode()
     assert "in one file of the tag;" in source and "not of the tag" not in source
+    page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
+    assert "fish of the tag." in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
     _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
     listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
     files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}

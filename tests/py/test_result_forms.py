@@ -1,17 +1,19 @@
-"""Results are typed: what is shipped about their forms is made from the classes, and each is read back as written."""
+"""Results are typed: what is printed about their forms is made from the classes, and each is read back as written."""
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
-import sys
-from pathlib import Path
-from types import ModuleType
+import pkgutil
+import re
+from collections.abc import Iterator
 
 import pytest
-from conftest import ROOT, Command
+from conftest import Command
+from gyrotc import results
+from gyrotc.cli.schemas import KINDS
 from gyrotc.common.errors import InputError
-from gyrotc.results.base import checked_result
+from gyrotc.results.base import Numbered, checked_result
 from gyrotc.results.describe import tables
 from gyrotc.results.evaluation import Apart, At
 from gyrotc.results.fleet import FleetEntry
@@ -19,18 +21,7 @@ from gyrotc.results.folder import Marker
 from gyrotc.results.release import HeldLimits, Limit
 from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError
-
-
-def _tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("formats", Path(ROOT) / "tools" / "formats.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["formats"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-FORMATS = _tool()
+from pydantic_core import PydanticUndefined
 
 LIMITS = HeldLimits(
     gyrotc_version="0.1.0", serial="A", axis=None, product="NAV", sha256="00", met=False,
@@ -42,20 +33,28 @@ LIMITS = HeldLimits(
 )  # fmt: skip
 
 
-def test_format_and_schemas_are_what_the_classes_give() -> None:
-    assert FORMATS.differing() == [], "run `make formats`"
+def _all(kind: type[Numbered]) -> Iterator[type[Numbered]]:
+    for one in kind.__subclasses__():
+        yield one
+        yield from _all(one)
 
 
-def test_the_comparison_with_the_classes_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    changed = tmp_path / "FORMAT.md"
-    changed.write_text(FORMATS.FORMAT.read_text("utf-8").replace("| `met` |", "| `mett` |"), "utf-8")
-    monkeypatch.setattr(FORMATS, "FORMAT", changed)
-    assert FORMATS.differing() == [changed]
+def test_every_class_with_a_schema_has_a_name() -> None:
+    """A class that names its schema is written to a file or printed: users ask for its form."""
+    for module in pkgutil.iter_modules(results.__path__):
+        importlib.import_module(f"gyrotc.results.{module.name}")
+    named = {
+        one
+        for one in _all(Numbered)
+        if one.__module__.startswith("gyrotc.") and not one.__name__.startswith("_")
+        and one.model_fields["schema_"].default is not PydanticUndefined
+    }  # fmt: skip
+    assert len(named) > 20 and named <= set(KINDS.values())
 
 
-@pytest.mark.parametrize("name", sorted(FORMATS.RESULTS))
+@pytest.mark.parametrize("name", sorted(set(KINDS) - {"model"}))
 def test_every_field_says_what_it_means(name: str) -> None:
-    rows = [line for line in tables(FORMATS.RESULTS[name]).splitlines() if line.startswith("| `")]
+    rows = [line for line in tables(KINDS[name]).splitlines() if line.startswith("| `")]
     assert rows and all(not row.endswith("|  |") for row in rows if "`schema`" not in row)
 
 
@@ -117,6 +116,16 @@ def test_a_result_that_is_no_number_cannot_be_made() -> None:
 def test_the_command_prints_a_schema_or_all(gyrotc: Command) -> None:
     done = gyrotc("schema", "limits")
     assert done.returncode == 0 and json.loads(done.stdout) == HeldLimits.model_json_schema()
-    assert set(json.loads(gyrotc("schema").stdout)) == set(FORMATS.KINDS)
+    assert json.loads(gyrotc("schema").stdout) == {
+        name: json.loads(gyrotc("schema", name).stdout) for name in KINDS
+    }
     done = gyrotc("schema", "limit")
     assert done.returncode == 2 and "changes, check" in done.stderr
+
+
+def test_the_command_prints_tables_of_one_or_all(gyrotc: Command) -> None:
+    done = gyrotc("schema", "limits", "--table")
+    assert done.returncode == 0 and done.stdout == tables(HeldLimits)
+    assert "| `met` | true or false | whether all are met;" in done.stdout and "\n`Limit`: " in done.stdout
+    whole = gyrotc("schema", "--table").stdout
+    assert re.findall(r"^## (.+)$", whole, re.MULTILINE) == list(KINDS) and done.stdout in whole

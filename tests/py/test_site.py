@@ -18,6 +18,7 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "tools"))
 
 import architecture
+import reference
 import site_pages
 
 PAGES = sorted((ROOT / "docs").rglob("*.md")) + sorted(p for p in site_pages.beside() if p.suffix == ".md")
@@ -53,14 +54,23 @@ def test_links_of_a_page_lead_to_what_the_site_has(page: Path) -> None:
             assert site_pages.source(there).is_file(), f"{target} is no file of the site"
 
 
+@pytest.mark.parametrize("name", sorted(reference.PAGES))
+def test_no_link_of_a_page_that_is_made_is_lost(name: str) -> None:
+    """A link to what the site does not have becomes its words alone."""
+    text = reference.PAGES[name]()
+    links = site_pages._LINK.findall(site_pages._BLOCK.sub("", text))
+    made = site_pages.prepared(text, ROOT / "docs" / name, name)
+    assert len(site_pages._LINK.findall(site_pages._BLOCK.sub("", made))) == len(links)
+
+
 @pytest.mark.slow
 def test_the_picture_shows_every_room_and_no_reader_fetches_its_painter() -> None:
     graph = architecture.packages()
-    drawn = site_pages.picture(graph)
-    assert re.findall(r">([^<>]+)</text>", drawn) == list(graph)
-    assert drawn.count("marker-end") == len(list(architecture.arrows(graph)))
     page = ROOT / "docs" / "architecture.md"
-    assert "mermaid" not in site_pages.prepared(page.read_text("utf-8"), page, "architecture.md")
+    text = site_pages.prepared(page.read_text("utf-8"), page, "architecture.md")
+    assert re.findall(r">([^<>]+)</text>", text) == list(graph)
+    assert text.count("marker-end") == len(list(architecture.arrows(graph)))
+    assert "mermaid" not in text
 
 
 class _References(HTMLParser):
@@ -106,6 +116,12 @@ def test_no_link_of_the_site_is_dead_and_nothing_is_fetched(site: Path) -> None:
             if not (parts.scheme or parts.netloc or is_there):
                 dead.append(f"{page.relative_to(site)}: {to}")
     assert len(pages) > 40 and dead == []
+
+
+def test_the_site_has_the_pages_that_are_made(site: Path) -> None:
+    for name in reference.PAGES:
+        assert (site / name).with_suffix(".html").is_file()
+    assert "rms_over_floor" in (site / "FORMAT.html").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib import resources
 from typing import Annotated
 
 import typer
@@ -17,24 +16,26 @@ def schema(
     name: Annotated[
         str | None, typer.Argument(help="A result, e.g. limits; without it all, by name.")
     ] = None,
+    table: Annotated[
+        bool, typer.Option("--table", help="Fields, types and what they mean, as tables in Markdown.")
+    ] = False,
 ) -> None:
     """Print the JSON Schema of a result, or of all of them.
 
     Example: gyrotc schema limits
     """
-    shipped = resources.files("gyrotc.results") / "schemas"
-    texts = {
-        file.name.removesuffix(".json"): file.read_text("utf-8")
-        for file in sorted(shipped.iterdir(), key=lambda file: file.name)
-        if file.name.endswith(".json")
-    }
-    if name is None:
-        whole = {known: json.loads(text) for known, text in texts.items()}
-        typer.echo(json.dumps(whole, indent=1))
-    elif name in texts:
-        typer.echo(texts[name], nl=False)
+    from ..results.describe import schema_text, tables
+    from .schemas import KINDS
+
+    if name is not None and name not in KINDS:
+        raise InputError("schema", repr(name), ", ".join(KINDS))
+    if name is not None:
+        typer.echo(tables(KINDS[name]) if table else schema_text(KINDS[name]), nl=False)
+    elif table:
+        typer.echo("\n".join(f"## {known}\n\n{tables(kind)}" for known, kind in KINDS.items()), nl=False)
     else:
-        raise InputError("schema", repr(name), ", ".join(texts))
+        whole = {known: json.loads(schema_text(kind)) for known, kind in KINDS.items()}
+        typer.echo(json.dumps(whole, indent=1))
 
 
 _SHELLS = ("bash", "zsh", "fish")

@@ -1,4 +1,4 @@
-"""What is written about the classes of results: JSON Schemas, and the tables of docs/FORMAT.md."""
+"""What is written about the classes of results: JSON Schemas, and tables of their fields."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PLAIN = {str: "text", int: "integer", float: "number", bool: "true or false", t
 
 
 def schema_text(kind: type[BaseModel]) -> str:
-    """JSON Schema of a result, as it stands in its file."""
+    """JSON Schema of a result, as `gyrotc schema` prints it."""
     return json.dumps(kind.model_json_schema(by_alias=True), indent=1, ensure_ascii=True) + "\n"
 
 
@@ -23,7 +23,7 @@ def tables(kind: type[BaseModel], told: Collection[type[BaseModel]] = ()) -> str
     """A table of fields for a result, and one for each object inside it, in Markdown.
 
     Args:
-        told: Results whose tables stand above: their objects are not told again.
+        told: Results whose tables stand on the same page: their objects are not told again.
     """
     seen: dict[type[BaseModel], None] = {kind: None}
     above = {inner for one in told for inner in _in_order({one: None})}
