@@ -36,6 +36,7 @@ from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
 from .common.errors import InputError
 from .common.inputs import read_json
+from .common.ranges import MOST_CENTERS, AverageLength, BlockLength
 from .store.files import digest_of, json_text, write_atomically
 
 __all__ = [
@@ -57,7 +58,7 @@ __all__ = [
 SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
-_MAX_CENTERS, _MAX_NETWORKS = 512, 16  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
+_MAX_NETWORKS = 16  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
@@ -173,7 +174,7 @@ class Network(_Frozen):
 
     w0: Dph
     linear: tuple[Dph, Dph]
-    centers: Annotated[tuple[tuple[Celsius, CelsiusPerMin], ...], Field(max_length=_MAX_CENTERS)]
+    centers: Annotated[tuple[tuple[Celsius, CelsiusPerMin], ...], Field(max_length=MOST_CENTERS)]
     widths: tuple[tuple[Width | None, Width | None], ...]
     weights: tuple[Dph, ...]
     region: Envelope | None = None
@@ -276,7 +277,7 @@ class Model(_Frozen):
     serial: Annotated[str, Field(pattern=SERIAL)]
     axis: Literal["x", "y", "z"] | None
     method: Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,31}$")]
-    block_s: Annotated[float, Field(gt=0.0, le=3600.0)]
+    block_s: BlockLength
     slope_blocks: Annotated[int, Field(ge=2, le=20)]
     lead_blocks: Annotated[int, Field(ge=0, le=1)] = 0
     scale: Scale
@@ -295,7 +296,7 @@ class Model(_Frozen):
     guards: dict[str, Guard] = {}
     noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None
     noise_floor_source: Literal["estimated"] | None
-    average_s: Annotated[float, Field(gt=0.0, le=1e6)] = 100.0
+    average_s: AverageLength = 100.0
     uncertainty_dph: Uncertainty | None = None
     data: tuple[DataFile, ...]
     seed: int
@@ -308,8 +309,8 @@ class Model(_Frozen):
     @model_validator(mode="after")
     def _whole(self) -> Model:
         networks = [*self.networks, *self.stand_ins]
-        if sum(len(n.centers) for n in networks) > _MAX_CENTERS:
-            raise ValueError(f"more than {_MAX_CENTERS} centers")
+        if sum(len(n.centers) for n in networks) > MOST_CENTERS:
+            raise ValueError(f"more than {MOST_CENTERS} centers")
         if len(networks) > _MAX_NETWORKS:
             raise ValueError(f"more than {_MAX_NETWORKS} networks, stand-ins of terms among them")
         regions = [n.region is not None for n in self.networks]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.jobs.compare import CompareOptions, compare
+from gyrotc.jobs.compare import compare
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import simulated_floor
@@ -70,7 +70,7 @@ def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
     for path in folder.glob("run-0[1-6].csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     dataset = load(tmp_path)
-    result = compare(dataset, CompareOptions(methods=("mlr", "mrbf"))).content()
+    result = compare(dataset, methods=("mlr", "mrbf")).content()
     assert result["judged_on"] == "left_out"
     front = front_end(dataset.runs, 10.0)
     parts = [samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(dataset.runs)]

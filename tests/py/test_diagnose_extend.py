@@ -22,7 +22,7 @@ from recordings import toml, write_csv
 SEED = 20260405
 SIZE_DPH_PER_C, TAU_S = 5e-4, 600.0
 GRADIENT = Effect("thermal_gradient", {"tau_s": TAU_S, "amplitude_dph_per_c": SIZE_DPH_PER_C})
-OPTIONS = FitOptions("mrbf", 0, 4, None, 10.0, 100.0)
+OPTIONS = FitOptions(method="mrbf", centers=4)
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ def test_a_lost_channel_costs_an_extension_no_more_than_2_percent_over_one_therm
     model = diagnose(dataset).model
     assert model is not None and [t.channel for t in model.terms] == ["supply_v"]
     assert model.terms[0].stand_in is not None
-    plain = fit_dataset(dataset, FitOptions("mrbf", centers=model.n_centers)).model
+    plain = fit_dataset(dataset, FitOptions(method="mrbf", centers=model.n_centers)).model
     exam = [run.rows() for run in dataset.runs if run.role == "exam"]
     lost = rms_of(model, [without(rows, "supply_v") for rows in exam], tmp_path)
     assert rms_of(model, exam, tmp_path) < lost <= 1.02 * rms_of(plain, exam, tmp_path)
@@ -226,7 +226,7 @@ def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alon
     played = play_runs(dataset, runs, front_end(runs, 10.0))
     effects = [Effect(id, VALUES[id], "supply_v" if id == "auxiliary" else None) for id in VALUES]
     effects = [e for e in effects if e.id in ("hysteresis", "auxiliary")]
-    plain = fit_dataset(dataset, FitOptions("linear")).model
+    plain = fit_dataset(dataset, FitOptions(method="linear")).model
     found = stand_ins_of(plain, joined([samples(run, effects) for run in played]), played, effects)
     assert list(found) == ["supply_v"]
     stand_in = found["supply_v"]

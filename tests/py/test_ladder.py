@@ -17,9 +17,10 @@ from gyrotc.train.data import TrainingData, gather
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guards import objection
 from gyrotc.train.methods import fit
+from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.selection import RUNGS, Ladder
-from gyrotc.train.simple import SIMPLE, all_solved, design, fit_simple, powers_of, solve
+from gyrotc.train.simple import all_solved, design, fit_simple, powers_of, solve
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 

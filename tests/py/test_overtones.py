@@ -17,7 +17,7 @@ from recordings import toml, write_csv
 SEED = 20261124
 PERIOD_C, SIZE_DPH, NOISE_DPH = 14.0, 4e-3, 2e-3
 WAVE = CATALOGUE["path_length_periodicity"]
-OPTIONS = FitOptions("mrbf", 0, None, None, 10.0, 100.0)
+OPTIONS = FitOptions(method="mrbf")
 
 
 def airy(t: np.ndarray, finesse: float = 4.0) -> np.ndarray:

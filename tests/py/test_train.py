@@ -207,7 +207,7 @@ def test_bad_arguments_are_refused() -> None:
         ({"centers": -1}, "512"),
         ({"centers": 513}, "512"),
         ({"rho": 1.5}, "rho"),
-        ({"average_s": 0.0}, "average_s"),
+        ({"average_s": 0.0}, "--average-s"),
         ({"method": "rbf_ols", "size_rule": "guess"}, "press"),
     ):
         with pytest.raises(InputError, match=message):

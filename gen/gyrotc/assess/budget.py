@@ -22,7 +22,7 @@ from ..results.evaluation import Calibration, Changes, Evaluation
 from ..results.release import Budget, Contribution, Instrument
 from ..results.training import Training
 from ..results.verification import Verification
-from ..train.simple import SIMPLE
+from ..train.options import SIMPLE
 from .limits import Limits, coverage_factor, instruments_in, last_day
 
 __all__ = [

@@ -18,6 +18,7 @@ from rich.text import Text
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
+from ..train.options import flag_of, help_of
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
@@ -182,40 +183,21 @@ JsonOption = Annotated[
 AxisOption = Annotated[
     str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
 ]
-AverageOption = Annotated[
-    float,
-    typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
-]
-ChannelsOption = Annotated[
-    bool,
-    typer.Option(
-        "--channels", help="Let recorded channels be inputs, those that hold on unseen history alone."
-    ),
-]
-MethodOption = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        help="auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ...",
-    ),
-]
-SeedOption = Annotated[
-    int,
-    typer.Option(
-        "--seed", help="Number from which everything random is drawn; the same number, the same result."
-    ),
-]
-CentersOption = Annotated[
-    int | None,
-    typer.Option("--centers", min=0, max=512, help="Number of centers; by default the data decide."),
-]
-RhoOption = Annotated[
-    float | None,
-    typer.Option(
-        "--rho", min=0.0, max=1.0, help="Threshold of error reduction, eq. (16) of Ding et al. 2014."
-    ),
-]
-BlockOption = Annotated[float, typer.Option("--block-s", min=0.001, max=3600.0, help="Length of a block, s.")]
+
+
+def _of_build(name: str) -> Any:
+    """An option of `BuildOptions`, which knows its meaning and refuses what is out of range."""
+    return typer.Option(flag_of(name), help=help_of(name))
+
+
+AverageOption = Annotated[float, _of_build("average_s")]
+AnyAverageOption = Annotated[float | None, _of_build("average_s")]
+ChannelsOption = Annotated[bool, _of_build("channels")]
+MethodOption = Annotated[str, _of_build("method")]
+SeedOption = Annotated[int, _of_build("seed")]
+CentersOption = Annotated[int | None, _of_build("centers")]
+RhoOption = Annotated[float | None, _of_build("rho")]
+BlockOption = Annotated[float, _of_build("block_s")]
 NumericOption = Annotated[
     str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
 ]

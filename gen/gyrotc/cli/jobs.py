@@ -13,6 +13,7 @@ from ..common.errors import CheckFailed, InputError
 from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
+from ..train.options import DEFAULTS, BuildOptions
 from .base import (
     BUILD,
     COMPARE,
@@ -167,14 +168,14 @@ def _gain_lines(gain: GainOnUnseen) -> Iterator[str]:
 def build(
     dataset: DatasetArg,
     out: OutOption = Path("build"),
-    method: MethodOption = "auto",
+    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = 0,
-    centers: CentersOption = None,
-    rho: RhoOption = None,
-    block_s: BlockOption = 10.0,
-    average_s: AverageOption = 100.0,
-    channels: ChannelsOption = False,
+    seed: SeedOption = DEFAULTS.seed,
+    centers: CentersOption = DEFAULTS.centers,
+    rho: RhoOption = DEFAULTS.rho,
+    block_s: BlockOption = DEFAULTS.block_s,
+    average_s: AverageOption = DEFAULTS.average_s,
+    channels: ChannelsOption = DEFAULTS.channels,
     numeric: NumericOption = None,
     target: TargetOption = None,
     applied: AppliedOption = None,
@@ -204,7 +205,10 @@ def build(
     from ..train.fitting import FitOptions
 
     shared = lot_in(lot)
-    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
+    options = FitOptions(
+        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s,
+        channels=channels, prior=shared,
+    )  # fmt: skip
     with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
         results = run(
             dataset,
@@ -272,9 +276,9 @@ def compare(
         Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
     ] = None,
     axis: AxisOption = None,
-    seed: SeedOption = 0,
-    block_s: BlockOption = 10.0,
-    average_s: AverageOption = 100.0,
+    seed: SeedOption = DEFAULTS.seed,
+    block_s: BlockOption = DEFAULTS.block_s,
+    average_s: AverageOption = DEFAULTS.average_s,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
@@ -283,12 +287,11 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
-    from ..jobs.compare import CompareOptions
     from ..jobs.compare import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.load import load
 
-    options = CompareOptions(seed=seed, block_s=block_s, average_s=average_s)
+    options = BuildOptions(seed=seed, block_s=block_s, average_s=average_s)
     with (
         result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
         progress(COMPARE) as say,
@@ -318,13 +321,13 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
-    method: MethodOption = "auto",
+    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = 0,
-    centers: CentersOption = None,
-    rho: RhoOption = None,
-    block_s: BlockOption = 10.0,
-    average_s: AverageOption = 100.0,
+    seed: SeedOption = DEFAULTS.seed,
+    centers: CentersOption = DEFAULTS.centers,
+    rho: RhoOption = DEFAULTS.rho,
+    block_s: BlockOption = DEFAULTS.block_s,
+    average_s: AverageOption = DEFAULTS.average_s,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
@@ -351,8 +354,8 @@ def diagnose(
         raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
     shared = lot_in(lot)
-    options = (
-        FitOptions(method, seed, centers, rho, block_s, average_s, prior=shared) if known is None else None
+    options = FitOptions(
+        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s, prior=shared
     )
     subtracted = applied_in(applied)
     axes = axes_of(dataset) if axis == "all" else (axis,)
@@ -367,7 +370,7 @@ def diagnose(
                 recordings,
                 into,
                 model=known,
-                options=options,
+                options=options if known is None else None,
                 progress=say,
                 accept_events=accept_events,
                 fresh=fresh,

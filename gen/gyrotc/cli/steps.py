@@ -14,12 +14,14 @@ from ..common.errors import CheckFailed, InputError
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
 from ..store.marker import MARKER
+from ..train.options import DEFAULTS, BuildOptions
 from .base import (
     EMIT,
     ERR,
     FIT,
     VERIFY,
     AgeingOption,
+    AnyAverageOption,
     AppliedOption,
     AverageOption,
     AxisOption,
@@ -101,14 +103,14 @@ def _inside(folder: Path, trace: Path | None) -> Path | None:
 def fit(
     dataset: DatasetArg,
     out: OutOption,
-    method: MethodOption = "auto",
+    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = 0,
-    centers: CentersOption = None,
-    rho: RhoOption = None,
-    block_s: BlockOption = 10.0,
-    average_s: AverageOption = 100.0,
-    channels: ChannelsOption = False,
+    seed: SeedOption = DEFAULTS.seed,
+    centers: CentersOption = DEFAULTS.centers,
+    rho: RhoOption = DEFAULTS.rho,
+    block_s: BlockOption = DEFAULTS.block_s,
+    average_s: AverageOption = DEFAULTS.average_s,
+    channels: ChannelsOption = DEFAULTS.channels,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
@@ -126,7 +128,10 @@ def fit(
     from ..train.fitting import FitOptions, fit_dataset
 
     shared = lot_in(lot)
-    options = FitOptions(method, seed, centers, rho, block_s, average_s, channels, shared)
+    options = FitOptions(
+        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s,
+        channels=channels, prior=shared,
+    )  # fmt: skip
     known = applied_of(applied) if applied else None
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
@@ -275,10 +280,7 @@ def evaluate(
     dataset: DatasetArg,
     numeric: NumericOption = None,
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
-    average_s: Annotated[
-        float | None,
-        typer.Option("--average-s", min=0.001, help="Length of the means of which RMS figures are taken, s."),
-    ] = None,
+    average_s: AnyAverageOption = None,
     applied: AppliedOption = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,
@@ -293,6 +295,8 @@ def evaluate(
     from ..recordings.load import load
     from ..tables.applied import applied_of
 
+    if average_s is not None:
+        BuildOptions(average_s=average_s)
     axis = load_model(folder / "model.json").axis
     subtracted = applied_of(applied) if applied else None
     recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)

@@ -13,12 +13,15 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 __all__ = [
     "CEILINGS",
@@ -34,6 +37,7 @@ __all__ = [
     "read_json",
     "read_toml",
     "refuse_above",
+    "refused",
     "set_ceilings",
 ]
 
@@ -276,12 +280,20 @@ def checked(kind: type[T], content: Any, where: str) -> T:
         # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
         return TypeAdapter(kind).validate_json(json.dumps(content))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        place = f"{where}, field {field}" if field else where
-        if first["type"] == "missing":
-            raise InputError(place, "is missing") from error
-        raise InputError(place, _short(first["input"]), first["msg"].removeprefix("Value error, ")) from error
+        raise refused(error, lambda field: f"{where}, field {field}" if field else where) from error
+
+
+def refused(error: ValidationError, place: Callable[[str], str]) -> InputError:
+    """What pydantic refuses as one message; `place` says where a field stands, whose name is empty for the whole."""
+    first = error.errors(include_url=False)[0]
+    where = place(".".join(str(part) for part in first["loc"]))
+    if first["type"] == "missing":
+        return InputError(where, "is missing")
+    if first["type"] == "extra_forbidden":
+        return InputError(where, "is not known")
+    return InputError(
+        where, _short(first["input"]), re.sub("^(Input should be|Value error,) ", "", first["msg"])
+    )
 
 
 def _decoded(data: bytes, where: str, expected: str) -> str:

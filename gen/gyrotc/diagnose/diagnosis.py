@@ -140,7 +140,9 @@ def _options_of(model: Model | None) -> FitOptions:
         return FitOptions()
     centers = model.n_centers if map_method(model.method) == model.method else None
     method = map_method(model.method)
-    return FitOptions(method, model.seed, centers, None, model.block_s, model.average_s)
+    return FitOptions(
+        method=method, seed=model.seed, centers=centers, block_s=model.block_s, average_s=model.average_s
+    )
 
 
 def _extended_model(

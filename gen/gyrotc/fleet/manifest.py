@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
-from ..common.inputs import read_toml, refuse_above
+from ..common.inputs import read_toml, refuse_above, refused
 from ..recordings.load import axes_of
 from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
-from ..train.methods import AUTO, NETWORK_METHODS
+from ..train.options import options_in
 
 __all__ = ["SUMMARY", "Fleet", "Unit", "load_manifest", "printable"]
 
@@ -75,27 +75,12 @@ class _UnitEntry(_Part):
     axis: _Axis = None
 
 
-def _method(name: str) -> str:
-    if name not in (AUTO, *NETWORK_METHODS):
-        raise ValueError("one of " + ", ".join((AUTO, *NETWORK_METHODS)))
-    return name
-
-
-class _Options(_Part):
-    method: Annotated[str, AfterValidator(_method)] = AUTO
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    centers: Annotated[int, Field(ge=0, le=512)] | None = None
-    rho: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    block_s: Annotated[float, Field(ge=0.001, le=3600.0)] = 10.0
-    average_s: Annotated[float, Field(ge=0.001, le=1e6)] = 100.0
-
-
 class _Manifest(_Part):
     schema_: Annotated[Literal[1], Field(alias="schema")]
     datasets: list[_Place] = []  # patterns of folders
     axis: _Axis = None  # of those
     unit: list[_UnitEntry] = []
-    options: _Options = _Options()
+    options: dict[str, Any] = {}
     numeric: Annotated[list[Literal["f32", "q31"]], Field(min_length=1)] | None = None
     limits: _Place | None = None
 
@@ -118,7 +103,7 @@ def load_manifest(path: Path) -> Fleet:
     )
     units = tuple(unit for folder, axis in named for unit in _units(folder, axis))
     limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
-    options = FitOptions(**manifest.options.model_dump())
+    options = FitOptions(**options_in(manifest.options, f"{path}, field options."))
     numerics = tuple(manifest.numeric) if manifest.numeric else None
     return _distinct(path, Fleet(units, options, numerics, limits))
 
@@ -139,17 +124,7 @@ def _parsed(path: Path) -> _Manifest:
     try:
         return _Manifest.model_validate(content)
     except ValidationError as error:
-        raise _wrong_field(path, error) from error
-
-
-def _wrong_field(path: Path, error: ValidationError) -> InputError:
-    detail: Any = error.errors()[0]
-    where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
-    if detail["type"] == "extra_forbidden":
-        return InputError(where, "is not known", "a field named in docs/fleet.md")
-    if detail["type"] == "missing":
-        return InputError(where, "is missing", f"{detail['loc'][-1]} = ...")
-    return InputError(where, repr(detail["input"]), detail["msg"])
+        raise refused(error, lambda field: f"{path}, field {field}") from error
 
 
 def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:

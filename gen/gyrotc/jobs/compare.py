@@ -23,23 +23,14 @@ from ..results.evaluation import Comparison, Group, Method, Pooled
 from ..train.cross_validation import training_spans
 from ..train.data import TrainingData, joined
 from ..train.fitting import front_end, samples_of
-from ..train.methods import METHODS, fit
+from ..train.methods import fit
+from ..train.options import DEFAULTS, METHODS, BuildOptions
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 
-__all__ = ["CompareOptions", "compare"]
+__all__ = ["compare"]
 
 _JudgedOn = Literal["exam", "left_out"]
-
-
-@dataclass(frozen=True, slots=True)
-class CompareOptions:
-    """Options of `gyrotc compare`."""
-
-    methods: tuple[str, ...] = METHODS
-    seed: int = 0
-    block_s: float = 10.0
-    average_s: float = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +44,18 @@ class _Held:
 
 
 def compare(
-    dataset: Dataset, options: CompareOptions | None = None, *, progress: Progress | None = None
+    dataset: Dataset,
+    options: BuildOptions = DEFAULTS,
+    *,
+    methods: Sequence[str] = METHODS,
+    progress: Progress | None = None,
 ) -> Comparison:
     """Trains and judges every method.
 
     Args:
         dataset: With at least one training run.
-        options: Methods, seed, block length, averaging.
+        options: Seed, block length and averaging; the others are each method's own.
+        methods: Their names.
         progress: Called with what is being done.
 
     Returns:
@@ -68,16 +64,15 @@ def compare(
     Raises:
         InputError: No training run, or no usable sample.
     """
-    options = options or CompareOptions()
     say = progress or (lambda _: None)
     say("reading")
     data, held, judged_on = _samples(dataset, options)
-    methods = []
-    _fit(options.methods[0], data, options)  # what a first call loads is not training time
-    for k, method in enumerate(options.methods, 1):
-        say(f"{method}, {k} of {len(options.methods)}")
-        methods.append(_judged(method, data, held, options))
-    reference = next((m for m in methods if m.id == "mrbf"), methods[0])
+    _fit(methods[0], data, options)  # what a first call loads is not training time
+    judged = []
+    for k, method in enumerate(methods, 1):
+        say(f"{method}, {k} of {len(methods)}")
+        judged.append(_judged(method, data, held, options))
+    reference = next((m for m in judged if m.id == "mrbf"), judged[0])
     return Comparison(
         gyrotc_version=__version__,
         serial=dataset.serial,
@@ -88,11 +83,11 @@ def compare(
         judged_on=judged_on,
         noise_floor_dph=reference.noise_floor_dph,
         noise_floor_source="estimated",
-        methods=tuple(methods),
+        methods=tuple(judged),
     )
 
 
-def _samples(dataset: Dataset, options: CompareOptions) -> tuple[TrainingData, list[_Held], _JudgedOn]:
+def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, list[_Held], _JudgedOn]:
     """All training samples, what is judged, and on what."""
     training = [run for run in dataset.runs if run.role == "train"]
     if not training:
@@ -135,7 +130,7 @@ def _left_out(
     ]
 
 
-def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: CompareOptions) -> Method:
+def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: BuildOptions) -> Method:
     began = time.process_time()
     whole = _fit(method, data, options)
     seconds = time.process_time() - began
@@ -159,19 +154,19 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Com
     )
 
 
-def _fit(method: str, data: TrainingData, options: CompareOptions) -> Fit:
+def _fit(method: str, data: TrainingData, options: BuildOptions) -> Fit:
     return fit(data, method=method, seed=options.seed, average_s=options.average_s)
 
 
 def _fits(
-    whole: Fit, data: TrainingData, held: Sequence[_Held], options: CompareOptions
+    whole: Fit, data: TrainingData, held: Sequence[_Held], options: BuildOptions
 ) -> Iterator[tuple[_Held, Fit]]:
     """Each part to judge with a fit that has not seen it."""
     for part in held:
         yield part, whole if part.seen.all() else _fit(whole.method, data.select(part.seen), options)
 
 
-def _averages(held: _Held, fitted: Fit, options: CompareOptions) -> Averages:
+def _averages(held: _Held, fitted: Fit, options: BuildOptions) -> Averages:
     s = held.samples
     after = s.bias_dph - predict(fitted, s.temperature_c, s.slope_c_per_min)
     scored = np.ones(len(s), dtype=bool)

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..common.metrics import Averages, statistics
+from ..common.ranges import AverageLength
 from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
 from .release import HeldLimits
 
@@ -180,7 +181,7 @@ class Evaluation(Result):
     axis: Axis = Field(description="null where the recordings have one axis")
     numeric: Arithmetic = Field(description="arithmetic that was run")
     block_s: float = Field(description="length of a block, s")
-    average_s: Annotated[float, Field(gt=0.0, le=1e9)] = Field(description="averaging of all RMS figures, s")
+    average_s: AverageLength = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Amount | None = Field(description="of means over `average_s`, deg/h")
     noise_floor_source: str | None = Field(description="`simulated`, or `estimated`")
     mismatches: Count | None = Field(description="steps that differ from the reference; null: not compared")

@@ -29,13 +29,13 @@ from .data import TrainingData, cleaned, joined, scaling_of
 from .evidence import TrainingFailed
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .means import unit_means
-from .methods import AUTO, METHODS, NETWORK_METHODS, fit
+from .methods import fit
 from .mrbf import Bumps
 from .noise import noise_terms, sensitivities, stretches
+from .options import AUTO, SIMPLE, BuildOptions
 from .prior import Prior
 from .result import Fit, predict, snapped
 from .samples import Blocks, run_blocks
-from .simple import SIMPLE
 from .uncertainty import coverage, rezero_dph, uncertainty
 
 __all__ = [
@@ -64,20 +64,16 @@ _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 
-@dataclass(frozen=True, slots=True)
-class FitOptions:
-    """Options of `gyrotc fit`; the method `auto` is the ladder of corrections.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitOptions(BuildOptions):
+    """Options of `gyrotc fit`: `method`, `seed`, `centers`, `rho`, `block_s`, `average_s`, `channels`, and `prior`.
 
-    `channels`: recorded channels become inputs where they earn their place. `prior`: what is known of the unit.
+    `prior` is what is known of the unit before its runs: a lot, or an earlier model.
+
+    Raises:
+        InputError: A value is out of its range; the message names the option of the command line.
     """
 
-    method: str = AUTO
-    seed: int = 0
-    centers: int | None = None
-    rho: float | None = None
-    block_s: float = 10.0
-    average_s: float = 100.0
-    channels: bool = False
     prior: Prior | None = None
 
 
@@ -149,14 +145,8 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     """Fits a model to the training runs of a data set.
 
     Raises:
-        InputError: No training run, too few usable samples, or a method whose map is no network.
+        InputError: No training run, or too few usable samples.
     """
-    if options.method not in (AUTO, *NETWORK_METHODS):
-        others = ", ".join(method for method in METHODS if method not in NETWORK_METHODS)
-        expected = (
-            f"one of {AUTO}, {', '.join(NETWORK_METHODS)} (`gyrotc compare` shows {others} beside them)"
-        )
-        raise InputError("--method", repr(options.method), expected)
     if options.prior is not None:
         options.prior.check_axis(dataset.axis)
     runs = [run for run in dataset.runs if run.role == "train"]
@@ -304,7 +294,8 @@ def _left_out(
 
 def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: float) -> Averages:
     """Weighted means over `average_s` of block samples of one run."""
-    number = np.floor((data.time_s - data.time_s[0]) / average_s + 1e-9).astype(np.int64)
+    cell = np.floor((data.time_s - data.time_s[0]) / average_s + 1e-9)
+    number = np.unique(cell, return_inverse=True)[1]
     weight = np.bincount(number, weights=data.weight)
     full = weight >= 0.5 * np.max(weight)
 

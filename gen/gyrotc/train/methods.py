@@ -14,11 +14,12 @@ from .evidence import TrainingFailed
 from .guards import objection
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .noise import floor_dph
+from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOptions
 from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
 from .prior import Prior
 from .result import Fit, Outcome, network, predict
 from .selection import chosen_by_ladder
-from .simple import SIMPLE, fit_simple
+from .simple import fit_simple
 from .uncertainty import coverage, uncertainty
 
 __all__ = [
@@ -38,12 +39,6 @@ __all__ = [
     "uncertainty",
 ]
 
-METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
-NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
-"""Those whose map is networks alone, so that a table can hold it."""
-AUTO = "auto"
-"""The ladder: the simplest correction that does on unseen history what the best one does."""
-_MAX_CENTERS = 512  # what a table holds: docs/FORMAT.md, "Legal ranges"
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
 _POLYNOMIALS = {"mlr": fit_mlr, "poly": fit_poly, "poly_slope": fit_poly_slope}
 _GUARDED = ("mrbf", "mrbf_t")
@@ -53,11 +48,11 @@ def fit(
     data: TrainingData,
     *,
     method: str = "mrbf",
-    seed: int = 0,
+    seed: int = DEFAULTS.seed,
     centers: int | None = None,
     rho: float | None = None,
     size_rule: str | None = None,
-    average_s: float = 100.0,
+    average_s: float = DEFAULTS.average_s,
     power_on: NDArray[np.int64] | None = None,
     prior: Prior | None = None,
     serial: str = "",
@@ -83,7 +78,8 @@ def fit(
         TrainingFailed: The equations of a method that was asked for by name cannot be solved.
     """
     method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
-    _check(method, centers, rho, average_s)
+    _check_method(method)
+    BuildOptions(seed=seed, centers=centers, rho=rho, average_s=average_s)
     samples = cleaned(data)
     scaling = scaling_of(samples)
     findings: list[dict[str, object]] = []
@@ -123,16 +119,11 @@ def fit(
     )  # fmt: skip
 
 
-def _check(method: str, centers: int | None, rho: float | None, average_s: float) -> None:
+def _check_method(method: str) -> None:
+    """Beside the methods of a build those that are there to be compared."""
     known = (AUTO, *dict.fromkeys((*METHODS, *NETWORK_METHODS)))
     if method not in known:
         raise InputError("method", repr(method), "one of " + ", ".join(known))
-    if centers is not None and not 0 <= centers <= _MAX_CENTERS:
-        raise InputError("centers", repr(centers), f"0 ... {_MAX_CENTERS}")
-    if rho is not None and not 0.0 <= rho < 1.0:
-        raise InputError("rho", repr(rho), "0 ... 1")
-    if not (np.isfinite(average_s) and average_s > 0.0):
-        raise InputError("average_s", repr(average_s), "a number of seconds above 0")
 
 
 def trained(
@@ -140,11 +131,11 @@ def trained(
     data: TrainingData,
     scaling: Scaling,
     *,
-    seed: int = 0,
+    seed: int = DEFAULTS.seed,
     centers: int | None = None,
     rho: float | None = None,
     size_rule: str | None = None,
-    average_s: float = 100.0,
+    average_s: float = DEFAULTS.average_s,
     ridge: float = RIDGE,
 ) -> Outcome:
     """What one method makes of cleaned samples, whatever they tell about temperature; arguments as those of `fit`.

@@ -47,8 +47,9 @@ from .evidence import MEAN_S, Process, TrainingFailed, conditioned, fit_process
 from .guards import objection
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .noise import difference_sigma
+from .options import SIMPLE
 from .result import Outcome
-from .simple import SIMPLE, all_solved, fit_simple, powers_of
+from .simple import all_solved, fit_simple, powers_of
 
 __all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Chosen", "Ladder", "chosen_by_ladder", "climb", "pieces_of"]
 

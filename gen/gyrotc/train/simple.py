@@ -14,19 +14,13 @@ import numpy as np
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
 from .noise import floor_dph
+from .options import SIMPLE
 from .result import Network, Outcome, network
 
-__all__ = ["SIMPLE", "all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]
+__all__ = ["all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]
 
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
-SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
-    "constant": ((0, 0),),
-    "linear": ((0, 0), (1, 0)),
-    "cubic": ((0, 0), (1, 0), (2, 0), (3, 0)),
-    "cubic_slope": ((0, 0), (1, 0), (0, 1), (2, 0), (3, 0)),
-}
-"""Powers of (z_T, z_r) of each."""
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
 """How many of `powers_of` each has."""
 _DEPENDENT = 1e-8

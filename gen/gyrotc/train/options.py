@@ -1,0 +1,156 @@
+"""Names of the training methods, and the options of a build with their defaults, ranges and meanings.
+
+They stand here alone: the command line, the manifest of a fleet and Python callers make the same class, which pydantic
+checks. It is imported by what says `--help`, so pydantic is loaded with the first value that is not a default.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+
+from annotated_types import Interval
+
+from ..common.errors import InputError
+from ..common.inputs import refused
+from ..common.ranges import MOST_CENTERS, AverageLength, BlockLength
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+__all__ = [
+    "AUTO",
+    "DEFAULTS",
+    "METHODS",
+    "NETWORK_METHODS",
+    "SIMPLE",
+    "BuildOptions",
+    "flag_of",
+    "help_of",
+    "options_in",
+]
+
+SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
+    "constant": ((0, 0),),
+    "linear": ((0, 0), (1, 0)),
+    "cubic": ((0, 0), (1, 0), (2, 0), (3, 0)),
+    "cubic_slope": ((0, 0), (1, 0), (0, 1), (2, 0), (3, 0)),
+}
+"""Corrections without a search: powers of (z_T, z_r) of each."""
+METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
+NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
+"""Those whose map is networks alone, so that a table can hold it."""
+AUTO = "auto"
+"""The ladder: the simplest correction that does on unseen history what the best one does."""
+
+
+def _meaning(text: str) -> dict[str, str]:
+    return {"meaning": text}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuildOptions:
+    """What `gyrotc fit`, `build`, `diagnose`, `compare` and a fleet can be told.
+
+    Raises:
+        InputError: A value is out of its range; the message names the option of the command line.
+    """
+
+    method: str = field(
+        default=AUTO,
+        metadata=_meaning(
+            "auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ..."
+        ),
+    )
+    seed: Annotated[int, Interval(ge=0, lt=2**63)] = field(
+        default=0,
+        metadata=_meaning("Number from which everything random is drawn; the same number, the same result."),
+    )
+    centers: Annotated[int, Interval(ge=0, le=MOST_CENTERS)] | None = field(
+        default=None, metadata=_meaning("Number of centers; by default the data decide.")
+    )
+    rho: Annotated[float, Interval(ge=0.0, lt=1.0)] | None = field(
+        default=None, metadata=_meaning("Threshold of error reduction, eq. (16) of Ding et al. 2014.")
+    )
+    block_s: BlockLength = field(default=10.0, metadata=_meaning("Length of a block, s."))
+    average_s: AverageLength = field(
+        default=100.0, metadata=_meaning("Length of the means of which RMS figures are taken, s.")
+    )
+    channels: bool = field(
+        default=False,
+        metadata=_meaning("Let recorded channels be inputs, those that hold on unseen history alone."),
+    )
+
+    def __post_init__(self) -> None:
+        for option in fields(BuildOptions):
+            value = getattr(self, option.name)
+            if value is not option.default:
+                object.__setattr__(self, option.name, _checked(option.name, value, flag_of(option.name)))
+
+
+DEFAULTS = BuildOptions()
+
+
+def flag_of(name: str) -> str:
+    """How a user types an option."""
+    return "--" + name.replace("_", "-")
+
+
+def help_of(name: str) -> str:
+    """What an option means, and the range of a number."""
+    [option] = (option for option in fields(BuildOptions) if option.name == name)
+    meaning, limits = option.metadata["meaning"], _range_of(name)
+    return f"{meaning.removesuffix('.')} ({limits})." if limits else str(meaning)
+
+
+def _range_of(name: str) -> str:
+    stated = get_type_hints(BuildOptions, include_extras=True)[name]
+    for kind in (stated, *get_args(stated)):
+        for limits in get_args(kind)[1:] if get_origin(kind) is Annotated else ():
+            if isinstance(limits, Interval):
+                low = f"{limits.ge:g} <=" if limits.ge is not None else f"{limits.gt:g} <"
+                high = f"<= {limits.le:g}" if limits.le is not None else f"< {limits.lt:g}"
+                return f"{low} x {high}"
+    return ""
+
+
+@functools.cache
+def _kind_of(name: str) -> TypeAdapter[Any]:
+    from pydantic import ConfigDict, TypeAdapter
+
+    stated = get_type_hints(BuildOptions, include_extras=True)[name]
+    return TypeAdapter(stated, config=ConfigDict(allow_inf_nan=False))
+
+
+def _checked(name: str, value: Any, where: str, *, strict: bool = False) -> Any:
+    from pydantic import ValidationError
+
+    try:
+        taken = _kind_of(name).validate_python(value, strict=strict)
+    except ValidationError as error:
+        if limits := _range_of(name):
+            raise InputError(where, repr(value), f"a number, {limits}") from error
+        raise refused(error, lambda _: where) from error
+    if name == "method" and taken not in (AUTO, *NETWORK_METHODS):
+        others = ", ".join(method for method in METHODS if method not in NETWORK_METHODS)
+        known = ", ".join((AUTO, *NETWORK_METHODS))
+        raise InputError(where, repr(value), f"one of {known} (`gyrotc compare` shows {others} beside them)")
+    return taken
+
+
+def options_in(content: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The options that a file states, each of its own type: no text for a number.
+
+    Args:
+        content: Values by the names of options.
+        where: Stands before a name in messages, e.g. ``fleet.toml, field options.``
+
+    Raises:
+        InputError: A name is not known, or a value is of another type or out of its range.
+    """
+    known = [option.name for option in fields(BuildOptions)]
+    if unknown := next((name for name in content if name not in known), None):
+        raise InputError(f"{where}{unknown}", "is not known", f"one of {', '.join(known)}")
+    return {name: _checked(name, value, f"{where}{name}", strict=True) for name, value in content.items()}
