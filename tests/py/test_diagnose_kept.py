@@ -14,6 +14,7 @@ import pytest
 from campaigns import GRADIENT, simulated
 from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.jobs import diagnosis
+from gyrotc.jobs.build import build
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.store import cache
@@ -156,5 +157,26 @@ def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, co
     ):
         path.write_bytes(damaged)
         before = counted.count
-        assert diagnosis.diagnosed(recordings) == counted.found.result
+        assert diagnosis.diagnosed(recordings).result == counted.found.result
         assert counted.count == before + 1
+
+
+@pytest.mark.slow
+def test_a_build_takes_the_diagnosis_that_was_made_before(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The extended model and what training says of it come with it: the result is the same to the byte."""
+
+    def built(out: Path) -> dict[str, bytes]:
+        build(data, out, FitOptions(), numerics=["f32"], targets=["host-gcc-O2"], extend=True)
+        names = ("model.json", "training.json", "diagnosis/report.html", "diagnosis/model-extended.json")
+        return {name: (out / name).read_bytes() for name in names}
+
+    first = built(tmp_path / "first")
+    assert json.loads(first["model.json"])["terms"]
+
+    def again(*_: object, **__: object) -> Diagnosis:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("gyrotc.diagnose.diagnosis.diagnose", again)
+    assert built(tmp_path / "second") == first

@@ -374,7 +374,7 @@ def diagnose(
                 progress=say,
                 accept_events=accept_events,
                 fresh=fresh,
-            )
+            ).result
 
     if axis != "all" or out is None:
         for name in axes:

@@ -18,7 +18,7 @@ from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
-from ..model import Model
+from ..model import Model, load_model
 from ..pages.report import write_report
 from ..recordings.load import axes_of, load
 from ..recordings.records import Dataset
@@ -244,12 +244,13 @@ def _extended(
     dataset: Dataset, work: Path, options: FitOptions, say: Progress
 ) -> tuple[Fitted | None, Diagnosed]:
     """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
-    from .diagnosis import diagnose_into
+    from .diagnosis import diagnosed
 
-    found = diagnose_into(work / "diagnosis", dataset, options=options, progress=say)
-    if found.model is None or found.training is None:
+    found = diagnosed(dataset, work / "diagnosis", options=options, progress=say)
+    extended = found.result.extended
+    if extended is None or extended.model is None or found.training is None:
         return None, found.result
-    return Fitted(found.model, found.training), found.result
+    return Fitted(load_model(work / "diagnosis" / extended.model), found.training), found.result
 
 
 def _of_axis(axis: str, say: Progress) -> Progress:

@@ -27,6 +27,7 @@ from ..recordings.description import FILE
 from ..recordings.records import Dataset
 from ..results.base import checked_result
 from ..results.diagnosed import Diagnosed, NamedCause
+from ..results.training import Training
 from ..store import cache
 from ..store.files import digest_of, json_text, write_atomically
 from ..store.folder import result_folder
@@ -35,7 +36,7 @@ from ..train.fitting import FitOptions
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
-__all__ = ["diagnose_into", "diagnosed", "extended_scenario", "save"]
+__all__ = ["Kept", "diagnose_into", "diagnosed", "extended_scenario", "save"]
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
@@ -134,11 +135,18 @@ _KINDS = (".html", ".json", ".svg", ".toml")
 
 
 @dataclass(frozen=True)
-class _Kept:
-    """A diagnosis as it was written: the result, and the texts of its files by path within the folder."""
+class Kept:
+    """A diagnosis as it was written.
+
+    Attributes:
+        result: What `diagnose.json` holds.
+        files: Texts of its files by path within the folder; none where it was made without a folder.
+        training: What `training.json` says of the extended model, where one is shipped.
+    """
 
     result: Diagnosed
     files: dict[str, str]
+    training: Training | None = None
 
 
 def diagnosed(
@@ -150,7 +158,7 @@ def diagnosed(
     progress: Progress | None = None,
     accept_events: bool = False,
     fresh: bool = False,
-) -> Diagnosed:
+) -> Kept:
     """Diagnoses a data set, or takes what an earlier call found of the same.
 
     Args:
@@ -164,15 +172,16 @@ def diagnosed(
     name = _name(dataset, model, options, accept_events=accept_events, files=out is not None)
     found = None if fresh else cache.kept(name, _unpacked)
     if found is None:
-        result = _anew(dataset, out, model, options, progress, accept_events)
-        files = {} if out is None else {path: _text(out / path) for path in _written(result)}
-        cache.keep(name, _packed(_Kept(result, files)))
-        return result
+        made = _anew(dataset, out, model, options, progress, accept_events)
+        files = {} if out is None else {path: _text(out / path) for path in _written(made.result)}
+        found = Kept(made.result, files, made.training)
+        cache.keep(name, _packed(found))
+        return found
     if progress:
         progress("taking what was found before")
     if out is not None:
         _write(out, dataset, found.files)
-    return found.result
+    return found
 
 
 def _anew(
@@ -182,11 +191,11 @@ def _anew(
     options: FitOptions | None,
     progress: Progress | None,
     accept_events: bool,
-) -> Diagnosed:
+) -> Diagnosis:
     from ..diagnose.diagnosis import diagnose
 
     into = diagnose if out is None else functools.partial(diagnose_into, out)
-    return into(dataset, model=model, options=options, progress=progress, accept_events=accept_events).result
+    return into(dataset, model=model, options=options, progress=progress, accept_events=accept_events)
 
 
 def _write(out: Path, dataset: Dataset, files: dict[str, str]) -> None:
@@ -211,16 +220,19 @@ def _text(path: Path) -> str:
     return path.read_bytes().decode("utf-8")
 
 
-def _packed(found: _Kept) -> bytes:
-    return json.dumps({"result": found.result.content(), "files": found.files}).encode("ascii")
+def _packed(found: Kept) -> bytes:
+    training = found.training.content() if found.training else None
+    held = {"result": found.result.content(), "files": found.files, "training": training}
+    return json.dumps(held).encode("ascii")
 
 
-def _unpacked(content: bytes) -> _Kept | None:
+def _unpacked(content: bytes) -> Kept | None:
     """None where it is no diagnosis with the files that its result names."""
     held = json.loads(content)
     result, files = checked_result(held["result"], Diagnosed, "what was kept"), held["files"]
+    training = held["training"] and checked_result(held["training"], Training, "what was kept")
     plain = all(isinstance(text, str) and _is_plain(path) for path, text in files.items())
-    return _Kept(result, files) if plain and set(files) in ({*_written(result)}, set()) else None
+    return Kept(result, files, training) if plain and set(files) in ({*_written(result)}, set()) else None
 
 
 def _is_plain(path: str) -> bool:
