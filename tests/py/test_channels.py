@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from campaigns import up_and_down
+from conftest import HOST, Command
 from gyrotc.causes.base import History
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.jobs.build import build_into
+from gyrotc.model import load_model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows
 from gyrotc.simulate.campaign import simulate
@@ -241,3 +246,35 @@ def test_without_the_option_recordings_with_channels_give_the_model_that_they_ga
     assert not model.terms
     assert not model.guards
     assert fitted.training.channels
+
+
+def test_a_manifest_can_ask_for_channels(recordings: Path, fitted: Fitted, tmp_path: Path) -> None:
+    fleet = load_manifest(_with_channels(recordings))
+    [unit] = fleet.units
+    built = build_into(tmp_path, load(unit.dataset), fleet.options, numerics=fleet.numerics, compiled=False)
+    assert built.model == fitted.model and built.model.terms
+
+
+def _with_channels(recordings: Path) -> Path:
+    manifest = recordings.parent / "fleet.toml"
+    manifest.write_text(
+        f'schema = 1\nnumeric = ["f32"]\ndatasets = ["{recordings.name}"]\n[options]\nchannels = true\n'
+    )
+    return manifest
+
+
+@pytest.mark.slow
+def test_a_fleet_with_channels_makes_what_a_build_with_channels_makes(
+    recordings: Path, fitted: Fitted, tmp_path: Path, gyrotc: Command
+) -> None:
+    for arguments in (
+        ("fleet", _with_channels(recordings), "--out", tmp_path / "fleet", "--jobs", "1"),
+        ("build", recordings, "--channels", *HOST, "--out", tmp_path / "build"),
+    ):
+        done = gyrotc(*arguments)
+        assert done.returncode == 0, done.stderr
+    unit, built = tmp_path / "fleet" / recordings.name, tmp_path / "build"
+    assert (unit / "model.json").read_bytes() == (built / "model.json").read_bytes()
+    assert load_model(unit) == fitted.model and fitted.model.terms
+    exams = [json.loads((folder / "evaluate.json").read_text())["exam"] for folder in (unit, built)]
+    assert exams[0] == exams[1]
