@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder
 from ..train.options import DEFAULTS, BuildOptions
 from .base import (
     BUILD,
@@ -60,6 +57,7 @@ from .results import (
 
 if TYPE_CHECKING:
     from ..jobs.build import Built
+    from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
 
 _RARE = 0.01  # the familywise level of the search: rarer statistics are told
 
@@ -287,9 +285,12 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
+
     from ..jobs.compare import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.load import load
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
 
     options = BuildOptions(seed=seed, block_s=block_s, average_s=average_s)
     with (
@@ -344,10 +345,12 @@ def diagnose(
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
+
     from ..jobs.diagnosis import diagnosed
     from ..model import load_model
     from ..recordings.load import axes_of, load
     from ..recordings.records import Dataset
+    from ..store.folder import result_folder
     from ..train.fitting import FitOptions
 
     if lot is not None and model is not None:

@@ -11,9 +11,6 @@ import typer
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder
-from ..store.marker import MARKER
 from ..train.options import DEFAULTS, BuildOptions
 from .base import (
     EMIT,
@@ -78,6 +75,9 @@ def evaluation_folders(
     Raises:
         InputError: As `result_folder`; or the traces would take the place of another part of the result.
     """
+
+    from ..store.folder import result_folder
+
     inside = _inside(folder, trace)
     entries = ("evaluate.json", *([inside.parts[0]] if inside else []))
     with ExitStack() as stack:
@@ -91,6 +91,9 @@ def evaluation_folders(
 
 def _inside(folder: Path, trace: Path | None) -> Path | None:
     """The folder of traces by its path in the result folder; None where it lies elsewhere."""
+
+    from ..store.marker import MARKER
+
     if trace is None or folder.resolve() not in (trace.resolve(), *trace.resolve().parents):
         return None
     inside = trace.resolve().relative_to(folder.resolve())
@@ -122,8 +125,11 @@ def fit(
 
     Example: gyrotc fit recordings --out result
     """
+
     from ..jobs.recalibration import with_prior
     from ..recordings.load import load
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
     from ..tables.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
@@ -169,8 +175,10 @@ def emit(
 
     Example: gyrotc emit result/model.json --out result
     """
+
     from ..model import load_model
     from ..results.verification import Emitted, EmittedTable
+    from ..store.folder import result_folder
     from ..tables.emit import emit as run
 
     loaded = load_model(model)
@@ -229,10 +237,13 @@ def verify(
 
     Example: gyrotc verify result --target all
     """
+
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
     from ..recordings.load import load
     from ..results.verification import JointVerification, Verification
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
     from ..verify.job import verify as run
 
     allowed = allow_edited or ()
@@ -290,9 +301,11 @@ def evaluate(
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
+
     from ..assess.evaluate import evaluate as run
     from ..model import load_model
     from ..recordings.load import load
+    from ..store.files import json_text, write_atomically
     from ..tables.applied import applied_of
 
     if average_s is not None:
