@@ -63,7 +63,7 @@ test-all:
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
 targets:
 	@tools/setup.sh targets
-	@$(PYTHON) -m pytest -q -rs tests/targets tests/py/test_negative_controls.py --results docs
+	@$(PYTHON) -m pytest -q -rs tests/targets tests/py/verify/test_negative_controls.py --results docs
 
 ## every input of a table, no run-time error, rounding bounds (Frama-C, Gappa, Z3; minutes): docs/results.md
 prove:
@@ -78,7 +78,7 @@ check:
 	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/promises
 	@$(PYTHON) -m gyrotc.paper docs --check
-	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/test_paper_reference.py
+	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/paper/test_paper_reference.py
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:
@@ -182,11 +182,11 @@ blind-other: setup
 
 ## training on 2,000 odd but valid data sets, minutes (SETS=2000; SEED=n begins with the n-th: shares)
 odd: setup
-	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/test_odd_training.py
+	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/train/test_odd_training.py
 
 ## memory named from 100 clean single cycles at four levels of noise (CYCLES=100): at most 2 %
 cycles: setup
-	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/test_diagnose_cycle.py -k clean_cycles
+	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/diagnose/test_diagnose_cycle.py -k clean_cycles
 
 ## archives to install from, without sources: sdist, wheel, bills of materials, checksums in build/dist
 dist: setup

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "py")]
+sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/target"))]
 
 from prove_page import section  # noqa: E402
 from results import Results, machine, write  # noqa: E402

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "py")]
+sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/verify"))]
 
 import self_test_page  # noqa: E402
 import targets_page  # noqa: E402

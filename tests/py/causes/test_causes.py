@@ -1,0 +1,182 @@
+"""A cause is one file: a new one goes all the way, and nothing outside `causes` knows one by its name."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import made_up_cause
+import numpy as np
+import pytest
+from gyrotc.causes import CATALOGUE, register, separate_by
+from gyrotc.causes.base import Cause, History, Parameter, Reach, Scene
+from gyrotc.cli.plan import plan_parts
+from gyrotc.jobs.build import build
+from gyrotc.model import load_model
+from gyrotc.pages.plan import write_plan
+from gyrotc.plan.plan import plan
+from gyrotc.simulate.campaign import simulate
+from gyrotc.target.recursions import Course, CourseChannel, TermOutcome
+from gyrotc.train.fitting import FitOptions
+
+PACKAGE = Path(__file__).resolve().parents[3] / "gen" / "gyrotc"
+MOST_LITERALS = 9
+SCENARIO = """
+extends = "separating"
+title = "a made-up cause"
+[[cause]]
+id = "slow_rate"
+tau_s = 900.0
+slope_dph_min_per_c = 4e-3
+[[set]]
+role = "train"
+started = 2026-03-02T08:00:00Z
+profiles = ["cold start 60 C", "nested loops", "fast full range"]
+[[set]]
+role = "exam"
+started = 2026-03-16T08:00:00Z
+profiles = ["fast full range"]
+"""
+
+
+@pytest.fixture
+def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[Cause]:
+    """The made-up cause in the catalogue, without the one whose columns are the same but for their unit."""
+    whole = dict(CATALOGUE)
+    del CATALOGUE["thermal_gradient"]
+    register(made_up_cause.CAUSE)
+    yield made_up_cause.CAUSE
+    CATALOGUE.clear()
+    CATALOGUE.update(whole)
+
+
+@pytest.mark.slow
+def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Cause) -> None:
+    """Simulated, planned, found, named, put into the table, emitted, verified on the host, reported."""
+    scenario, out = tmp_path / "made-up.toml", tmp_path / "out"
+    scenario.write_text(SCENARIO)
+    simulate(scenario, seed=5, out=tmp_path / "data")
+    planned = plan(scenario, seed=5)
+    assert made_up.id in [entry.id for entry in planned.limits]
+    assert made_up.id in [row.id for row in planned.separability]
+    assert list(plan_parts(planned))
+    assert "slow rate" in write_plan(tmp_path / "plan", planned).read_text()
+
+    (built,) = build(tmp_path / "data", out, FitOptions(), targets=["host-gcc-O2"], extend=True)
+    assert not built.failures
+    diagnosis = built.diagnosis
+    assert diagnosis is not None and diagnosis.verdict in ("explained", "ambiguous")
+    (cause,) = diagnosis.causes
+    assert (cause.id, cause.name) == (made_up.id, made_up.words.name)
+    assert cause.parameters["tau_s"].value == pytest.approx(900.0, rel=0.2)
+    assert cause.parameters["slope_dph_min_per_c"].value == pytest.approx(4e-3, rel=0.2)
+    assert cause.gain is not None and (cause.gain.share_of_excess_removed or 0.0) > 0.6
+
+    (term,) = load_model(out / "model.json").terms
+    assert term.id == made_up.id
+    assert built.evaluation.mismatches == 0, "the compiled code is what the reference says"
+    assert built.verification.passed > 0 and built.verification.failed == 0
+    assert "/* slow_rate */" in next((out / "c").glob("gtc_sim_*.c")).read_text()
+    assert "slow rate" in (out / "report.html").read_text()
+
+
+def test_a_cause_has_its_own_id_and_rank(made_up: Cause) -> None:
+    with pytest.raises(ValueError, match="slow_rate"):
+        register(made_up)
+
+
+DIAGNOSED = [id for id, term in CATALOGUE.items() if term.search is not None]
+TABLED = [id for id, term in CATALOGUE.items() if term.table is not None]
+TIME = np.arange(0.0, 28800.0, 10.0)
+WAVE = 20.0 + 30.0 * np.sin(TIME / 3000.0)
+
+
+def _values(term: Cause) -> dict[str, float]:
+    """Every parameter in the middle of its range, at the default where it has one."""
+
+    def middle(p: Parameter) -> float:
+        return float(np.sqrt(p.low * p.high)) if p.logarithmic else 0.5 * (p.low + p.high)
+
+    return {p.name: middle(p) if p.default is None else p.default for p in term.parameters}
+
+
+@pytest.mark.parametrize("id", CATALOGUE)
+def test_every_cause_says_what_it_is(id: str) -> None:
+    term = CATALOGUE[id]
+    assert term.id == id and term.equation and term.source
+    words = term.words
+    assert all((words.name, words.short, words.signature, words.remedy, words.experiment))
+    assert words.name[0].isupper() and not words.name.endswith(".")
+    assert len(words.short) <= 8
+    assert set(words.beside) <= set(CATALOGUE), "an experiment beside a cause that there is"
+    linear = [p.linear for p in term.parameters]
+    assert linear == sorted(linear), "the linear parameters come last"
+    assert term.cavity or term.bias or term.record
+
+
+@pytest.mark.parametrize("id", DIAGNOSED)
+def test_every_cause_that_is_searched_has_columns_at_every_point_of_its_grid(id: str) -> None:
+    term = CATALOGUE[id]
+    assert term.search and term.features and term.unit
+    points = term.search.grid(Reach(span_c=100.0, longest_s=28800.0))
+    assert points
+    channel = WAVE if term.needs.channel else None
+    history = History(TIME, WAVE, on_s=TIME, channel=channel, day=3.0)
+    defaults = {p.name: p.default for p in term.nonlinear() if p.default is not None}
+    for values in (points[0], points[-1]):
+        features = term.features(history, {**defaults, **values})
+        assert features.columns.shape[0] == features.known.size == TIME.size
+        assert np.isfinite(features.columns).all()
+    if term.search.over is not None:
+        assert term.search.over in {p.name for p in term.nonlinear()}
+        assert all(set(values) == {term.search.over} for values in points)
+        assert not term.search.grid(Reach(1.0, 60.0)) or term.search.step, "none where nothing would show"
+    assert (term.kind == "input") == (term.amplitudes is None and term.kind != "static")
+
+
+@pytest.mark.parametrize("id", TABLED)
+def test_every_cause_of_a_table_does_there_what_it_does_in_the_simulation(id: str) -> None:
+    """The recursion over blocks of one row against the physics, where the cavity is the sensor."""
+    term, values = CATALOGUE[id], _values(CATALOGUE[id])
+    assert term.table
+    number = np.arange(TIME.size)
+    course = Course(WAVE, number > 0, number)
+    nothing = np.zeros_like(WAVE)
+    outcome = TermOutcome(WAVE, nothing, nothing, np.zeros(WAVE.size, dtype=np.int32))
+    table = term.table
+    channel = CourseChannel(WAVE, np.zeros(WAVE.size, dtype=np.int32), np.zeros(WAVE.size, dtype=np.bool_))
+    table.recursion(values, 10.0).apply(course, channel, outcome)
+    scene = Scene(TIME, TIME, WAVE, WAVE, WAVE, WAVE, 0.0)
+    if term.cavity is not None:
+        assert np.abs(outcome.temperature - term.cavity(scene, values)).max() < np.abs(np.diff(WAVE)).max()
+    if term.bias is not None:
+        want = term.bias(scene, values, np.random.default_rng(0))
+        assert np.abs(outcome.added - want).max() < 0.01 * np.ptp(want)
+
+
+@pytest.mark.parametrize("one", DIAGNOSED)
+def test_every_pair_has_an_experiment_whichever_comes_first(one: str) -> None:
+    for other in DIAGNOSED:
+        if other != one:
+            assert separate_by(one, other) == separate_by(other, one) != ""
+
+
+def literals() -> Iterator[str]:
+    """Where the id of a cause stands as a text outside `causes`."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.parent.name == "causes":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and node.value in CATALOGUE:
+                yield f"{path.relative_to(PACKAGE)}:{node.lineno} {node.value}"
+    quoted = re.compile("[\"'](" + "|".join(CATALOGUE) + ")[\"']")
+    for path in sorted(PACKAGE.rglob("*.j2")):
+        yield from (f"{path.name} {found}" for found in quoted.findall(path.read_text(encoding="utf-8")))
+
+
+def test_nothing_outside_causes_knows_a_cause_by_its_name() -> None:
+    """A rule about a pair may; each says its reason at its line, and they stay few."""
+    found = list(literals())
+    assert len(found) <= MOST_LITERALS, found

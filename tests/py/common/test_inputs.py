@@ -1,0 +1,380 @@
+"""Whatever is given as an input: a regular file within its ceilings is read, anything else is refused in one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from conftest import Command
+from gyrotc.assess.limits import load_limits
+from gyrotc.common import inputs
+from gyrotc.common.errors import InputError
+from gyrotc.common.inputs import parse_json, parse_toml
+from gyrotc.diagnose import signature_bank
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.model import load_model
+from gyrotc.pages import report
+from gyrotc.recordings.load import load
+from gyrotc.results.base import checked_result, read_result
+from gyrotc.results.evaluation import EvaluatedRun, Evaluation
+from gyrotc.results.verification import Verification
+from gyrotc.simulate.campaign import simulate
+from gyrotc.simulate.scenario import read
+from gyrotc.simulate.truth import simulated_floor
+from gyrotc.store import cache as kept
+from gyrotc.train.samples import run_blocks
+from gyrotc.verify.board import log_parts
+from recordings import columns, csv_text, described, write_csv
+
+READERS: dict[str, Callable[[Path], Any]] = {
+    "model": load_model,
+    "limits": load_limits,
+    "manifest": load_manifest,
+    "scenario": read,
+    "log": log_parts,
+    "result": lambda path: read_result(path, Evaluation),
+    "recording": lambda path: load(path.parent),
+}
+
+
+def refused(act: Callable[[], Any]) -> str:
+    with pytest.raises(InputError) as caught:
+        act()
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_a_device_and_the_kernels_files_are_not_waited_for(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "RLG-1"
+    folder.mkdir()
+    path = folder / "a.csv"
+    os.mkfifo(path)
+    assert "is a pipe" in refused(lambda: READERS[name](path))
+    for device in ("/dev/zero", "/dev/random", "/dev/full"):
+        path.unlink()
+        path.symlink_to(device)
+        assert "is a device" in refused(lambda: READERS[name](path))
+    path.unlink()
+    path.symlink_to("/proc/kmsg")
+    told = refused(lambda: READERS[name](path))
+    assert "is empty" in told or "cannot be read" in told
+
+
+def test_a_link_to_a_regular_file_is_read(tmp_path: Path) -> None:
+    write_csv(tmp_path / "there.csv")
+    (tmp_path / "RLG-1").mkdir()
+    (tmp_path / "RLG-1" / "a.csv").symlink_to(tmp_path / "there.csv")
+    assert load(tmp_path / "RLG-1").runs[0].n_rows == 120
+
+
+NESTED = 5000
+TOML = {
+    "thousands of digits": ("a = " + "9" * 5000, "no TOML"),
+    "more than 64 bits": ("a = " + "9" * 30, "100 bits"),
+    "deep lists": ("a = " + "[" * NESTED + "]" * NESTED, "nested too deep"),
+    "lists of 40 levels": ("a = " + "[" * 40 + "]" * 40, "nested too deep"),
+    "deep tables": ("a" + ".a" * NESTED + " = 1", "a key of too many parts"),
+    "a key that costs the square of its length": ("[" + "a." * 500_000 + "a]", "a key of too many parts"),
+    "no UTF-8": ("a = 1\nb = \udcff", "line 2: no UTF-8"),
+}
+JSON = {
+    "NaN": ('{"a": NaN}', "NaN is not a finite number"),
+    "beyond float": ('{"a": 1e999}', "1e999 is not a finite number"),
+    "thousands of digits": ('{"a": ' + "9" * 5000 + "}", "is not JSON"),
+    "more than 64 bits": ('{"a": ' + "9" * 30 + "}", "100 bits"),
+    "deep": ("[" * NESTED + "]" * NESTED, "nested too deep"),
+    "40 levels": ("[" * 40 + "]" * 40, "nested too deep"),
+    "half a surrogate pair": ('{"a": "\\ud800"}', "half a surrogate pair"),
+}
+
+
+@pytest.mark.parametrize("case", TOML)
+def test_hostile_toml(case: str) -> None:
+    text, told = TOML[case]
+    data = text.encode("utf-8", "surrogateescape")
+    assert told in refused(lambda: parse_toml(data, "a.toml", "a file"))
+
+
+@pytest.mark.parametrize("case", JSON)
+def test_hostile_json(case: str) -> None:
+    text, told = JSON[case]
+    assert told in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
+
+
+def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
+    """150 million rows lie in a file of 1 MB; here a twentieth of that, which is told from its metadata alone."""
+    folder = tmp_path / "RLG-1"
+    folder.mkdir()
+    table = pa.table({name: np.zeros(2**23) for name in ("time_s", "temperature_c", "rate_dph")})
+    pq.write_table(table, folder / "a.parquet")
+    assert (folder / "a.parquet").stat().st_size < 2**20
+    del table
+    program = (
+        "import resource, sys; from gyrotc.recordings.load import load; from pathlib import Path\n"
+        "used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "try: load(Path(sys.argv[1]))\nexcept Exception as error: print(error)\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used, 'KiB')\n"
+    )
+    for limits, told in (
+        ("", "bytes that unpack to 201326592 or more; expected at most 250 times"),
+        ("rows=1000000", "8388608 rows; expected at most 1000000 (--max rows=...)"),
+        (
+            "parquet_ratio=1e6 memory_gib=0.1",
+            "GiB of memory for 8388608 rows of 3 columns; expected at most 0.1",
+        ),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", program, folder], capture_output=True, text=True, check=True,
+            env=os.environ | {"GYROTC_MAX": limits},
+        )  # fmt: skip
+        message, taken = done.stdout.splitlines()
+        assert told in message and int(taken.split()[0]) < 2**16, done.stdout
+
+
+def test_times_on_a_wrong_scale(tmp_path: Path) -> None:
+    """Steps of 1e-11 s made one block of 10^12 rows: an array of 3.64 TiB."""
+    table = columns()
+    write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": 1e-12 * table["time_s"]})
+    assert "a median step of 1e-11 s" in refused(lambda: load(tmp_path / "RLG-1"))
+
+
+def test_a_block_longer_than_the_recording_takes_no_more_memory_than_it(tmp_path: Path) -> None:
+    table = columns()
+    write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": 2e-6 * table["time_s"]})
+    [run] = load(tmp_path / "RLG-1", trust_units=True).runs
+    settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
+    assert not run_blocks(run.rows(), run, block_s=3600.0, **settings).valid.any()
+
+
+def test_gaps_that_make_more_samples_than_memory_is_granted_for(tmp_path: Path) -> None:
+    table = columns(2000)
+    time = 1e-5 * np.arange(2000) + 1e4 * (np.arange(2000) // 3)
+    write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": np.round(time, 6)})
+    [run] = load(tmp_path / "RLG-1", trust_units=True).runs
+    settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
+    told = refused(lambda: run_blocks(run.rows(), run, block_s=10.0, **settings))
+    assert told.startswith("a.csv: ") and "GiB of memory" in told
+
+
+def test_ceilings_move_by_option_and_environment(tmp_path: Path, gyrotc: Command) -> None:
+    write_csv(tmp_path / "RLG-1" / "a.csv")
+    assert gyrotc("check", tmp_path / "RLG-1").returncode == 0
+    done = gyrotc("--max", "rows=50", "check", tmp_path / "RLG-1")
+    assert done.returncode == 2 and "expected at most 50 (--max rows=...)" in done.stdout
+    for wrong in ("rows=0", "rows=nan", "lines=5", "rows"):
+        done = gyrotc("--max", wrong, "check", tmp_path / "RLG-1")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1) and "--max or GYROTC_MAX" in done.stderr
+
+
+def test_every_ceiling_is_documented() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text("utf-8")
+    for name, ceiling in inputs.CEILINGS.items():
+        assert f"| `{name}` | {ceiling.default:g} |" in text, name
+
+
+TRUTH = {
+    "schema": "gyrotc.truth/1", "scenario": "a", "seed": 1, "noise": {}, "map": {}, "causes": [], "plan": {},
+    "runs": [{"file": "a.csv", "noise": "a.npy", "noise_step_s": 1.0, "bias_dph": [0.0, 1.0]}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"runs": [{}]}, "field runs.0.file: is missing"),
+        ({"runs": [TRUTH["runs"][0] | {"file": "b.csv"}]}, "no run a.csv"),  # type: ignore[index,operator]
+        ({"runs": "all"}, "field runs: 'all'"),
+        ({"runs": [TRUTH["runs"][0] | {"noise_step_s": 0.0}]}, "noise_step_s"),  # type: ignore[index,operator]
+        ({"runs": [TRUTH["runs"][0] | {"noise": "../../etc/passwd"}]}, "a file in the folder"),  # type: ignore[index,operator]
+        ({"schema": "x"}, "field schema"),
+        ({}, "a.npy: does not exist"),
+    ],
+)
+def test_a_truth_that_is_not_as_it_was_written(change: dict[str, Any], told: str, tmp_path: Path) -> None:
+    (tmp_path / "truth.json").write_text(json.dumps(TRUTH | change))
+    assert told in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
+
+
+def test_the_noise_of_a_truth(tmp_path: Path) -> None:
+    (tmp_path / "truth.json").write_text(json.dumps(TRUTH))
+    np.save(tmp_path / "a.npy", np.full(100, 2.0, dtype=np.float32))
+    assert simulated_floor(tmp_path, ["a.csv"], 10.0) == 2.0
+    whole = (tmp_path / "a.npy").read_bytes()
+    for wrong in (
+        whole[:-1],
+        whole.replace(b"(100,)", b"(10**9,)"),
+        whole.replace(b"<f4", b"|O "),
+        whole[:9],
+    ):
+        (tmp_path / "a.npy").write_bytes(wrong)
+        assert "is no whole array of numbers" in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
+
+
+def test_results_of_other_types_are_refused_by_field() -> None:
+    content: dict[str, Any] = {
+        "schema": "gyrotc.verify/1",
+        "gyrotc_version": "0.1.0",
+        "serial": "A",
+        "axis": None,
+    }
+    content |= {"passed": 1, "failed": 0, "missing": 0, "targets": [], "emitted": [], "errors": []}
+    content |= {"model_hash": "00", "c_hash": "00", "error_bound_dph": 0.0}
+    content |= {"worst_error_dph": {"value": 0.0, "inputs_visited": 0}}
+    assert checked_result(content, Verification, "v.json").content() == content
+    for change, told in (
+        ({"passed": "1"}, "v.json, field passed: '1'"),
+        ({"targets": [3]}, "v.json, field targets.0: 3"),
+        ({"targets": {}}, "v.json, field targets: {}"),
+        ({"failed": -1}, "v.json, field failed: -1"),
+        ({"schema": None}, "v.json, field schema: None"),
+    ):
+        assert told in refused(lambda: checked_result(content | change, Verification, "v.json"))  # noqa: B023
+    assert "is not a JSON object" in refused(lambda: checked_result([], Verification, "v.json"))
+
+
+@pytest.mark.slow
+def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
+    program = (
+        "import sys, gyrotc.recordings.load as m, gyrotc.quality.check, gyrotc.cli.main\n"
+        "def fail(*a, **k): raise {0}\n"
+        "gyrotc.quality.check.survey = fail\n"
+        f"sys.argv = ['gyrotc', 'check', {str(tmp_path)!r}]\n"
+        "gyrotc.cli.main.main()\n"
+    )
+    state = {"XDG_STATE_HOME": str(tmp_path / "state")}
+
+    def done(raised: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", program.format(raised)]
+        env = os.environ | state | environment
+        return subprocess.run(command, capture_output=True, text=True, check=False, env=env)
+
+    first = done("KeyError('a\\nb')")
+    assert first.returncode == 70 and first.stderr.count("\n") == 1
+    kept = Path(first.stderr.split("please send ")[1].strip())
+    assert kept.parent == tmp_path / "state" / "gyrotc" and kept.stat().st_mode & 0o777 == 0o600
+    assert "Traceback (most recent call last)" in kept.read_text() and "KeyError" in kept.read_text()
+    number = first.stderr.split("internal fault ")[1].split()[0]
+    assert number in kept.name and number in done("KeyError('other')").stderr, "one fault, one id"
+    (tmp_path / "file").write_text("")
+    elsewhere = done("KeyError()", XDG_STATE_HOME=str(tmp_path / "file"), TMPDIR=str(tmp_path))
+    assert f"please send {tmp_path}/crash-" in elsewhere.stderr
+    assert (done("KeyboardInterrupt").returncode, done("KeyboardInterrupt").stdout) == (130, "")
+    assert "Traceback" not in done("KeyboardInterrupt").stderr
+    out_of_memory = done("MemoryError")
+    assert out_of_memory.returncode == 2 and out_of_memory.stderr.startswith("gyrotc: not enough memory")
+
+
+class _Runs:
+    """What a pickle of somebody else would do."""
+
+    def __reduce__(self) -> tuple[Any, tuple[str]]:
+        return os.system, ("touch /tmp/gyrotc-was-here",)
+
+
+@pytest.mark.slow
+def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pickle
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    table = columns(400)
+    for number in range(3):
+        write_csv(tmp_path / "RLG-1" / f"{number}.csv", table)
+    records = records_of(load(tmp_path / "RLG-1"), "train", block_s=10.0, average_s=100.0)
+    said: list[str] = []
+    bank = signature_bank.bank_of(records, 0, said.append)
+    assert kept.folder().stat().st_mode & 0o777 == 0o700
+    [path] = kept.folder().glob("*.bank")
+    whole = path.read_bytes()
+    assert np.array_equal(signature_bank.bank_of(records, 0, said.append).signatures, bank.signatures)
+    assert len(said) == 1, "the second came from disk"
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        damaged = bytearray(whole)
+        damaged[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        assert kept.kept(path.name, signature_bank._bank) is None and not path.exists()
+    content = pickle.dumps(_Runs())
+    for foreign in (
+        b"",
+        b"x",
+        whole[:-1],
+        content,
+        kept._packed(content),
+    ):
+        path.write_bytes(foreign)
+        assert kept.kept(path.name, signature_bank._bank) is None
+    assert not Path("/tmp/gyrotc-was-here").exists()
+    path.write_bytes(whole[:1000])
+    assert np.array_equal(signature_bank.bank_of(records, 0, said.append).signatures, bank.signatures)
+    assert len(said) == 2
+    kept.folder().chmod(0o777)
+    signature_bank.bank_of(records, 0, said.append)
+    assert len(said) == 3, "others may write there"
+
+
+def test_a_line_without_an_end_does_not_fill_memory(tmp_path: Path) -> None:
+    folder = tmp_path / "RLG-1"
+    folder.mkdir()
+    (folder / "a.csv").write_text(csv_text(columns()) + "1" * 2**22)
+    assert "line 122: 1048576 characters and no end" in refused(lambda: load(folder))
+
+
+def test_runs_of_a_data_set_have_a_ceiling(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GYROTC_MAX", "runs=3")
+    described(tmp_path, *['file = "run-01.csv"'] * 4)
+    assert "4 runs; expected at most 3" in refused(lambda: load(tmp_path))
+
+
+@pytest.mark.slow
+def test_mutants_of_every_reader() -> None:
+    """A slice of `make fuzz`: no exception but those meant for users, no hang, no more than 2 GiB."""
+    command = [sys.executable, str(Path(__file__).parents[1] / "mutants.py"), "--count", "420", "--seed", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert done.stdout.startswith("seed 1: ")
+
+
+@pytest.mark.parametrize(
+    ("steps", "minutes", "told"),
+    [
+        ("[{staircase_to_c = 60.0, tread_c = 1e-9, hold_min = 1.0, c_per_min = 1.0}]", "60", "corners"),
+        ("[{repeat = [{hold_min = 1e-9}]}]", "60", "corners"),
+        ("[{hold_min = 1.0}]", "9e6", "GiB of memory"),
+        ("[{hold_min = 1.0}]", "1e300", "record_min"),
+    ],
+)
+def test_a_programme_that_never_ends(steps: str, minutes: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(
+        f'title = "a"\n[profile.a]\nstart_c = 20.0\nrecord_min = {minutes}\nsteps = {steps}\n'
+        '[[set]]\nstarted = 2026-03-02T08:00:00Z\nprofiles = ["a"]\n'
+    )
+    assert told in refused(lambda: simulate(tmp_path / "a.toml", seed=1, out=tmp_path / "out"))
+
+
+@pytest.mark.parametrize(
+    "line", ['[[unit]]\ndataset = "a\\u0000b"', 'datasets = ["**a"]', 'datasets = [""]', 'limits = "\\u0000"']
+)
+def test_names_in_a_manifest_that_are_no_paths(line: str, tmp_path: Path) -> None:
+    (tmp_path / "fleet.toml").write_text(f"schema = 1\n{line}\n")
+    assert "fleet.toml, field " in refused(lambda: load_manifest(tmp_path / "fleet.toml"))
+
+
+@pytest.mark.parametrize("time", ["1e18", "nan", "5.0"])
+def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
+    rows = [f"{t},20.0,1.0,1.0" for t in ("0.0", "10.0", time, "30.0")]
+    (tmp_path / "a.csv").write_text(
+        "\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n"
+    )
+    run = EvaluatedRun.model_construct(file="a.csv")
+    assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))

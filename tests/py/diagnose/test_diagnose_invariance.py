@@ -1,0 +1,234 @@
+"""What must not change a diagnosis, and what must: units, sign, order of runs, truth beside the recordings.
+
+Recordings of the independent generator of tests/blind with a fixed seed; every claim holds for any.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.diagnose.blocks import Record, Records, records_of
+from gyrotc.diagnose.detection import project
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.joined import _root
+from gyrotc.diagnose.noise import Declared, declared_noise
+from gyrotc.diagnose.pipeline import Analysis, analyse
+from gyrotc.diagnose.search import open_search
+from gyrotc.diagnose.summary import verdict_of
+from gyrotc.recordings.load import load
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+
+from tests.blind import campaign as blind  # noqa: E402
+from tests.blind.noise import Noise  # noqa: E402
+
+SEED = 20260301
+LEVEL = Noise(7e-4, 3e-5)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A verdict, the physical causes, and the analysis."""
+
+    verdict: str
+    causes: list[str]
+    analysis: Analysis
+
+
+def answer(records: Records, declared: Declared | None) -> Answer:
+    found = analyse(records, declared)
+    causes = [c.candidate.id for c in found.attribution.causes]
+    return Answer(verdict_of(found.attribution, found.noise), causes, found)
+
+
+@dataclass(frozen=True)
+class Case:
+    records: Records
+    declared: Declared
+    folder: Path
+    answer: Answer
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Temperatures, and what is hidden in the rates."""
+
+    campaign: blind.Campaign
+    yardstick: blind.Yardstick
+
+    def hidden(self, cause: str, k: float = 3.5) -> blind.Hidden:
+        """The same gyro and noise for any size of a cause."""
+        rng = np.random.default_rng([SEED, len(cause)])
+        return blind.draw_recording(self.campaign, self.yardstick, [(cause, k)] if cause else [], LEVEL, rng)
+
+
+@pytest.fixture(scope="module")
+def drawing() -> Drawing:
+    campaign = blind.draw_campaign(np.random.default_rng(SEED), "separating", hours=5.0, exam=1)
+    return Drawing(campaign, blind.Yardstick(campaign))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, drawing: Drawing) -> Callable[[str], Case]:
+    """A recording with one cause hidden at k = 3.5 ("" for none)."""
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+    known: dict[str, Case] = {}
+
+    def make(cause: str) -> Case:
+        if cause not in known:
+            folder = tmp_path_factory.mktemp("recordings")
+            blind.write(drawing.campaign, drawing.hidden(cause), folder, declare=True, serial="U-0001")
+            dataset = load(folder)
+            records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+            declared = declared_noise(dataset)
+            assert declared is not None
+            known[cause] = Case(records, declared, folder, answer(records, declared))
+        return known[cause]
+
+    yield make
+    patch.undo()
+
+
+def changed(records: Records, change: Callable[[Record], Record]) -> Records:
+    return Records(tuple(change(r) for r in records.runs), records.block_s)
+
+
+def scaled(noise: Declared, factor: float) -> Declared:
+    values = (noise.arw_deg_per_sqrt_h, noise.bias_instability_dph)
+    return Declared(*(factor * v for v in values))
+
+
+@pytest.mark.slow
+def test_what_is_hidden_is_named_in_the_first_place(made: Callable[[str], Case]) -> None:
+    assert made("hysteresis").answer.causes == ["hysteresis"]
+    assert made("auxiliary").answer.causes == ["auxiliary"]
+    assert made("").answer.verdict == "consistent"
+
+
+def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[str], Case]) -> None:
+    case = made("hysteresis")
+    other = changed(case.records, lambda r: replace(r, rate_dph=1000.0 * r.rate_dph))
+    found = answer(other, scaled(case.declared, 1000.0))
+    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
+    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
+    assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-3)
+    assert now["amplitude_dph_per_c"].value == pytest.approx(
+        1000.0 * was["amplitude_dph_per_c"].value, rel=1e-3
+    )
+
+
+@pytest.mark.slow
+def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) -> None:
+    case = made("hysteresis")
+    found = answer(changed(case.records, lambda r: replace(r, rate_dph=-r.rate_dph)), case.declared)
+    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
+    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
+    assert now["amplitude_dph_per_c"].value == pytest.approx(-was["amplitude_dph_per_c"].value, rel=1e-6)
+
+
+def test_the_order_of_the_runs_does_not_matter(made: Callable[[str], Case]) -> None:
+    case = made("hysteresis")
+    order = np.random.default_rng(3).permutation(len(case.records.runs))
+    runs = [case.records.runs[k] for k in order]
+    turned = [replace(r, history=replace(r.history, run=k)) for k, r in enumerate(runs)]
+    found = answer(Records(tuple(turned), case.records.block_s), case.declared)
+    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
+    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
+    assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-3)
+
+
+def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
+    made: Callable[[str], Case],
+) -> None:
+    search = made("hysteresis").answer.analysis.search
+    weights = np.random.default_rng(4).normal(size=search.bank.map.shape[1]) * 0.01
+    moved = open_search(
+        search.records,
+        search.bank,
+        search.y + search.bank.map @ weights,
+        channels=search.channels,
+        beside=search.beside,
+        sigma=search.sigma,
+        declared=search.declared,
+    )
+    inside = search.joined.layout.signatures
+    for was, now in zip(search.views.values(), moved.views.values(), strict=True):
+        a, b = (project(s, v, "map and beside").a[inside] * v.scale for s, v in ((search, was), (moved, now)))
+        assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
+
+
+@pytest.mark.slow
+def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Case]) -> None:
+    case = made("auxiliary")
+
+    def shifted(run: Record) -> Record:
+        half = len(run.rate_dph) // 2
+        return replace(run, channels={k: np.roll(v, half) for k, v in run.channels.items()})
+
+    assert "auxiliary" not in answer(changed(case.records, shifted), case.declared).causes
+
+
+@pytest.mark.slow
+def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str], Case]) -> None:
+    """Nothing in the recordings can say which of the two acts."""
+    case = made("auxiliary")
+    (name,) = case.records.runs[0].channels
+    twice = changed(case.records, lambda r: replace(r, channels={**r.channels, "copy_v": r.channels[name]}))
+    found = answer(twice, case.declared)
+    (cause,), ((rival,),) = found.analysis.attribution.causes, found.analysis.attribution.rivals
+    assert found.verdict == "ambiguous"
+    assert (cause.candidate.id, rival.id) == ("auxiliary", "auxiliary")
+    assert {cause.candidate.channel, rival.channel} == {name, "copy_v"}
+    assert rival.distance == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
+    made: Callable[[str], Case], drawing: Drawing, tmp_path: Path
+) -> None:
+    """The same gyro and noise, with the cause in training and without it in the exam."""
+    assert made("hysteresis").answer.causes == ["hysteresis"]
+    hidden, plain = drawing.hidden("hysteresis"), drawing.hidden("hysteresis", 1e-9)
+    roles = drawing.campaign.roles
+    rows = [a if role == "train" else b for a, b, role in zip(hidden.rows, plain.rows, roles, strict=True)]
+    blind.write(drawing.campaign, replace(hidden, rows=rows), tmp_path / "r", declare=True, serial="U-0001")
+    result = diagnose(load(tmp_path / "r")).result.content()
+    assert [c["id"] for c in result["causes"]] == ["hysteresis"]
+    assert result["causes"][0]["gain"]["low"] < 0.0
+    # The training runs alone say what is shipped; the exam only grades, and says here that it harms.
+    assert result["extended"] is None or result["extended"]["gain"]["rms_removed_dph"]["low"] < 0.0
+
+
+@pytest.mark.slow
+def test_noise_declared_twice_too_high_or_low_is_told(made: Callable[[str], Case]) -> None:
+    case = made("")
+    for factor in (0.5, 2.0):
+        found = answer(case.records, scaled(case.declared, factor))
+        assert found.verdict == "noise_differs"
+        assert found.analysis.noise[0].id == "noise_level"
+        assert found.analysis.noise[0].parameters["ratio"] == pytest.approx(1.0 / factor, rel=0.05)
+
+
+@pytest.mark.slow
+def test_truth_beside_the_recordings_is_not_looked_at(made: Callable[[str], Case]) -> None:
+    folder = made("hysteresis").folder
+    before = diagnose(load(folder)).result
+    (folder / "truth.json").write_text('{"causes": [{"id": "warm_up"}]}', encoding="utf-8")
+    assert diagnose(load(folder)).result == before
+    (folder / "truth.json").unlink()
+
+
+def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
+    """Rounding leaves the matrix of their products with a negative eigenvalue; it was an error."""
+    vectors = np.linalg.qr(np.random.default_rng(5).normal(size=(6, 6)))[0]
+    gram = (vectors * [3.0, 2.0, 1.0, 0.5, 0.0, -1e-9]) @ vectors.T
+    root = _root(gram)
+    assert np.abs(root @ root.T - gram).max() < 1e-8
+    assert np.isfinite(root).all()

@@ -1,0 +1,270 @@
+"""The main job as the user types it: recordings in, verified C and a report out."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import HOST, Command
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.model import load_model
+from gyrotc.pages.report import write_report
+from gyrotc.recordings.load import load
+from gyrotc.simulate.campaign import simulate
+from gyrotc.tables.emit import emit
+from gyrotc.train.fitting import FitOptions, fit_dataset
+
+REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[4] / "shared/data/real"))
+
+
+def _json(path: Path) -> dict:
+    return json.loads(path.read_text())
+
+
+def test_demo_reaches_the_noise_floor_and_verifies(demo: Path) -> None:
+    result = demo / "result"
+    evaluation, verification = _json(result / "evaluate.json"), _json(result / "verify.json")
+    assert evaluation["mismatches"] == 0
+    assert verification["failed"] == 0 and verification["passed"] >= 3
+    assert all(t["vectors"] >= 20000 for t in verification["targets"] if t["status"] == "pass")
+    floor, exam = evaluation["noise_floor_dph"], evaluation["exam"]
+    assert evaluation["noise_floor_source"] == "simulated"
+    assert exam["after"]["rms_dph"] <= 1.03 * floor
+    assert exam["improvement"] >= 0.97 * exam["before"]["rms_dph"] / floor
+    assert evaluation["model"]["table_bytes"] <= 312
+    assert [r["samples"] for r in evaluation["runs"]] == [288] * 12
+
+
+def test_build_leaves_every_promised_file(demo: Path) -> None:
+    result = demo / "result"
+    names = {p.name for p in result.iterdir()}
+    assert names == {
+        "model.json", "training.json", "c", "verify.json", "evaluate.json", "trace", "report.html",
+        "manifest.json", "budget.json", ".gyrotc-result.json",
+    }  # fmt: skip
+    assert len(list((result / "trace").glob("run-*.csv"))) == 12
+    assert not [p for p in demo.iterdir() if p.name.startswith(".out") or "gyrotc-part" in p.name]
+
+
+def test_trace_has_the_promised_columns_and_a_row_for_every_input_row(demo: Path) -> None:
+    text = (demo / "result" / "trace" / "run-07.csv").read_text().splitlines()
+    assert text[0] == "time_s,temperature_c,rate_dph,bias_dph,compensated_dph,status"
+    trace = np.genfromtxt(text, delimiter=",", names=True)
+    rows = np.genfromtxt(demo / "data" / "run-07.csv", delimiter=",", names=True)
+    np.testing.assert_array_equal(trace["time_s"], rows["time_s"])
+    np.testing.assert_allclose(trace["compensated_dph"], trace["rate_dph"] - trace["bias_dph"], atol=1e-12)
+    assert trace["status"][0] == 8 and trace["bias_dph"][0] == 0.0  # one reading alone is not believed
+    assert trace["status"][1] == 1 and trace["status"][-1] in (0, 4)
+
+
+def test_figures_follow_from_the_trace(demo: Path) -> None:
+    """The exam RMS of a run, computed here from its trace alone."""
+    evaluation = _json(demo / "result" / "evaluate.json")
+    trace = np.genfromtxt(demo / "result" / "trace" / "run-09.csv", delimiter=",", names=True)
+    believed = np.where(trace["status"] == 8, np.nan, trace["compensated_dph"])  # nothing is corrected before
+    means = np.nanmean(believed.reshape(-1, 10), axis=1)
+    entry = next(r for r in evaluation["runs"] if r["file"] == "run-09.csv")
+    assert entry["after"]["rms_dph"] == pytest.approx(float(np.sqrt(np.mean(means**2))), rel=1e-9)
+    assert entry["after"]["std_dph"] == pytest.approx(float(np.std(means)), rel=1e-9)
+
+
+def test_the_simulated_floor_is_the_noise_that_was_added(demo: Path) -> None:
+    evaluation = _json(demo / "result" / "evaluate.json")
+    declared = 7e-4
+    assert evaluation["noise_floor_dph"] == pytest.approx(declared, rel=0.06)
+
+
+def test_fit_twice_gives_the_same_model_and_build_the_same_c(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    for out in ("a", "b"):
+        done = gyrotc("fit", demo / "data", "--out", tmp_path / out)
+        assert done.returncode == 0
+        assert "predicted RMS over it: 1.00" in done.stdout
+    first = (tmp_path / "a" / "model.json").read_bytes()
+    assert first == (tmp_path / "b" / "model.json").read_bytes()
+    assert first == (demo / "result" / "model.json").read_bytes()
+
+
+def test_report_is_one_self_contained_page(demo: Path) -> None:
+    page = (demo / "result" / "report.html").read_text()
+    assert page.count("<svg") >= 3
+    assert "SIM-0001" in page and "host-gcc-O2" in page
+    outside = re.findall(r'(?:src|href)="(?!#)([^"]+)"', page)
+    assert not [link for link in outside if not link.startswith("data:")], outside
+
+
+def test_targets_that_are_not_installed_are_one_line_under_the_proof(demo: Path, tmp_path: Path) -> None:
+    """Neither rows of the table nor counted as a pass."""
+    folder = Path(shutil.copytree(demo / "result", tmp_path / "result"))
+    record = json.loads((folder / "verify.json").read_text())
+    absent = [
+        {"name": name, "numeric": numeric, "status": "missing", "package": "no-compiler no-emulator"}
+        for name in ("pdp-11", "vax")
+        for numeric in ("f32", "q31")
+    ]
+    record["targets"] += absent
+    (folder / "verify.json").write_text(json.dumps(record))
+    page = write_report(folder).read_text("utf-8")
+    line = next(line for line in page.splitlines() if "pdp-11" in line)
+    assert "pdp-11, vax" in line and "apt-get install no-compiler no-emulator" in line
+    assert page.count("pdp-11") == 1 and "pdp-11" not in (demo / "result" / "report.html").read_text("utf-8")
+
+
+def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:
+    before = (demo / "result" / "report.html").read_bytes()
+    assert gyrotc("report", demo / "result").returncode == 0
+    assert (demo / "result" / "report.html").read_bytes() == before
+
+
+@pytest.mark.slow
+def test_ten_gyros_reach_the_floor(tmp_path: Path) -> None:
+    """Pooled exam RMS ÷ floor: median ≤ 1.006, worst ≤ 1.015; tables ≤ 144 bytes. One of them through compiled C."""
+    ratios = []
+    for seed in range(1, 11):
+        data, out = tmp_path / f"d{seed}", tmp_path / f"r{seed}"
+        simulate("paper", seed=seed, out=data)
+        recordings = load(data)
+        model = fit_dataset(recordings, FitOptions()).model
+        model.save(out / "model.json")
+        emit(model, out, numerics=["f32"])
+        evaluation = evaluate(out, recordings, compiled=seed == 1).content()
+        assert evaluation["mismatches"] == (0 if seed == 1 else None)
+        assert evaluation["model"]["table_bytes"] <= 144
+        ratio = evaluation["exam"]["after"]["rms_dph"] / evaluation["noise_floor_dph"]
+        needed = 0.97 * evaluation["exam"]["before"]["rms_dph"] / evaluation["noise_floor_dph"]
+        assert evaluation["exam"]["improvement"] >= needed
+        ratios.append(ratio)
+    print("exam RMS / floor:", [round(r, 4) for r in ratios])
+    assert np.median(ratios) <= 1.006
+    assert max(ratios) <= 1.015
+
+
+@pytest.mark.skipif(not (REAL / "mpu6000-chamber-cycle").is_dir(), reason="no real recordings here")
+@pytest.mark.slow
+def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyrotc: Command) -> None:
+    done = gyrotc("build", REAL / "mpu6000-chamber-cycle", "--axis", "x", *HOST, "--out", tmp_path / "r")
+    assert done.returncode == 0, done.stderr
+    evaluation = _json(tmp_path / "r" / "evaluate.json")
+    assert evaluation["exam"] is None
+    assert evaluation["model"]["method"] == "constant" and evaluation["generalises"] is False
+    assert "does_not_generalise" in [f["id"] for f in evaluation["findings"]]
+    assert "record the same cycle at least twice more" in done.stdout
+    assert "Beside simpler corrections" in (tmp_path / "r" / "report.html").read_text("utf-8")
+
+
+def test_an_existing_folder_of_somebody_else_is_not_replaced(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter1.tex").write_text("years of work")
+    done = gyrotc("build", demo / "data", "--out", tmp_path / "thesis")
+    assert done.returncode == 2
+    assert "was not written by gyrotc" in done.stderr
+    assert [p.name for p in (tmp_path / "thesis").iterdir()] == ["chapter1.tex"]
+
+
+def test_usage_errors_exit_2_and_help_shows_an_example(gyrotc: Command, tmp_path: Path) -> None:
+    assert gyrotc("build").returncode == 2
+    assert gyrotc("build", tmp_path / "nothing", "--out", tmp_path / "o").returncode == 2
+    assert not (tmp_path / "o").exists()
+    for command in (
+        "simulate",
+        "check",
+        "fit",
+        "emit",
+        "verify",
+        "evaluate",
+        "build",
+        "compare",
+        "diagnose",
+        "report",
+    ):
+        done = gyrotc(command, "--help")
+        assert done.returncode == 0
+        assert "Example: gyrotc" in done.stdout
+
+
+def _three_axes(source: Path, folder: Path) -> None:
+    """Two training runs of the demo as three-axis recordings whose axes differ by a constant."""
+    folder.mkdir()
+    for name in ("run-04.csv", "run-05.csv", "run-06.csv"):
+        rows = np.genfromtxt(source / name, delimiter=",", names=True)
+        columns = [rows["time_s"], rows["temperature_c"], *(rows["rate_dph"] + k for k in (0.0, 1.0, 2.0))]
+        header = "time_s,temperature_c,rate_x_dph,rate_y_dph,rate_z_dph"
+        np.savetxt(
+            folder / name, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments=""
+        )
+
+
+@pytest.mark.slow
+def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
+    _three_axes(demo / "data", tmp_path / "triad")
+    done = gyrotc("build", tmp_path / "triad", "--axis", "all", *HOST, "--out", tmp_path / "r")
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (tmp_path / "r").iterdir()} == {
+        "x", "y", "z", "c", "report.html", ".gyrotc-result.json",
+    }  # fmt: skip
+    c = tmp_path / "r" / "c"
+    assert {f"gtc_triad_{axis}.c" for axis in "xyz"} <= {p.name for p in c.iterdir()}
+    w0 = [load_model(tmp_path / "r" / axis / "model.json").map_dph(10.0, 0.0) for axis in "xyz"]
+    np.testing.assert_allclose(np.diff(w0), 1.0, atol=1e-5)
+    program = tmp_path / "main"
+    sources = [c / "main.c", c / "gtc.c", *(c / f"gtc_triad_{axis}.c" for axis in "xyz")]
+    subprocess.run(["gcc", "-std=c99", "-ffp-contract=off", "-o", program, *sources], check=True)
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    assert printed.count("deg/h") == 3
+
+
+def test_without_an_axis_a_three_axis_recording_is_refused_naming_the_choices(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    _three_axes(demo / "data", tmp_path / "triad")
+    done = gyrotc("build", tmp_path / "triad", "--out", tmp_path / "r")
+    assert done.returncode == 2
+    assert all(axis in done.stderr for axis in ("x", "y", "z")) and not (tmp_path / "r").exists()
+
+
+def test_a_correction_applied_while_recording_is_added_back_or_refused(
+    demo: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    """Recordings from which the demo's own correction was subtracted give the demo's figures again."""
+    corrected = tmp_path / "corrected"
+    corrected.mkdir()
+    model = load_model(demo / "result" / "model.json")
+    text = (demo / "data" / "dataset.toml").read_text()
+    text = text.replace("schema = 1\n", f'schema = 1\napplied_table = "{model.hash}"\n')
+    (corrected / "dataset.toml").write_text(text)
+    for path in (demo / "result" / "trace").glob("*.csv"):
+        trace = np.genfromtxt(path, delimiter=",", names=True)
+        rows = np.stack([trace["time_s"], trace["temperature_c"], trace["compensated_dph"]], axis=1)
+        header = "time_s,temperature_c,rate_dph"
+        np.savetxt(corrected / path.name, rows, fmt="%.12g", delimiter=",", header=header, comments="")
+    refused = gyrotc("fit", corrected, "--out", tmp_path / "no")
+    assert refused.returncode == 2 and "applied" in refused.stderr and not (tmp_path / "no").exists()
+    applied = demo / "result" / "model.json"
+    done = gyrotc("fit", corrected, "--applied", applied, "--out", tmp_path / "again")
+    assert done.returncode == 0, done.stderr
+    again = load_model(tmp_path / "again" / "model.json")
+    t = np.linspace(-30, 60, 40)
+    np.testing.assert_allclose(again.map_dph(t, 0.0), model.map_dph(t, 0.0), atol=2e-6)
+
+
+def test_traces_of_files_with_one_stem_do_not_meet() -> None:
+    from types import SimpleNamespace
+
+    from gyrotc.assess.evaluate import trace_name
+
+    runs = [
+        SimpleNamespace(file=f, from_s=s)
+        for f, s in (("a.csv", None), ("b/a.csv", None), ("c.csv", 5.0), ("c.csv", 9.0))
+    ]
+    names = [trace_name(run, runs) for run in runs]
+    assert names[2:] == ["c@5.csv", "c@9.csv"]
+    assert len(set(names)) == 4

@@ -1,0 +1,158 @@
+"""The paper repeated: its page is made from its record, and the record is what the experiment gives."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.common.errors import InputError
+from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
+from gyrotc.paper.__main__ import page_of, record_of, stale
+from gyrotc.paper.experiment import METHODS
+from gyrotc.paper.figures import FIGURES, draw
+from gyrotc.paper.page import departures, filled, made_with, measured
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+PAGE = DOCS / "paper.md"
+RECORD = record_of(DOCS)
+
+
+@pytest.fixture(scope="module")
+def now() -> dict[str, Any]:
+    """The first gyro, with both levels of noise."""
+    return measured([1])
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All figures of the record."""
+    folder = tmp_path_factory.mktemp("drawn") / "paper"
+    draw(RECORD["series"], folder)
+    return folder
+
+
+def test_the_published_figures_are_those_of_table_1() -> None:
+    """The improvements that the paper prints follow from its before and after."""
+    printed = {
+        "mlr": (5.17, 4.87, 5.15, 4.77, 4.80, 4.82),
+        "rbf_random": (8.08, 7.60, 8.05, 7.63, 7.62, 7.61),
+        "mrbf_paper": (10.43, 9.82, 10.39, 9.818, 9.832, 9.847),
+    }
+    for method, improvements in printed.items():
+        for name, improvement in zip(ENVIRONMENTS, improvements, strict=True):
+            assert BEFORE_DPH[name] / AFTER_DPH[method][name] == pytest.approx(improvement, abs=0.01)
+
+
+def test_the_record_is_what_the_experiment_gives(now: dict[str, Any]) -> None:
+    assert list(departures(RECORD, now)) == []
+
+
+def test_page_and_figures_are_made_from_the_record() -> None:
+    assert list(stale(DOCS)) == []
+
+
+def test_a_figure_that_moves_is_told_with_its_place(now: dict[str, Any]) -> None:
+    """By ten times what is allowed, here and where libraries or compiler are others."""
+    for made, share in ((made_with(), 1e-5), ({**made_with(), "compiler": "another"}, 0.01)):
+        other = copy.deepcopy(RECORD) | {"made_with": made}
+        other["gyros"]["paper"]["1"]["after"]["mlr"]["5 C/min"]["rms_dph"] *= 1.0 + share
+        (line,) = departures(other, now)
+        assert line.startswith("paper noise, gyro 1, after, mlr, 5 C/min, rms_dph: ")
+    other = copy.deepcopy(RECORD)
+    other["series"]["mrbf_paper"]["20 C"][7] += 1e-5
+    assert any(line.startswith("series, mrbf_paper, 20 C: 1e-05 deg/h") for line in departures(other, now))
+    del other["gyros"]["class"]
+    assert sum("None recorded" in line for line in departures(other, now)) > 100
+
+
+def test_a_page_or_a_figure_of_another_record_is_told(drawn: Path, tmp_path: Path) -> None:
+    docs = tmp_path / "docs"
+    (docs / "results").mkdir(parents=True)
+    for name in ("paper.md", "results/paper.json", "results/bench.json"):
+        shutil.copy(DOCS / name, docs / name)
+    assert all("figure" in line for line in stale(docs))
+    shutil.copytree(drawn, docs / "paper")
+    assert list(stale(docs)) == []
+    text = PAGE.read_text("utf-8")
+    row = next(line for line in text.splitlines() if line.startswith("| after, modified RBFNN |"))
+    (docs / "paper.md").write_text(text.replace(row, row.replace("| 0.", "| 1.")), "utf-8")
+    (line,) = stale(docs)
+    assert "after, modified RBFNN" in line
+    shutil.copy(PAGE, docs / "paper.md")
+    record = copy.deepcopy(RECORD)
+    record["series"]["measured"]["20 C"][0] += 1e-6
+    (docs / "results" / "paper.json").write_text(json.dumps(record), "utf-8")
+    assert len(list(stale(docs))) == len(FIGURES)
+
+
+def test_the_table_prints_what_the_record_has() -> None:
+    """Row by row, without the code that makes the page: RMS after of every method of the first gyro."""
+    text = PAGE.read_text("utf-8")
+    for mark, noise in (("table-1", "paper"), ("table-1-class", "class")):
+        part = text.split(f"<!-- {mark} -->")[1].split(f"<!-- /{mark} -->")[0]
+        cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in part.strip().splitlines()]
+        rows = {row[0]: row[1:] for row in cells}
+        of = RECORD["gyros"][noise]["1"]
+        for method, label in METHODS.items():
+            after = [1e3 * of["after"][method][name]["rms_dph"] for name in ENVIRONMENTS]
+            assert rows[f"after, {label}"] == [f"{value:.3f}" for value in after]
+        sigma = [1e3 * of["before"][name]["std_dph"] for name in ENVIRONMENTS]
+        assert rows["before: σ about the mean"] == [f"{value:.3f}" for value in sigma]
+        gain = [of["before"][n]["rms_dph"] / of["after"]["mrbf_paper"][n]["rms_dph"] for n in ENVIRONMENTS]
+        assert rows["improvement, modified RBFNN"] == [f"{value:.1f}" for value in gain]
+
+
+def test_every_mean_of_eight_hours_is_there() -> None:
+    assert {len(values) for of in RECORD["series"].values() for values in of.values()} == {288}
+
+
+def test_series_and_figures_of_the_record_are_of_one_experiment() -> None:
+    figures = RECORD["gyros"]["paper"]["1"]
+    for name, before in RECORD["series"]["measured"].items():
+        assert np.std(before) == pytest.approx(figures["before"][name]["std_dph"], rel=1e-3)
+        for method in ("mlr", "rbf_random", "mrbf_paper"):
+            after = np.subtract(before, RECORD["series"][method][name])
+            rms = np.sqrt(np.mean(after**2))
+            assert rms == pytest.approx(figures["after"][method][name]["rms_dph"], rel=1e-3)
+
+
+def test_a_constant_alone_improves_nearly_tenfold_at_constant_temperature() -> None:
+    figures = RECORD["gyros"]["paper"]["1"]
+    for name in ENVIRONMENTS[:3]:
+        before, after = figures["before"][name]["rms_dph"], figures["after"]["constant"][name]["rms_dph"]
+        assert before / after > 9.0
+
+
+def test_one_model_over_all_comes_closest_to_the_noise() -> None:
+    for figures in RECORD["gyros"]["paper"].values():
+        total = {
+            method: sum(cell["rms_dph"] ** 2 for cell in of.values())
+            for method, of in figures["after"].items()
+        }
+        assert min(total, key=lambda method: total[method]) == "mrbf"
+        assert np.sqrt(total["mrbf"] / 6.0) < 1.02 * figures["floor_dph"]
+
+
+def test_a_page_without_marks_is_refused() -> None:
+    with pytest.raises(InputError, match="no marks"):
+        filled("nothing", {"table-1": ""})
+
+
+def test_every_table_has_cells_in_every_row() -> None:
+    for part in re.findall(r"<!-- ([\w-]+) -->\n(.*?)\n<!-- /\1 -->", page_of(DOCS, RECORD), re.DOTALL):
+        if part[1].startswith("|"):
+            assert len({line.count("|") for line in part[1].splitlines()}) == 1, part[0]
+
+
+def test_every_figure_is_drawn_and_shown(drawn: Path, tmp_path: Path) -> None:
+    names = sorted(path.name for path in drawn.iterdir())
+    assert names == [f"figure-{number:02d}.svg" for number in FIGURES]
+    (again,) = draw(RECORD["series"], tmp_path, [11])
+    assert again.read_bytes() == (drawn / again.name).read_bytes()
+    assert re.findall(r"\(paper/(figure-\d+\.svg)\)", PAGE.read_text("utf-8")) == names

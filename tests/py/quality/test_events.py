@@ -1,0 +1,298 @@
+"""Events of recordings: steps with time and size, what they leave out, and no step in what has none."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.quality import steps as lasting_steps
+from gyrotc.quality.drifts import drifts_of
+from gyrotc.quality.events import Event, accepted, events_of
+from gyrotc.quality.sign_and_gain import another_gain_throughout, gain_changes, turned_runs
+from gyrotc.quality.steps import steps_of
+from gyrotc.recordings.load import load
+from recordings import toml, write_csv
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
+from tests.blind.other.record import draw_recording, write
+
+SEED, ROW_S, HOURS = 20261122, 10.0, 8
+NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means
+Columns = dict[str, np.ndarray]
+
+
+def recording(rng: np.random.Generator, kind: int) -> Columns:
+    """Eight hours at a constant temperature, or with ramps, of a bias that follows temperature and its rate."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    corners = ([0, 8], [20, 20]) if kind % 3 == 0 else ([0, 1, 2, 4, 6, 8], [0, 0, 60, 60, -30, -30])
+    temperature = np.interp(time / 3600.0, *corners) + 0.01 * np.sin(time / 300.0)
+    rate = 2e-4 * temperature + 1e-6 * temperature**2 + 0.06 * np.gradient(temperature, time)
+    walk = np.cumsum(rng.standard_normal(time.size)) * NOISE_DPH * (0.002 if kind % 2 else 0.0)
+    noise = NOISE_DPH * rng.standard_normal(time.size)
+    return {"time_s": time, "temperature_c": temperature, "rate_dph": 0.01 + rate + walk + noise}
+
+
+def written(
+    folder: Path, change: Columns | None = None, run: int = 1, kept: np.ndarray | None = None
+) -> Path:
+    """Three runs; one, the second, has the rates of `change` added, and of its rows those that are `kept`."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    for k in range(3):
+        columns = recording(rng, k)
+        if k == run and change is not None:
+            columns["rate_dph"] = columns["rate_dph"] + change["rate_dph"]
+        if k == run and kept is not None:
+            columns = {name: values[kept] for name, values in columns.items()}
+        write_csv(folder / f"{k}.csv", columns)
+    (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(3))), "utf-8")
+    return folder
+
+
+def only(folder: Path) -> Event:
+    (event,) = events_of(load(folder))
+    return event
+
+
+@pytest.mark.slow
+def test_recordings_without_steps_have_none() -> None:
+    """Forty sets of six runs, half of them with a random walk, at a false-alarm rate of one in a hundred."""
+    rng = np.random.default_rng(SEED)
+    alarms = 0
+    for _ in range(40):
+        runs = [recording(rng, k) for k in range(6)]
+        alarms += bool(steps_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
+    print(f"{alarms} of 40 sets with a step")
+    assert alarms <= 3, alarms
+
+
+@pytest.mark.parametrize("row_s", [1.0, 60.0])
+def test_one_record_in_as_many_as_is_said_has_a_step_by_chance(
+    monkeypatch: pytest.MonkeyPatch, row_s: float
+) -> None:
+    """At an alarm rate of a fifth, where short records of white noise show it: too few looks had made it a quarter.
+
+    Of rows of a minute the shortest windows had eight cells for eight columns: 35 of 100 records with ramps had a step.
+    """
+    monkeypatch.setattr(lasting_steps, "FALSE_ALARMS", 0.2)
+    rng = np.random.default_rng(SEED + 2)
+    time = row_s * np.arange(7200.0 if row_s < 10.0 else 600.0)
+    programme = np.interp(time % 7200.0, [0, 1800, 3600, 5400, 7200], [0, 60, 60, 0, 0])
+    temperature = programme if row_s > 10.0 else np.full(time.size, 20.0)
+    records = [(time, temperature, rng.standard_normal(time.size)) for _ in range(200)]
+    alarms = sum(bool(steps_of([record])) for record in records)
+    print(f"{alarms} of 200 records with a step")
+    assert alarms <= 44, alarms
+
+
+def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None:
+    """Six passages over 2 C in half a minute. A step in the same place of one passage alone is told."""
+    rng = np.random.default_rng(SEED + 3)
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    temperature = np.interp(time / 3600.0, [0, 1, 1.25, 3, 3.25, 6, 6.25, 8], [0, 0, 60, 60, 0, 0, 60, 60])
+    feature = np.tanh((temperature - 30.0) / 1.0)
+    at = float(time[np.searchsorted(temperature[time < 7200.0], 30.0)])
+    for size, lasting, expected in ((0.01, 0.0, 0), (0.0, 0.02, 1)):
+        rates = [size * feature + NOISE_DPH * rng.standard_normal(time.size) for _ in range(2)]
+        rates[1] = rates[1] + lasting * (time >= at)
+        found = steps_of([(time, temperature, rate) for rate in rates])
+        assert len(found) == expected, (size, found)
+        assert all(step.run == 1 and step.time_s[1] <= at <= step.time_s[2] for step in found)
+
+
+@pytest.mark.slow
+def test_limits_of_time_and_size_hold_in_as_many_cases_as_they_say() -> None:
+    """Sixty steps of 9 to 20 noise floors, on ramps and holds. A step within a cell had been told too small."""
+    rng = np.random.default_rng(SEED + 4)
+    found, times, sizes = 0, 0, 0
+    for _ in range(60):
+        run = recording(rng, 1)
+        at, size = 3600.0 * rng.uniform(1.2, 6.8), 7e-4 * rng.uniform(9.0, 20.0)
+        rate = run["rate_dph"] + size * (run["time_s"] >= at)
+        steps = steps_of([(run["time_s"], run["temperature_c"], rate)])
+        for step in [s for s in steps if abs(s.time_s[0] - at) < 600.0][:1]:
+            found += 1
+            times += step.time_s[1] <= at <= step.time_s[2]
+            sizes += step.size_dph[1] <= size <= step.size_dph[2]
+    print(f"{found} of 60 steps, times hold {times}, sizes {sizes}")
+    assert found >= 54 and min(times, sizes) >= 0.87 * found
+
+
+@pytest.mark.parametrize(
+    ("seed", "number", "name"),
+    [
+        (1865575792, 13, "hysteresis"),
+        (1809580124, 1008, "hysteresis"),
+        (1809580124, 42, "map_too_coarse"),
+    ],
+)
+@pytest.mark.slow
+def test_what_a_unit_always_does_is_no_event(tmp_path: Path, seed: int, number: int, name: str) -> None:
+    """Relays of which a branch looked like a gain that changed, in a run and of a run; a kink passed in a minute."""
+    write(draw_recording(seed, number, "one", name), tmp_path, "A")
+    dataset = load(tmp_path)
+    assert [e.id for e in (*turned_runs(dataset), *gain_changes(dataset), *events_of(dataset))] == []
+
+
+def test_recordings_without_drifts_have_none_though_temperatures_are_followed_late() -> None:
+    """Forty sets of six runs with random walks, warm-up and a slow memory: kinks, but no beginning."""
+    rng = np.random.default_rng(SEED + 1)
+    alarms = 0
+    for _ in range(40):
+        runs = [recording(rng, k) for k in range(6)]
+        for r in runs:
+            tau = rng.uniform(300.0, 3000.0)
+            weights = np.exp(-np.arange(0.0, 5.0 * tau, ROW_S) / tau)
+            past = np.r_[np.full(weights.size, r["temperature_c"][0]), r["temperature_c"]]
+            late = np.convolve(past, weights / weights.sum())[weights.size : past.size]
+            r["rate_dph"] = (
+                r["rate_dph"] + 5e-4 * (late - r["temperature_c"]) + 0.01 * np.exp(-r["time_s"] / tau)
+            )
+        alarms += bool(drifts_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs]))
+    print(f"{alarms} of 40 sets with a drift")
+    assert alarms <= 2, alarms
+
+
+def test_a_drift_that_begins_has_its_run_time_and_slope(tmp_path: Path) -> None:
+    """At a constant temperature, after five of eight hours; it is left out to the end."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    slope, at = 0.02, 5.0 * 3600.0
+    folder = written(tmp_path, {"rate_dph": slope * np.maximum(time - at, 0.0) / 3600.0}, run=0)
+    event = only(folder)
+    assert (event.id, event.file, event.unit) == ("ramp", "0.csv", "deg/h/h")
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 1800.0
+    assert event.size[1] <= slope <= event.size[2] and event.size[0] == pytest.approx(slope, rel=0.1)
+    assert event.leave_out is not None and event.leave_out[1] > time[-1]
+    assert events_of(accepted(load(folder), [event])) == []
+
+
+def test_a_run_that_goes_on_at_another_level_after_a_gap_was_restarted(tmp_path: Path) -> None:
+    """Seven minutes without rows. The same gap without another level is a dropout."""
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    kept = (time < 10_000.0) | (time > 10_400.0)
+    for size, id in ((0.012, "restart"), (0.0, "dropout")):
+        folder = written(tmp_path / id, {"rate_dph": size * (time > 10_200.0)}, run=0, kept=kept)
+        event = only(folder)
+        assert (event.id, event.file) == (id, "0.csv")
+        if id == "restart":
+            assert event.time_s[1:] == (9990.0, 10_410.0) and event.size[1] <= size <= event.size[2]
+            assert event.leave_out is not None and event.leave_out[1] <= 10_410.0, "the shorter side"
+            assert "power_on_s" in event.text
+
+
+def test_a_step_that_stays_has_its_run_time_and_size(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    size, at = 0.01, 5.0 * 3600.0
+    event = only(written(tmp_path, {"rate_dph": size * (time >= at)}))
+    assert (event.id, event.file) == ("step", "1.csv")
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 600.0
+    assert event.size[1] <= size <= event.size[2] and event.size[0] == pytest.approx(size, rel=0.3)
+    assert event.leave_out is not None and event.leave_out[1] > time[-1], "the shorter side"
+    assert (event.result().exclude or "").startswith("exclude = [{from_s = ")
+
+
+def test_a_step_that_comes_back_is_one_event_and_what_is_accepted_is_left_out(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
+    begin, end = 4.0 * 3600.0, 5.5 * 3600.0
+    folder = written(tmp_path, {"rate_dph": -0.012 * ((time >= begin) & (time < end))})
+    event = only(folder)
+    assert event.id == "step_and_recover" and event.leave_out is not None
+    assert event.leave_out[0] <= begin and event.leave_out[1] >= end
+    rest = accepted(load(folder), [event])
+    inside = rest.runs[1].in_span(time)
+    assert not inside[(time >= begin) & (time < end)].any() and inside.sum() > 0.75 * time.size
+    assert rest.runs[0].in_span(time).all() and rest.runs[2].in_span(time).all()
+    assert events_of(rest) == []
+
+
+def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
+    """An hour of rows of a second: bursts are told where a block has several rows."""
+    rng = np.random.default_rng(SEED)
+    time = np.arange(3600.0)
+    temperature = 20.0 + time / 600.0 + 0.01 * rng.standard_normal(time.size)
+    rate = 7e-3 * rng.standard_normal(time.size)
+    rate[900:915] += 3.0 * np.sin(time[900:915])
+    temperature[1500:1800] = temperature[1500]
+    kept = (time < 2400.0) | (time > 2700.0)
+    columns = {"time_s": time, "temperature_c": temperature, "rate_dph": rate}
+    write_csv(tmp_path / "a.csv", {name: values[kept] for name, values in columns.items()})
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    found = {e.id: e for e in events_of(load(tmp_path))}
+    assert {"burst", "dropout", "thermometer_lost"} <= set(found) and "step" not in found
+    assert found["burst"].time_s[0] == pytest.approx(900.0, abs=5.0) and found["burst"].leave_out is not None
+    assert found["dropout"].size[0] == pytest.approx(301.0, abs=2.0)
+    assert found["thermometer_lost"].leave_out == pytest.approx((1500.0, 1800.0), abs=2.0)
+
+
+def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path:
+    """Four runs with ramps, an hour later in the programme each; the third is changed."""
+    folder.mkdir(exist_ok=True)
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    for k in range(4):
+        columns = recording(rng, 1)
+        if k == 2 and change is not None:
+            change(columns)
+        write_csv(folder / f"{k}.csv", columns)
+    head = 'schema = 1\nserial = "A"\nearth_rate = "removed"'
+    (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(4)), head=head), "utf-8")
+    return folder
+
+
+def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = 1.3 * columns["rate_dph"]
+
+    dataset = load(ramps(tmp_path, louder))
+    (event,) = turned_runs(dataset)
+    assert (event.id, event.file, event.unit) == ("gain_changed", "2.csv", "times")
+    assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
+    assert event.result().exclude is None, "the whole run goes, by its entry"
+    assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.15, 1.3])
+def test_no_memory_stands_for_another_gain(tmp_path: Path, factor: float) -> None:
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = factor * columns["rate_dph"]
+
+    assert another_gain_throughout(load(ramps(tmp_path, louder)).runs, 2)
+
+
+def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path) -> None:
+    """In the midst of four hours of ramps; without a change, or with a level that changes, no gain does."""
+    at = 3.2 * 3600.0
+
+    def louder(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] * np.where(columns["time_s"] >= at, 1.4, 1.0)
+
+    def higher(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] + 0.02 * (columns["time_s"] >= at)
+
+    (event,) = gain_changes(load(ramps(tmp_path / "gain", louder)))
+    assert (event.id, event.file, event.whole_run) == ("gain_changed", "2.csv", False)
+    assert event.time_s[1] <= at <= event.time_s[2] and event.time_s[2] - event.time_s[1] < 1800.0
+    assert event.size[1] <= 1.4 <= event.size[2] and event.size[0] == pytest.approx(1.4, abs=0.1)
+    assert (event.result().exclude or "").startswith("exclude = [{from_s = ")
+    assert gain_changes(load(ramps(tmp_path / "none"))) == []
+    assert gain_changes(load(ramps(tmp_path / "level", higher))) == []
+
+
+def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:
+    def turned(columns: Columns) -> None:
+        columns["rate_dph"] = -columns["rate_dph"]
+
+    (event,) = turned_runs(load(ramps(tmp_path, turned)))
+    assert (event.id, event.file) == ("sign_reversed", "2.csv")
+
+
+def test_runs_that_agree_are_told_nothing_of(tmp_path: Path) -> None:
+    def shifted(columns: Columns) -> None:
+        columns["rate_dph"] = columns["rate_dph"] + 0.01
+
+    assert turned_runs(load(ramps(tmp_path))) == []
+    assert turned_runs(load(ramps(tmp_path, shifted))) == [], "an offset is no gain"

@@ -1,0 +1,99 @@
+"""The other blind world: its own physics, checked by what physics says, and a few of its recordings diagnosed.
+
+`make blind-other` measures the figures. Here three recordings show that every stage of it still runs.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+
+from tests.blind.other import heat, noise  # noqa: E402
+from tests.blind.other.grade import table  # noqa: E402
+from tests.blind.other.mechanisms import Scene, draw_map  # noqa: E402
+from tests.blind.other.record import IMITATED, draw_recording  # noqa: E402
+from tests.blind.other.run import orders, run  # noqa: E402
+from tests.blind.other.yardstick import Yardstick  # noqa: E402
+
+WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
+SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind-other`
+
+
+def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:
+    for name in WORLD:
+        tree = ast.parse((ROOT / "tests" / "blind" / "other" / f"{name}.py").read_text("utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith(("gyrotc", "tests")) for alias in node.names), name
+            if isinstance(node, ast.ImportFrom):
+                assert node.level <= 1 and not str(node.module).startswith(("gyrotc", "tests")), name
+
+
+@pytest.mark.slow
+def test_heat_comes_to_rest_at_the_air_and_keeps_its_balance() -> None:
+    """Without a discharge all volumes end at the air; with it, the case is above by power / to_air."""
+    rng = np.random.default_rng(3)
+    body = heat.draw_body(rng)
+    still = heat.Body(**{**vars(body), "ripple_c": 1e-6})
+    command = np.full(12_000, 20.0)
+    command[2000:] = 40.0
+    dark = heat.run_heat(still, command, 0.0, np.random.default_rng(1), lit=False)
+    lit = heat.run_heat(still, command, 0.0, np.random.default_rng(1))
+    for values in (dark.sensor, dark.deep, dark.case):
+        assert values[-1] == pytest.approx(dark.air[-500:].mean(), abs=0.1)
+    above = lit.case[-1000:].mean() - lit.air[-1000:].mean()
+    assert above == pytest.approx(body.discharge / body.to_air, rel=0.02)
+    assert lit.deep[-1] > lit.sensor[-1] > lit.case[-1]
+    half = [int(np.argmax(x[2000:] > 30.0)) for x in (dark.case, dark.sensor, dark.mirror)]
+    assert half == sorted(half), "the mirror comes last"
+
+
+def test_noise_has_the_covariance_that_the_yardstick_counts_on() -> None:
+    level = noise.PowerLaw(1e-3, 2e-4, 1.2)
+    rng = np.random.default_rng(8)
+    means = np.array([noise.draw(level, 6000, rng).reshape(-1, 100).mean(axis=1) for _ in range(300)])
+    wanted = noise.covariance(level, 60, 100)
+    drawn = means.T @ means / len(means)
+    assert np.trace(drawn) == pytest.approx(np.trace(wanted), rel=0.05)
+    assert drawn[0, 5] == pytest.approx(wanted[0, 5], abs=0.2 * wanted[0, 0])
+
+
+@pytest.mark.slow
+def test_a_seed_gives_the_same_recording_and_foreign_ones_are_foreign() -> None:
+    one, again = (draw_recording(11, 4, "foreign", "", hours=2.0) for _ in range(2))
+    for a, b in zip(one.tables, again.tables, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert one.truth.kind == again.truth.kind and one.truth.imitated <= IMITATED
+    wanted = orders(100)
+    assert [sum(s == name for s, _ in wanted) for name in ("clean", "foreign", "one")] == [45, 30, 25]
+
+
+def test_a_map_of_a_late_temperature_is_no_foreign_effect() -> None:
+    """Polynomials of degree 6 and clocks 300 s apart took less than half of a saturation that comes 240 s late."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    body = heat.draw_body(rng)
+    runs = [heat.run_heat(body, *heat.programme(rng, 3.0), rng) for _ in range(3)]
+    zeros = [np.zeros(h.sensor.size) for h in runs]
+    scene = Scene(runs, lambda: runs, [0.0, 1.0, 2.0], draw_map(rng), zeros)
+    stick = Yardstick(scene, [0, 1, 2], noise.PowerLaw(1e-3, 2e-4, 1.0))
+    edge = float(np.mean(runs[0].sensor))
+    lag = round(240 / heat.STEP_S)
+    late = [np.concatenate([np.full(lag, h.sensor[0]), h.sensor[:-lag]]) for h in runs]
+    assert stick.imitated([np.tanh((t - edge) / 6.0) for t in late]) > 0.8
+    noises = [np.repeat(rng.normal(size=t.size // 100 + 1), 100)[: t.size] for t in late]
+    assert stick.imitated(noises) < 0.5, "noise is nobody's"
+
+
+@pytest.mark.slow
+def test_a_slice_of_the_world_is_diagnosed(tmp_path: Path) -> None:
+    rows = run(SEED, RECORDS, tmp_path, hours=2.0)
+    assert len(rows) == RECORDS and table(rows)
+    assert not [row["error"] for row in rows if row["verdict"] == "error"]

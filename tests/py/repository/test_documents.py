@@ -1,0 +1,123 @@
+"""Pages are what they say: marked blocks run and print it, links lead somewhere, tables match the sources."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from gyrotc.verify.toolchain import all_targets, compiler_version
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools" / "promises")]
+
+import analysers  # noqa: E402
+import documents  # noqa: E402
+
+PAGES = documents.pages()
+RUNNING = [page for page in PAGES if documents.steps(page.read_text("utf-8"))]
+
+
+def _name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def test_relative_links_lead_somewhere() -> None:
+    assert len(PAGES) > 25
+    assert [wrong for page in PAGES for wrong in documents.dead_links(page)] == []
+
+
+def test_a_dead_link_and_a_dead_heading_are_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents, "ROOT", tmp_path)
+    page = tmp_path / "a.md"
+    page.write_text(
+        "# One `two`\n[x](b.md) [y](#one-two) [z](#three) ![p](p.png) `[q](r)` [w](https://s/t)\n"
+    )
+    assert [text.split(": ", 1)[1] for text in documents.dead_links(page)] == [
+        "b.md: no such file", "#three: no such heading", "p.png: no such file",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("page", RUNNING, ids=_name)
+@pytest.mark.slow
+def test_what_a_page_shows_is_what_happens(page: Path) -> None:
+    told = list(documents.run(page))
+    assert [text for text in told if not text.startswith("skipped")] == []
+    if told:
+        pytest.skip("; ".join(told))
+
+
+def test_the_readme_shows_what_make_demo_prints(demo: Path) -> None:
+    """Figures of the emulated core are those of GCC 12.2 (Debian 12); with another release they are left out."""
+    target = all_targets()["cortex-m4f"]
+    if target.missing():
+        pytest.skip(f"{target.missing()} is not installed")
+    printed = (demo / "printed.txt").read_text("utf-8")
+    for own, shown in (("data", "build/demo-data"), ("result", "build/demo")):
+        printed = printed.replace(str(demo / own), shown)
+    block = re.search(r"^\$ make demo\n(.*?)^\$ ", (ROOT / "README.md").read_text("utf-8"), re.M | re.S)
+    assert block is not None
+    shown = block[1]
+    if "not installed" not in printed:
+        shown = re.sub("^not installed.*\n", "", shown, flags=re.M)
+    if not compiler_version(target.compiler).endswith(" 12.2.1"):
+        printed, shown = (
+            re.sub(r"^( cortex-m4f( +\w+){3} +- +0) .*", r"\1", t, flags=re.M) for t in (printed, shown)
+        )
+    assert documents.agrees(_words(printed), _words(shown).splitlines()), printed
+
+
+def _words(text: str) -> str:
+    """Lines with a word in them, as words with one blank between: widths of columns go with what is installed."""
+    lines = (" ".join(line.split()) for line in text.splitlines())
+    return "".join(f"{line}\n" for line in lines if re.search(r"\w|\.\.\.", line))
+
+
+def test_commands_output_and_status_of_a_page() -> None:
+    text = "x\n```console run needs: gcc\n$ echo a \\\n  b\na b\n$ false\n$? = 1\n```\n```console\n$ rm -rf /\n```\n"
+    first, second = documents.steps(text)
+    assert (first.command, first.line, first.needs, first.output) == ("echo a \\\n  b", 3, ("gcc",), ["a b"])
+    assert (second.command, second.output, second.status) == ("false", [], 1)
+
+
+@pytest.mark.parametrize(
+    ("printed", "wanted", "same"),
+    [
+        ("a\nb\n", ["a", "b"], True),
+        ("a\nb\n", ["a"], False),
+        ("a 1.5 s\n", ["a ... s"], True),
+        ("a\nx\ny\nb\n", ["a", "...", "b"], True),
+        ("a\nb\n", ["a", "...", "b"], True),
+        ("a.b\n", ["axb"], False),
+        ("", [], True),
+        ("a\n", [], False),
+    ],
+)
+def test_three_dots_stand_for_anything(printed: str, wanted: list[str], same: bool) -> None:
+    assert documents.agrees(printed, wanted) is same
+
+
+def test_a_page_that_says_something_else_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents, "_copy", lambda folder: folder)
+    page = tmp_path / "page.md"
+    page.write_text("```console run\n$ echo a\nb\n$ exit 3\n$ echo c\nc\n```\n")
+    wrong = list(documents.run(page))
+    assert [text.splitlines()[0] for text in wrong] == ["page.md:2: echo a", "page.md:4: exit 3"]
+
+
+def test_a_block_that_is_a_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents, "_copy", lambda folder: folder)
+    page = tmp_path / "page.md"
+    page.write_text("```c file: a/main.c\nint x;\n```\n```console run\n$ cat a/main.c\nint x;\n```\n")
+    assert list(documents.run(page)) == []
+
+
+def test_the_table_of_deviations_is_what_the_sources_declare() -> None:
+    page = (ROOT / "docs" / "certification.md").read_text("utf-8")
+    listed = dict(re.findall(r"^\| (\d+\.\d+) \| (?:advisory|required) \| (.+?) \|", page, re.MULTILINE))
+    declared: dict[str, set[str]] = {}
+    for deviation in analysers.deviations(ROOT):
+        where = f"`{deviation.path.name}`" if deviation.lines else "throughout"
+        declared.setdefault(deviation.rule, set()).add(where)
+    assert {rule: set(where.split(", ")) for rule, where in listed.items()} == declared

@@ -1,0 +1,201 @@
+"""Examples are built as their pages say, run, and give the reference's numbers."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from gyrotc.model import Model, load_model
+from gyrotc.tables.emit import emit
+from gyrotc.tables.quantise import quantise
+from gyrotc.target.history import replay
+from gyrotc.target.maps import evaluate_map
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = ROOT / "examples"
+FLAGS = (
+    "-std=c99",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Werror",
+    f"-I{ROOT / 'include'}",
+)
+RUNTIME = sorted((ROOT / "libc").glob("*.c"))
+
+
+def _run(*command: str | Path, status: int = 0, cwd: Path | None = None) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stdout
+
+
+def _at(model: Model, temperature: float) -> float:
+    """The reference's bias at rest, deg/h."""
+    table = quantise(model, "f32")
+    _, bits = evaluate_map(table, table.encode_inputs(np.array([[temperature, 0.0]])))
+    return float(table.decode_bias(bits)[0])
+
+
+def test_every_example_is_on_the_page() -> None:
+    listed = re.findall(r"^\| \[(\w+)\]", (EXAMPLES / "README.md").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(
+        p.name for p in EXAMPLES.iterdir() if p.is_dir() and (p / "README.md").exists()
+    )
+
+
+@pytest.mark.slow
+def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
+    folder = tmp_path / "examples" / "triad"
+    shutil.copytree(EXAMPLES / "triad", folder)
+    _run("make", f"GYROTC={Path(sys.executable).with_name('gyrotc')}", cwd=folder)
+    told = re.findall(r"-?\d+\.\d+", _run(folder / "build" / "triad"))
+    for axis, temperature, rate in zip("xyz", (20.0, 21.5, None), told, strict=True):
+        if temperature is not None:  # the third one's temperature moves
+            assert float(rate) == pytest.approx(
+                -_at(load_model(folder / f"model_{axis}.json"), temperature), abs=1e-6
+            )
+    assert len({abs(float(rate)) for rate in told}) == 3
+
+
+@pytest.fixture(scope="module")
+def gyros(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Results of three serials, each with a bias of its own, as `emit` leaves them."""
+    raw = load_model(EXAMPLES / "minimal" / "model.json")
+    found = {}
+    for k, serial in enumerate(("RLG-0001", "RLG-0002", "RLG-0010")):
+        network = raw.networks[0].model_copy(update={"w0": raw.networks[0].w0 + 1e-3 * k})
+        model = raw.model_copy(update={"serial": serial, "networks": (network,)})
+        found[serial] = tmp_path_factory.mktemp("fleet") / serial
+        emit(model, found[serial])
+        model.save(found[serial] / "model.json")
+    return found
+
+
+@pytest.fixture(scope="module")
+def firmware(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("firmware") / "many_serials"
+    folder = EXAMPLES / "many_serials"
+    _run("gcc", *FLAGS, folder / "main.c", folder / "images.c", *RUNTIME, "-o", program)
+    return program
+
+
+def test_one_firmware_takes_the_image_of_its_serial(
+    gyros: dict[str, Path], firmware: Path, tmp_path: Path
+) -> None:
+    flash = tmp_path / "flash.bin"
+    assert _run(sys.executable, EXAMPLES / "many_serials" / "pack.py", flash, *gyros.values()).startswith(
+        "3 images"
+    )
+    flash.write_bytes(flash.read_bytes() + b"\xff" * 64)  # erased behind the last one
+    for serial, folder in gyros.items():
+        told = _run(firmware, flash, serial)
+        assert told.startswith(f"{serial}: ")
+        assert float(told.split()[-2]) == pytest.approx(
+            _at(load_model(folder / "model.json"), 20.0), abs=2e-7
+        )
+    for stranger in ("RLG-0003", "RLG-001", "RLG-00100", ""):
+        assert "-5" in _run(firmware, flash, stranger, status=1), "GTC_E_ID"
+
+
+def test_a_damaged_image_is_not_used_nor_passed_over(
+    gyros: dict[str, Path], firmware: Path, tmp_path: Path
+) -> None:
+    flash = tmp_path / "flash.bin"
+    _run(sys.executable, EXAMPLES / "many_serials" / "pack.py", flash, *gyros.values())
+    content = bytearray(flash.read_bytes())
+    content[400] ^= 1
+    flash.write_bytes(content)
+    for serial in ("RLG-0001", "RLG-0002"):
+        assert "-4" in _run(firmware, flash, serial, status=1), "GTC_E_IMAGE"
+    flash.write_bytes(content[:10])
+    _run(firmware, flash, "RLG-0001", status=1)
+    assert "-5" in _run(firmware, tmp_path / "none", "RLG-0001", status=1)
+
+
+def test_interrupt_and_task_on_the_host(tmp_path: Path) -> None:
+    told = _run("make", "-s", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
+    assert re.search(r"\d+ increments, 5 readings, 0\.\d+ arcsec taken away", told)
+
+
+def test_interrupt_and_task_with_freertos(tmp_path: Path) -> None:
+    kernel = os.environ.get("FREERTOS")
+    if kernel is None:
+        pytest.skip("FREERTOS names no folder of the FreeRTOS kernel")
+    told = _run("make", "-s", f"FREERTOS={kernel}", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
+    assert "320 increments, 5 readings" in told
+
+
+@pytest.mark.slow
+def test_two_slots_as_its_page_says(tmp_path: Path) -> None:
+    folder = EXAMPLES / "two_slots"
+    sources = [folder / "main.c", folder / "slots.c", EXAMPLES / "minimal" / "gtc_rlg_0042.c", *RUNTIME]
+    _run("gcc", *FLAGS, f"-I{EXAMPLES / 'minimal'}", *sources, "-o", tmp_path / "two_slots")
+    _run(tmp_path / "two_slots")
+
+
+def _simulink(folder: Path) -> Path:
+    """The S-function with stand-ins for Simulink, as a program."""
+    own = EXAMPLES / "minimal"
+    quiet = [flag for flag in FLAGS if flag != "-Wconversion"]  # of the stand-ins
+    sources = [EXAMPLES / "simulink" / "sfun_gtc.c", own / "gtc_rlg_0042.c", *RUNTIME]
+    includes = [f"-I{ROOT / 'tests' / 'py' / 'simulink'}", f"-I{own}"]
+    _run("gcc", *quiet, *includes, *sources, "-o", folder / "block")
+    return folder / "block"
+
+
+def test_a_block_of_simulink_gives_the_bits_of_the_reference(tmp_path: Path) -> None:
+    """Two blocks of one model have a state each; the one that is read sees every tenth reading missing."""
+    table = quantise(load_model(EXAMPLES / "minimal" / "model.json"), "f32")
+    x = 20.0 + 15.0 * np.sin(np.arange(400) / 40.0)
+    x[::10] = np.nan
+    text = "\n".join(f"{t!r} 0.5" for t in x.astype(np.float32).tolist())
+    done = subprocess.run(
+        [_simulink(tmp_path), str(table.block_s / 4.0)],
+        input=text,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rows = np.array([[float(word) for word in line.split()] for line in done.stdout.splitlines()])
+    want = replay(
+        table, table.encode_inputs(x[:, None]), missed=np.zeros(400, dtype=np.int64), samples_per_block=4
+    )
+    bias = table.decode_bias(want.bits)
+    assert np.array_equal(rows[:, 1], bias)
+    assert np.array_equal(rows[:, 0], 0.5 - bias)
+    assert np.ptp(bias) > 0.0
+
+
+def test_a_block_of_simulink_refuses_a_period_that_makes_no_block(tmp_path: Path) -> None:
+    block = _simulink(tmp_path)
+    assert "no whole number of sample periods" in _run(block, "7.3", status=1)
+    assert "between a microsecond and 4294 s" in _run(block, "0", status=1)
+
+
+@pytest.mark.slow
+def test_the_notebook_draws_a_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cells in order, as Jupyter runs them; at most ten statements of the API."""
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((EXAMPLES / "notebook" / "map.ipynb").read_text())["cells"]
+    names: dict[str, object] = {}
+    for cell in (c for c in cells if c["cell_type"] == "code"):
+        text = "".join(cell["source"])
+        if text.startswith("!gyrotc "):
+            _run(Path(sys.executable).with_name("gyrotc"), *text.removeprefix("!gyrotc ").split())
+        else:
+            exec(compile(text, "map.ipynb", "exec"), names)
+    assert len(plt.gcf().axes) == 2 and "centers" in plt.gca().get_title() + plt.gcf().axes[0].get_title()
+    plt.close("all")

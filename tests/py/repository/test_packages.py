@@ -1,0 +1,400 @@
+"""Packages for firmware: each is built by its own tool where the machine has it, else by what its files say.
+
+All of them carry the version of `include/gtc.h`, and give the bits of the C functions.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGES = ROOT / "packages"
+MINIMAL = ROOT / "examples" / "minimal"
+RUNTIME = [ROOT / "libc" / f"gtc_{part}.c" for part in ("crc", "f32", "q31")]
+FLAGS = (
+    "-std=c99",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    f"-I{ROOT / 'include'}",
+    f"-I{MINIMAL}",
+)
+sys.path.insert(0, str(ROOT / "tools"))
+
+import version  # noqa: E402
+
+import packages  # noqa: E402
+
+pytestmark = pytest.mark.slow
+
+#: What packages/rust/example and packages/ada/example do, in C.
+RAMP = r"""
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "gtc_rlg_0042.h"
+
+int main(void)
+{
+    static gtc_f32_state_t single;
+    static gtc_q31_state_t fixed;
+    int k;
+
+    if ((gtc_f32_init(&single, &gtc_rlg_0042_f32, 1000000UL) != 0)
+        || (gtc_q31_init(&fixed, &gtc_rlg_0042_q31, 1000000UL) != 0)) {
+        return 1;
+    }
+    for (k = 0; k < 600; k++) {
+        const float warm = 20.0F + (float) k / 64.0F;
+        const int_least32_t word = (20 * 65536) + (k * 1024);
+        const int lost = (k % 100 == 99);
+        gtc_word_t bits;
+        int_least32_t bias;
+        int status = lost ? gtc_f32_missed(&single, 1) : gtc_f32_sample(&single, &warm);
+
+        if ((status < 0) || ((lost ? gtc_q31_missed(&fixed, 1) : gtc_q31_sample(&fixed, &word)) < 0)) {
+            return 2;
+        }
+        status = gtc_f32_bias(&single, &bits.value);
+        if ((status < 0) || (gtc_q31_bias(&fixed, &bias) < 0)) {
+            return 3;
+        }
+        printf("%d %08" PRIxLEAST32 " %08" PRIxLEAST32 " %d\n", k, bits.bits, (uint_least32_t) bias, status);
+    }
+    return 0;
+}
+"""
+
+
+def _run(*command: str | Path, cwd: Path | None = None, **environment: str) -> str:
+    done = subprocess.run(
+        [str(c) for c in command],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env=os.environ | environment,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def _need(program: str) -> str:
+    """Path of a program of this machine; without it the test is skipped by its name."""
+    path = shutil.which(program)
+    if path is None:
+        pytest.skip(f"{program} is not installed")
+    return path
+
+
+@pytest.fixture(scope="module")
+def ramp(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What the C functions give."""
+    folder = tmp_path_factory.mktemp("ramp")
+    (folder / "ramp.c").write_text(RAMP)
+    _run("gcc", *FLAGS, folder / "ramp.c", MINIMAL / "gtc_rlg_0042.c", *RUNTIME, "-o", folder / "ramp")
+    return _run(folder / "ramp")
+
+
+@pytest.fixture(scope="module")
+def archives(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of everything that `make packages` writes."""
+    out = tmp_path_factory.mktemp("archives")
+    packages.assemble(out, list(packages.KINDS))
+    return out
+
+
+# --- one source of the version -----------------------------------------------------------------
+
+
+def test_every_file_carries_the_version_of_the_header() -> None:
+    assert version.differing(ROOT) == []
+
+
+@pytest.fixture
+def copies(tmp_path: Path) -> Path:
+    """A folder with a copy of each file that carries the version."""
+    for name in (version.HEADER, *version.PLACES):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", version.PLACES)
+def test_a_file_with_another_version_is_told_and_mended(name: str, copies: Path) -> None:
+    path = copies / name
+    path.write_text(path.read_text().replace(version.header_version(ROOT), "9.8.7"))
+    (told,) = version.differing(copies)
+    assert told.startswith(f"{name}: 9.8.7")
+    version.write(copies)
+    assert path.read_text() == (ROOT / name).read_text()
+
+
+def test_a_new_version_is_set_in_one_place_and_reaches_all(copies: Path) -> None:
+    version.set_header(copies, "1.20.3")
+    assert version.header_version(copies) == "1.20.3" and len(version.differing(copies)) == len(
+        version.PLACES
+    )
+    version.write(copies)
+    assert version.differing(copies) == []
+
+
+def test_no_file_of_a_package_carries_a_version_that_the_list_lacks() -> None:
+    current = version.header_version(ROOT)
+    listed = set(version.PLACES) | {"packages/README.md"}
+    for path in (p for p in PACKAGES.rglob("*") if p.is_file() and p.suffix != ".lock"):
+        name = path.relative_to(ROOT).as_posix()
+        if name not in listed:
+            assert current not in path.read_text("utf-8"), name
+
+
+# --- each by its tool ----------------------------------------------------------------------------
+
+
+def test_meson_builds_a_user_of_the_wrap(tmp_path: Path, ramp: str) -> None:
+    _need("ninja")
+    meson = _need("meson")
+    (tmp_path / "subprojects").mkdir()
+    (tmp_path / "subprojects" / "gyrotc").symlink_to(ROOT)
+    shutil.copy(PACKAGES / "meson" / "gyrotc.wrap", tmp_path / "subprojects")
+    (tmp_path / "user.c").write_text(RAMP)
+    for ending in "ch":
+        shutil.copy(MINIMAL / f"gtc_rlg_0042.{ending}", tmp_path)
+    (tmp_path / "meson.build").write_text(
+        "project('user', 'c', default_options: ['c_std=c99'])\n"
+        "executable('user', 'user.c', 'gtc_rlg_0042.c', dependencies: dependency('gyrotc'))\n"
+    )
+    _run(meson, "setup", "--wrap-mode=nodownload", tmp_path / "build", tmp_path)
+    _run(meson, "compile", "-C", tmp_path / "build")
+    assert _run(tmp_path / "build" / "user") == ramp
+
+
+#: Stand-ins for the functions of Zephyr's and Espressif's CMake that the two files call.
+STUBS = """
+cmake_minimum_required(VERSION 3.18)
+project(image C)
+set(CMAKE_C_STANDARD 99)
+add_executable(image user.c gtc_rlg_0042.c)
+function(zephyr_library_named name)
+  set(ZEPHYR_CURRENT_LIBRARY ${name} PARENT_SCOPE)
+  add_library(${name} STATIC)
+  target_link_libraries(image PRIVATE ${name})
+endfunction()
+function(zephyr_library_sources)
+  target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+endfunction()
+function(zephyr_library_sources_ifdef feature)
+  if(${${feature}})
+    target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+  endif()
+endfunction()
+function(zephyr_library_compile_options)
+  target_compile_options(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+endfunction()
+function(zephyr_include_directories)
+  target_include_directories(image PRIVATE ${ARGN})
+  target_include_directories(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+endfunction()
+function(zephyr_compile_definitions)
+  target_compile_definitions(image PRIVATE ${ARGN})
+  target_compile_definitions(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+endfunction()
+function(zephyr_compile_definitions_ifdef feature)
+  if(${${feature}})
+    zephyr_compile_definitions(${ARGN})
+  endif()
+endfunction()
+function(idf_component_register)
+  cmake_parse_arguments(ARG "" "" "SRCS;INCLUDE_DIRS" ${ARGN})
+  set(COMPONENT_LIB gyrotc PARENT_SCOPE)
+  add_library(gyrotc STATIC ${ARG_SRCS})
+  target_include_directories(gyrotc PUBLIC ${ARG_INCLUDE_DIRS})
+  target_link_libraries(image PRIVATE gyrotc)
+endfunction()
+"""
+
+
+def _image(component: Path, folder: Path, **options: str) -> Path:
+    """The program RAMP with a component that is added by its CMakeLists.txt."""
+    folder.mkdir(parents=True)
+    (folder / "user.c").write_text(RAMP)
+    for ending in "ch":
+        shutil.copy(MINIMAL / f"gtc_rlg_0042.{ending}", folder)
+    set_ = "".join(f"set({key} {value})\n" for key, value in options.items())
+    (folder / "CMakeLists.txt").write_text(f'{STUBS}{set_}add_subdirectory("{component}" gyrotc)\n')
+    _run("cmake", "-S", folder, "-B", folder / "build", "-DCMAKE_BUILD_TYPE=Release")
+    _run("cmake", "--build", folder / "build")
+    return folder / "build" / "image"
+
+
+def _kconfig(path: Path) -> dict[str, str]:
+    """Options of a Kconfig file with their defaults (`n` where there is none), as CMake sees them."""
+    found = re.findall(r"^(?:menu)?config (\w+)\n((?:\t.*\n)+)", path.read_text(), re.MULTILINE)
+    default = {name: re.search(r"^\tdefault (\w+)$", body, re.MULTILINE) for name, body in found}
+    return {f"CONFIG_{name}": match[1] if match else "n" for name, match in default.items()}
+
+
+def _asked(path: Path) -> set[str]:
+    return set(re.findall(r"CONFIG_\w+", path.read_text()))
+
+
+def test_zephyr_finds_the_module_and_its_options(tmp_path: Path, ramp: str) -> None:
+    """`zephyr/module.yml` names the folders, each option that CMake asks for is one of Kconfig."""
+    named = dict(
+        re.findall(r"^  (cmake|kconfig): (\S+)$", (ROOT / "zephyr" / "module.yml").read_text(), re.M)
+    )
+    options = _kconfig(ROOT / named["kconfig"])
+    assert _asked(ROOT / named["cmake"] / "CMakeLists.txt") == set(options)
+    chosen = {key: "1" if value in ("y", "n") else value for key, value in options.items()}
+    assert (
+        _run(_image(ROOT / named["cmake"], tmp_path / "image", **chosen | {"CONFIG_GYROTC_MAX_TERMS": "6"}))
+        == ramp
+    )
+
+
+@pytest.mark.parametrize("where", ["sources", "archive"])
+def test_esp_idf_takes_the_component(where: str, tmp_path: Path, ramp: str, archives: Path) -> None:
+    component = PACKAGES / "esp-idf" if where == "sources" else archives / "esp-idf" / "gyrotc"
+    options = _kconfig(component / "Kconfig")
+    assert _asked(component / "CMakeLists.txt") == set(options)
+    chosen = {key: "0" if value == "n" else value for key, value in options.items()}
+    assert _run(_image(component, tmp_path / "image", **chosen)) == ramp
+
+
+def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
+    text = (ROOT / "include" / "gtc_config.h").read_text()
+    defaults = dict(re.findall(r"#ifndef GTC_(\w+)\n#define GTC_\w+ (\d+)", text))
+    for path in (PACKAGES / "zephyr" / "Kconfig", PACKAGES / "esp-idf" / "Kconfig"):
+        options = _kconfig(path)
+        for name, value in defaults.items():
+            expected = {"0": "n"}.get(value, value)
+            assert options.get(f"CONFIG_GYROTC_{name}") == expected, (path, name)
+
+
+def test_platformio_compiles_what_its_manifest_says(tmp_path: Path, ramp: str) -> None:
+    manifest = json.loads((ROOT / "library.json").read_text())
+    build = manifest["build"]
+    files = [re.fullmatch(r"\+<(\w+\.c)>", word)[1] for word in build["srcFilter"]]  # type: ignore[index]
+    (tmp_path / "user.c").write_text(RAMP)
+    sources = [tmp_path / "user.c", MINIMAL / "gtc_rlg_0042.c", *(ROOT / build["srcDir"] / f for f in files)]
+    folders = [f"-I{ROOT / build['includeDir']}", f"-I{MINIMAL}"]
+    _run("gcc", "-std=gnu11", *build["flags"], *folders, *sources, "-o", tmp_path / "user")
+    assert _run(tmp_path / "user") == ramp
+    assert (ROOT / build["includeDir"] / manifest["headers"]).is_file()
+    for pattern in manifest["export"]["include"]:
+        assert list(ROOT.glob(pattern)), pattern
+
+
+def test_a_cmsis_pack_holds_every_file_that_its_description_names(archives: Path) -> None:
+    (pack,) = archives.glob("*.pack")
+    with zipfile.ZipFile(pack) as opened:
+        names = set(opened.namelist())
+        description = ElementTree.fromstring(opened.read("gyrotc.gtc.pdsc"))
+    assert pack.name == f"gyrotc.gtc.{version.header_version(ROOT)}.pack"
+    listed = [e.attrib["name"] for e in description.iter("file")]
+    listed += [str(e.text) for tag in ("license", "doc") for e in description.iter(tag)]
+    sources = [name for name in listed if name.endswith(".c")]
+    assert len(sources) == len(set(sources)) == 3, "a source in two components links twice"
+    for name in listed:
+        assert name in names or any(n.startswith(name) for n in names if name.endswith("/")), name
+    conditions = {e.attrib["id"] for e in description.iter("condition")}
+    asked = {e.attrib["condition"] for e in description.iter() if "condition" in e.attrib}
+    assert asked <= conditions
+
+
+def test_the_arduino_library_keeps_to_c99_arithmetic_without_a_flag(archives: Path, tmp_path: Path) -> None:
+    """Its builder compiles as gnu11 with flags of its own; without the pragma, products are fused."""
+    source = archives / "arduino" / "gyrotc" / "src" / "gtc.c"
+    assert sorted(p.name for p in source.parent.iterdir()) == ["gtc.c", "gtc.h", "gtc.hpp"]
+    fused = {}
+    for name, text in (
+        ("with", source.read_text()),
+        ("without", source.read_text().replace("#pragma GCC", "//")),
+    ):
+        (tmp_path / f"{name}.c").write_text(text)
+        command = (
+            _need("arm-none-eabi-gcc"), "-std=gnu11", "-O2", "-mcpu=cortex-m4", "-mfloat-abi=hard",
+            "-mfpu=fpv4-sp-d16", f"-I{source.parent}", "-S", "-o", "-",
+        )  # fmt: skip
+        fused[name] = len(re.findall(r"\bvfn?m[as]\b", _run(*command, tmp_path / f"{name}.c")))
+    assert fused["with"] == 0 < fused["without"]
+
+
+def test_the_arduino_builder_takes_the_library(archives: Path, tmp_path: Path) -> None:
+    builder = _need("arduino-builder")
+    hardware = Path("/usr/share/arduino/hardware")
+    if not (hardware / "arduino" / "avr").is_dir():
+        pytest.skip("arduino-core-avr is not installed")
+    libraries = tmp_path / "libraries"
+    shutil.copytree(archives / "arduino", libraries)
+    (tmp_path / "build").mkdir()
+    ctags = (
+        '"{cmd.path}" -u --language-force=c++ -f - --c++-kinds=svpf --fields=KSTtzns --line-directives '
+        '"{source_file}"'
+    )
+    told = _run(
+        builder, "-compile", "-hardware", hardware, "-tools", "/usr/bin", "-libraries", libraries,
+        "-fqbn", "arduino:avr:mega:cpu=atmega2560", "-build-path", tmp_path / "build",
+        # Debian's core needs a macro that its own compiler lacks.
+        "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=17", "-prefs", f"tools.ctags.pattern={ctags}",
+        "-prefs", "tools.ctags.cmd.path=/usr/bin/arduino-ctags",
+        libraries / "gyrotc" / "examples" / "Minimal" / "Minimal.ino",
+    )  # fmt: skip
+    assert "Sketch uses" in told
+
+
+def test_rust_gives_the_bits_of_c(ramp: str, archives: Path) -> None:
+    """The crate as it is published (C sources inside) holds its own sizes against C's; the example gives C's bits."""
+    cargo = _need("cargo")
+    target = str(ROOT / "build" / "rust")
+    crate = archives / "crate" / "gyrotc"
+    fetched = subprocess.run([cargo, "fetch"], cwd=crate, capture_output=True, text=True, check=False)
+    if fetched.returncode != 0:
+        pytest.skip("crate cc cannot be had (no registry), or cargo is too old")
+    assert "1 passed" in _run(cargo, "test", "--offline", "--lib", cwd=crate, CARGO_TARGET_DIR=target)
+    assert _run(cargo, "run", "-q", cwd=PACKAGES / "rust" / "example", CARGO_TARGET_DIR=target) == ramp
+
+
+def test_rust_has_every_option_at_its_default_and_every_status() -> None:
+    text = (PACKAGES / "rust" / "src" / "lib.rs").read_text()
+    header = (ROOT / "include" / "gtc.h").read_text()
+    for name in re.findall(r"^#define (gtc_(?:f32|q31)_(?!term)\w+) GTC_LINKED", header, re.MULTILINE):
+        assert f'"{name}_20blocks_4terms"' in text, name
+    remarks = dict(re.findall(r"pub const (\w+): Self = Self\((\d+)\);", text))
+    assert remarks == dict(re.findall(r"^#define GTC_([A-Z_]+) (\d+) +/\*", header, re.MULTILINE))
+    assert len(re.findall(r"^ +-\d => Err\(Error::", text, re.MULTILINE)) == len(
+        re.findall(r"^#define GTC_E_\w+ \(-\d\)", header, re.MULTILINE)
+    )
+
+
+def test_ada_gives_the_bits_of_c_with_every_contract_checked(ramp: str, tmp_path: Path) -> None:
+    gnatmake = _need("gnatmake")
+    for source in (*PACKAGES.glob("ada/*.ad?"), *PACKAGES.glob("ada/example/*.adb")):
+        shutil.copy(source, tmp_path)
+    objects = []
+    for source in (*RUNTIME, MINIMAL / "gtc_rlg_0042.c"):
+        objects.append(f"{source.stem}.o")
+        _run("gcc", *FLAGS, "-c", source, "-o", objects[-1], cwd=tmp_path)
+    _run(gnatmake, "-q", "-gnat2012", "-gnata", "-gnatwae", "firmware.adb", "-largs", *objects, cwd=tmp_path)
+    assert _run(tmp_path / "firmware") == ramp
+
+
+# --- archives ----------------------------------------------------------------------------------
+
+
+def test_archives_made_twice_are_equal(archives: Path, tmp_path: Path) -> None:
+    again = packages.assemble(tmp_path, list(packages.KINDS))
+    assert len(again) == len(packages.KINDS)
+    for path in again:
+        assert path.read_bytes() == (archives / path.name).read_bytes()

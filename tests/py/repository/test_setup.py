@@ -1,0 +1,107 @@
+"""Set-up on any release of Debian: which packages it asks for, and what it does about those that are not there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+#: Programs of a machine on which nothing is installed yet; $UNKNOWN are packages that its release does not have.
+STUBS = {
+    "id": "echo 0",
+    "dpkg-query": "exit 1",
+    "apt-get": 'echo "$@" >>"$CALLS"',
+    "apt-cache": '[ "$1" = show ]; case " $UNKNOWN " in *" $2 "*) exit 100 ;; esac',
+    "gcc": "echo 14",
+    "clang": "echo 19.1.7",
+}
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """A folder with nothing but the script, what it looks at, and an environment that is there."""
+    for name in ("tools", "gen/core", "gen/gyrotc", "bin", ".venv/bin"):
+        (tmp_path / name).mkdir(parents=True)
+    shutil.copy(ROOT / "tools/setup.sh", tmp_path / "tools")
+    for name in ("gen/pyproject.toml", "gen/CMakeLists.txt", "gen/core/x.cpp"):
+        (tmp_path / name).touch()
+    for name, body in {**{f"bin/{k}": v for k, v in STUBS.items()}, ".venv/bin/python": "exit 0"}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{body}\n")
+        (tmp_path / name).chmod(0o755)
+    return tmp_path
+
+
+def setup(house: Path, level: str, unknown: str = "") -> tuple[int, list[str], str]:
+    """Exit status, the packages asked for, and what was told."""
+    calls = house / "calls"
+    calls.unlink(missing_ok=True)
+    environment = os.environ | {
+        "PATH": f"{house / 'bin'}:{os.environ['PATH']}", "CALLS": str(calls), "UNKNOWN": unknown,
+    }  # fmt: skip
+    done = subprocess.run(
+        [house / "tools/setup.sh", level], env=environment, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    lines = calls.read_text().splitlines() if calls.exists() else []
+    assert lines.count("update -qq") == 1, "the lists are fetched once"
+    asked = [
+        word for line in lines if line.startswith("install") for word in line.split()[1:] if word[0] != "-"
+    ]
+    return done.returncode, asked, done.stderr
+
+
+def test_packages_of_a_compiler_have_its_version(house: Path) -> None:
+    status, asked, told = setup(house, "targets")
+    assert (status, told) == (0, "")
+    assert {"libclang-rt-19-dev", "lib32gcc-14-dev"} <= set(asked)
+    assert asked.index("libclang-rt-19-dev") > asked.index("clang")
+    assert not [name for name in setup(house, "demo")[1] if re.search("clang|lib32|qemu-user", name)]
+
+
+def test_a_package_that_a_release_lacks_is_told_and_left_out(house: Path) -> None:
+    status, asked, told = setup(house, "prove", "frama-c-base libclang-rt-19-dev")
+    assert status == 0 and {"gappa", "z3", "cmake"} <= set(asked)
+    assert "frama-c-base" not in asked and "libclang-rt-19-dev" not in asked
+    assert told.splitlines() == [
+        f"setup: this release has no package {name}: what needs it is skipped"
+        for name in ("frama-c-base", "libclang-rt-19-dev")
+    ]
+
+
+def test_what_the_main_job_needs_is_never_left_out(house: Path) -> None:
+    assert "libeigen3-dev" in setup(house, "demo", "libeigen3-dev")[1], "apt-get says what is wrong"
+
+
+@pytest.mark.parametrize("level", ["demo", "test", "check", "targets", "prove", "picture"])
+def test_every_level_brings_the_core_on_which_the_main_job_proves_its_code(level: str, house: Path) -> None:
+    assert {"gcc-arm-none-eabi", "qemu-system-arm"} <= set(setup(house, level)[1])
+
+
+def test_no_release_stands_in_a_package_name() -> None:
+    """libfoo-14-dev is one release's; libeigen3-dev and libc6-dev are names."""
+    files = [ROOT / "tools/setup.sh", *(ROOT / "gen/gyrotc/verify/targets").glob("*.toml")]
+    numbered = [
+        word for path in files for word in re.findall(r"\b[a-z0-9+-]+-\d+(?:-[a-z]+)?\b", path.read_text())
+        if re.match(r"lib|gcc-\d|clang-\d|g\+\+-\d", word)
+    ]  # fmt: skip
+    assert numbered == []
+
+
+@pytest.mark.slow
+def test_proofs_whose_tool_is_missing_are_skipped_by_its_name(tmp_path: Path) -> None:
+    files = ("test_rounding.py", "test_run_time_errors.py")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider",
+         *(f"tests/prove/{name}" for name in files), "--results", tmp_path],
+        cwd=ROOT, env=os.environ | {"PATH": str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    assert "passed" not in done.stdout and "failed" not in done.stdout
+    for tool in ("frama-c", "gappa", "z3"):
+        assert f"{tool} is not installed" in done.stdout
+    assert list(tmp_path.iterdir()) == [], "figures of half a proof are not written"
