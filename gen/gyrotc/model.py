@@ -36,7 +36,7 @@ from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
 from .common.errors import InputError
 from .common.inputs import read_json
-from .common.ranges import MOST_CENTERS, AverageLength, BlockLength
+from .common.ranges import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength
 from .store.files import digest_of, json_text, write_atomically
 
 __all__ = [
@@ -288,7 +288,7 @@ class Model(_Frozen):
     fallback_dph: Dph
     effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = None
     rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
-    hold_blocks: Annotated[int, Field(ge=1, le=100000)]
+    hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
     agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
     max_step_c: Positive

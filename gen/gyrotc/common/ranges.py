@@ -6,10 +6,12 @@ from typing import Annotated
 
 from annotated_types import Interval
 
-__all__ = ["MOST_CENTERS", "AverageLength", "BlockLength"]
+__all__ = ["MOST_CENTERS", "MOST_HELD", "AverageLength", "BlockLength"]
 
 MOST_CENTERS = 512
 """What a table holds: docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl."""
+MOST_HELD = 100_000
+"""Blocks for which a temperature is held."""
 BlockLength = Annotated[float, Interval(gt=0.0, le=3600.0)]
 """Of a block, s."""
 AverageLength = Annotated[float, Interval(gt=0.0, le=1e6)]

@@ -17,6 +17,7 @@ from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages
+from ..common.ranges import MOST_HELD
 from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
@@ -114,15 +115,19 @@ class FrontEnd:
 
 
 def front_end(runs: Sequence[Run], block_s: float) -> FrontEnd:
-    """Block rounded to whole median row periods (at least one), window of about 100 s, limits of belief."""
+    """Block rounded to whole median row periods (at least one), window of about 100 s, limits of belief.
+
+    Raises:
+        InputError: Whole rows make a block that is longer than any may be.
+    """
     period = float(np.median([run.row_period_s for run in runs]))
-    rounded = max(1, round(block_s / period)) * period
+    rounded = BuildOptions(block_s=max(1, round(block_s / period)) * period).block_s
     return FrontEnd(
         block_s=rounded,
         slope_blocks=int(np.clip(round(_SLOPE_WINDOW_S / rounded), 2, 20)),
         max_step_c=_MAX_STEP_C,
         max_rate_c_per_min=_MAX_RATE_C_PER_MIN,
-        hold_blocks=max(1, round(HOLD_S / rounded)),
+        hold_blocks=min(max(1, round(HOLD_S / rounded)), MOST_HELD),
     )
 
 

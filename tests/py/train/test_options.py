@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from gyrotc.cli.commands import app
 from gyrotc.common.errors import InputError
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.recordings.load import load
-from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.train.fitting import FitOptions, fit_dataset, front_end
 from gyrotc.train.options import DEFAULTS
 from recordings import columns, toml, write_csv
 from typer.main import get_command
@@ -110,3 +111,19 @@ def test_means_shorter_than_a_block_are_the_blocks(tmp_path: Path) -> None:
     ]
     assert found[0].left_out is not None
     assert found[0].left_out == found[1].left_out
+
+
+def test_a_block_that_whole_rows_make_too_long_is_refused(tmp_path: Path) -> None:
+    """27.7 rows of 130 s are an hour, 28 are more than a model may have."""
+    recordings = load(one_run(tmp_path / "RLG-1"))
+    runs = [replace(run, row_period_s=130.0) for run in recordings.runs]
+    assert front_end(runs, 3500.0).block_s == 3510.0
+    with pytest.raises(InputError, match=r"--block-s: 3640\.0; expected"):
+        front_end(runs, 3600.0)
+
+
+def test_blocks_of_a_millisecond_are_held_as_often_as_a_model_may_say(tmp_path: Path) -> None:
+    """300 s of them are more than it may."""
+    runs = [replace(run, row_period_s=0.001) for run in load(one_run(tmp_path / "RLG-1")).runs]
+    assert front_end(runs, 0.001).hold_blocks == 100_000
+    assert front_end(runs, 0.01).hold_blocks == 30_000
