@@ -35,7 +35,7 @@ POSITION_BITS = 27  # gain of an input: position = offset * gain * 2^-27
 _H = np.uint64(1557473452)  # 2^-24
 _G = np.uint64(558709134)  # 2^-16
 _TOP = 2052389455  # 2^-29 of one, at the top of the table: docs/numerics.md, section 3
-#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u; proved by visiting every u (tests/py/target/test_reference.py)
+#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u (all u: tests/py/target/test_reference.py)
 GAUSS_ERROR = 2.9e-8
 
 _FULL_SHARE = 2**24  # one, in 2^-24
