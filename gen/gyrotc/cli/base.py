@@ -168,7 +168,6 @@ OutOption = Annotated[Path, typer.Option("--out", help="Folder for the result.")
 
 def written_place(path: Path | None) -> Path | None:
     """Checks, before the work begins, that gyrotc wrote what stands in the place of the result."""
-
     from ..store.files import check_replaceable
 
     if path is not None:

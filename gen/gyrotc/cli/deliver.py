@@ -121,7 +121,6 @@ def sign(
 
     Example: gyrotc sign result --key lab.pem
     """
-
     from ..jobs.axes import check_emitted
     from ..jobs.release import release_of
     from ..store.files import json_text, write_own

@@ -210,7 +210,6 @@ def lot(
 
     Example: gyrotc lot fleet --out lot.json
     """
-
     from ..lot.job import lot_of
     from ..store.files import json_text
     from ..store.folder import write_result

@@ -285,7 +285,6 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
-
     from ..jobs.compare import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.load import load
@@ -345,7 +344,6 @@ def diagnose(
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
-
     from ..jobs.diagnosis import diagnosed
     from ..model import load_model
     from ..recordings.load import axes_of, load

@@ -18,6 +18,7 @@ from .base import (
     SeedOption,
     TrustUnitsOption,
     app,
+    applied_in,
     progress,
     tell,
     write_json,
@@ -279,14 +280,13 @@ def check(
     from ..assess.changes import earlier_models
     from ..quality.check import check as run
     from ..quality.check import envelope_of
-    from ..tables.applied import applied_of
 
     with progress() as say:
         result = run(
             dataset,
             axis=axis,
             envelope=envelope_of(envelope) if envelope is not None else None,
-            applied=applied_of(applied) if applied else None,
+            applied=applied_in(applied),
             trust_units=trust_units,
             earlier=earlier_models(previous) if previous else None,
             progress=say,

@@ -170,7 +170,6 @@ def _log_notes(log: ReadLog) -> Iterator[str]:
 
 def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
-
     from ..results.verification import Verification
 
     for file in result.emitted:
@@ -210,7 +209,6 @@ def summary(result: Evaluation) -> str:
 
     The paper's own figure stands beside it for the paper's scenario.
     """
-
     from ..pages.comparison import ENVIRONMENTS
 
     found = result.judged()

@@ -39,6 +39,7 @@ from .base import (
     TrustOption,
     TrustUnitsOption,
     app,
+    applied_in,
     lot_in,
     numerics_of,
     progress,
@@ -75,7 +76,6 @@ def evaluation_folders(
     Raises:
         InputError: As `result_folder`; or the traces would take the place of another part of the result.
     """
-
     from ..store.folder import result_folder
 
     inside = _inside(folder, trace)
@@ -91,7 +91,6 @@ def evaluation_folders(
 
 def _inside(folder: Path, trace: Path | None) -> Path | None:
     """The folder of traces by its path in the result folder; None where it lies elsewhere."""
-
     from ..store.marker import MARKER
 
     if trace is None or folder.resolve() not in (trace.resolve(), *trace.resolve().parents):
@@ -125,12 +124,10 @@ def fit(
 
     Example: gyrotc fit recordings --out result
     """
-
     from ..jobs.recalibration import with_prior
     from ..recordings.load import load
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
-    from ..tables.applied import applied_of
     from ..train.fitting import FitOptions, fit_dataset
 
     shared = lot_in(lot)
@@ -138,7 +135,7 @@ def fit(
         method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s,
         channels=channels, prior=shared,
     )  # fmt: skip
-    known = applied_of(applied) if applied else None
+    known = applied_in(applied)
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
@@ -175,7 +172,6 @@ def emit(
 
     Example: gyrotc emit result/model.json --out result
     """
-
     from ..model import load_model
     from ..results.verification import Emitted, EmittedTable
     from ..store.folder import result_folder
@@ -237,7 +233,6 @@ def verify(
 
     Example: gyrotc verify result --target all
     """
-
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
     from ..recordings.load import load
@@ -301,17 +296,15 @@ def evaluate(
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
-
     from ..assess.evaluate import evaluate as run
     from ..model import load_model
     from ..recordings.load import load
     from ..store.files import json_text, write_atomically
-    from ..tables.applied import applied_of
 
     if average_s is not None:
         BuildOptions(average_s=average_s)
     axis = load_model(folder / "model.json").axis
-    subtracted = applied_of(applied) if applied else None
+    subtracted = applied_in(applied)
     recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
         result = run(

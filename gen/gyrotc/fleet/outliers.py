@@ -243,7 +243,6 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
     return found
 
 
-_LEAST_GYROS = 8  # gyros; fewer do not say what is usual
 _LEAST_PLACES = 6  # of a shorter curve a correlation of 0.9 may be chance
 _ALIKE = (
     0.9  # correlation of the usual gyro with the median of the lot, and of a turned one with its negative
@@ -257,7 +256,7 @@ def turned(entries: Sequence[FleetEntry]) -> list[str]:
     names: list[str] = []
     for axis in dict.fromkeys(entry.axis for entry in entries):
         lot = [(e.name, e.facts.curve) for e in entries if e.axis == axis and e.facts is not None]
-        names += _turned_of(lot) if len(lot) >= _LEAST_GYROS else []
+        names += _turned_of(lot) if len(lot) >= _LEAST_SERIALS else []
     return names
 
 
@@ -272,7 +271,7 @@ def _turned_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]:
     usual = np.median(shapes, axis=0)
     swing = np.sqrt(np.mean(shapes**2, axis=1))
     size = float(np.sqrt(np.mean(usual**2)))
-    if len(whole) < _LEAST_GYROS or size == 0.0:
+    if len(whole) < _LEAST_SERIALS or size == 0.0:
         return []
     alike = np.mean(shapes * usual, axis=1) / np.maximum(swing * size, np.finfo(float).tiny)
     if float(np.median(alike)) < _ALIKE:

@@ -55,7 +55,6 @@ def diagnose_into(
     Raises:
         InputError: As `diagnose` and `result_folder`.
     """
-
     from ..diagnose.diagnosis import diagnose
 
     with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
@@ -68,7 +67,6 @@ def diagnose_into(
 
 def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
-
     from ..pages.diagnosis import PICTURES, draw, write_diagnosis_page
 
     if progress:

@@ -195,7 +195,6 @@ def finding(name: str, text: str, **evidence: Any) -> Finding:
 
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is reversed
-_SAME_C = 1.0  # what counts as the same temperature, as in `findings`
 _LEAST_PLACES = 8  # of eight places a correlation of 0.9 is chance in 0.2 % of cases
 _ALIKE = 0.9  # correlation of a run's mean curve over temperature with that of the others
 _STUCK_S, _STUCK_ROWS = (
@@ -258,7 +257,7 @@ def sign_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
 
 def _curve(f: RunFacts) -> dict[int, float]:
     """Mean rate at each degree, deg/h."""
-    place = np.round(f.temperatures_c / _SAME_C).astype(np.int64)
+    place = np.round(f.temperatures_c / _PLACE_C).astype(np.int64)
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=place[order[0]] - 1))
     rates = np.split(f.rates_dph[order], starts[1:])
