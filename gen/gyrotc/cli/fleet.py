@@ -62,10 +62,9 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..fleet.manifest import load_manifest
+    from ..fleet.manifest import load_manifest, share_of
     from ..fleet.page import summary_of
-    from ..fleet.run import run_fleet
-    from ..fleet.shards import gather, run_share, share_of
+    from ..fleet.run import gather, run_fleet, run_share
 
     share = share_of(shard) if shard else None
     if share and gathered:

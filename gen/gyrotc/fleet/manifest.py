@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,7 +19,7 @@ from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.options import options_in
 
-__all__ = ["SUMMARY", "Fleet", "Unit", "load_manifest", "printable"]
+__all__ = ["SUMMARY", "Fleet", "Share", "Unit", "load_manifest", "mine", "printable", "share_of"]
 
 #: Files of a summary, beside the folders of the units.
 SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")
@@ -45,7 +46,7 @@ class Unit:
     @property
     def refused(self) -> str:
         """Why no result folder may have this name; empty if it may."""
-        if self.folder.casefold() in (*SUMMARY, "catalogue", "shards"):
+        if self.folder.casefold() in (*SUMMARY, "catalogue"):
             return "is the name of a file of the summary or a folder of the fleet; give the data set another name"
         if not self.folder.strip("-xyz") or self.folder.startswith("."):
             return "a name that is empty or begins with a dot is no name for a result"
@@ -60,6 +61,42 @@ class Fleet:
     options: FitOptions
     numerics: tuple[str, ...] | None
     limits: Limits | None
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """The k-th of n shares of a fleet, from 1 on: for jobs of an array."""
+
+    number: int
+    of: int
+
+
+_MOST_SHARES = 100_000  # as many as a fleet may have units
+
+
+def share_of(text: str) -> Share:
+    """`k/N` as a share.
+
+    Raises:
+        InputError: It is not of that form.
+    """
+    number, _, of = text.partition("/")
+    if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of) <= _MOST_SHARES:
+        return Share(int(number), int(of))
+    raise InputError("--shard", repr(text)[:40], f"k/N with 1 <= k <= N <= {_MOST_SHARES}, such as 3/16")
+
+
+def mine(fleet: Fleet, share: Share) -> Fleet:
+    """The fleet with the units of a share alone, in their order.
+
+    Which share a unit belongs to follows from the hash of its name alone: all machines agree without talking.
+    """
+    units = (unit for unit in fleet.units if _number(unit.folder) % share.of == share.number - 1)
+    return replace(fleet, units=tuple(units))
+
+
+def _number(name: str) -> int:
+    return int.from_bytes(hashlib.sha256(os.fsencode(name)).digest()[:8], "big")
 
 
 class _Part(BaseModel):

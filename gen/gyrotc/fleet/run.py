@@ -1,4 +1,8 @@
-"""A fleet: units that are done stay, the rest is done on processes of this machine or on a Dask cluster."""
+"""A fleet: units that are done stay, the rest is done on processes of this machine or on a Dask cluster.
+
+What is done is told by the results themselves. So a job of an array can do a share of the units and write nothing
+else, and a call that gathers finds what all of them did.
+"""
 
 from __future__ import annotations
 
@@ -19,27 +23,20 @@ from ..common.errors import InputError
 from ..results.fleet import FleetEntry
 from ..store.cache import program_of
 from ..store.files import Lock
+from ..store.folder import result_folder
 from ..store.interrupts import deferred
 from ..store.marker import KINDS, check_apart, check_contents, final_place
 from .catalogue import enter
-from .manifest import SUMMARY, Fleet, printable
+from .manifest import SUMMARY, Fleet, Share, mine, printable
 from .page import write_summary
-from .unit import ENTRY, Task, clean_units, do_unit, done_before, failed
+from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
-__all__ = [
-    "checked_place",
-    "done_already",
-    "on_dask",
-    "on_processes",
-    "run_fleet",
-    "summed",
-    "tasks_of",
-    "unfinished",
-    "worked",
-]
+__all__ = ["gather", "on_dask", "on_processes", "run_fleet", "run_share", "tasks_of"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
+_STOPPED = "the fleet was stopped before it: give the command again"
+_NO_RESULT = "no share has made it: give its share again, which says why where it fails"
 
 
 def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
@@ -176,7 +173,7 @@ def run_fleet(
         InputError: A scheduler is named and Dask is not installed, or cannot be reached; `out` is, holds or lies in
             a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
-    place = checked_place(fleet, out)
+    place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
         entries = _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
@@ -190,7 +187,72 @@ def run_fleet(
                 lock.release()
 
 
-def checked_place(fleet: Fleet, out: Path) -> Path:
+def run_share(
+    fleet: Fleet,
+    out: Path,
+    share: Share,
+    *,
+    jobs: int = 2,
+    scheduler: str | None = None,
+    full: bool = False,
+    told: Told | None = None,
+) -> list[FleetEntry]:
+    """Does the units of one share that are not done yet, and writes no summary; arguments as of `run_fleet`.
+
+    Raises:
+        InputError: As `run_fleet`; what the summary would replace is none.
+    """
+    place, own, say = _checked_place(fleet, out), mine(fleet, share), told or (lambda _: None)
+    try:
+        tasks = tasks_of(own, place, full)
+        entries = _done_already(tasks, say)
+        if len(entries) < len(tasks):
+            _without_summary(place)  # what it says of them ends now
+        return _worked(tasks, entries, jobs, scheduler, say)
+    finally:
+        with deferred():
+            clean_units(place, [unit.folder for unit in own.units])
+
+
+def _without_summary(out: Path) -> None:
+    """Takes an earlier summary away; shares that do it at the same time wait for one another."""
+    lock = Lock(out / "fleet.json", "fleet", wait=True)
+    try:
+        if any((out / name).exists() for name in SUMMARY):
+            with result_folder(out, "fleet", entries=SUMMARY):
+                pass
+    finally:
+        with deferred():
+            lock.release()
+
+
+def gather(
+    fleet: Fleet, out: Path, *, full: bool = False, tag: str = "", told: Told | None = None
+) -> list[FleetEntry]:
+    """The summary and the catalogue of the results that shares have made; arguments as of `run_fleet`.
+
+    A unit without a result of its present recordings, options and program is unfinished.
+
+    Raises:
+        InputError: As `run_fleet`.
+    """
+    place, say = _checked_place(fleet, out), told or (lambda _: None)
+    lock = Lock(place / "fleet.json", "fleet")
+    try:
+        entries = []
+        for task in tasks_of(fleet, place, full):
+            known = made_before(task.keyed())
+            entries.append(known.as_kept() if known else _unfinished(task, _NO_RESULT))
+            say(entries[-1])
+        found = _summed(place, entries)
+        enter(place, found, tag)
+        return found
+    finally:
+        with deferred():
+            lock.release()
+
+
+def _checked_place(fleet: Fleet, out: Path) -> Path:
     """The folder of a fleet, which is there afterwards; raises as `run_fleet`."""
     place = final_place(out)
     folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
@@ -221,25 +283,25 @@ def _run(
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
     tasks = tasks_of(fleet, out, full)
-    entries = done_already(tasks, say)
+    entries = _done_already(tasks, say)
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
-        write_summary(out, [entries.get(n) or unfinished(task) for n, task in enumerate(tasks)])
-    return summed(out, worked(tasks, entries, jobs, scheduler, say))
+        write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
+    return _summed(out, _worked(tasks, entries, jobs, scheduler, say))
 
 
-def done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
+def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
     """Entries of earlier calls that still hold, by the number of their task. Every task gets its key."""
     entries = {}
     for number, task in enumerate(tasks):
         tasks[number] = task.keyed()
-        if known := done_before(tasks[number]):
+        if (known := made_before(tasks[number])) and known.status == "done":
             entries[number] = known.as_kept()
             say(entries[number])
     return entries
 
 
-def worked(
+def _worked(
     tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, scheduler: str | None, say: Told
 ) -> list[FleetEntry]:
     """Does what has no entry yet; all entries in the order of the tasks."""
@@ -251,20 +313,20 @@ def worked(
     return [entries[number] for number in range(len(tasks))]
 
 
-def summed(out: Path, entries: Sequence[FleetEntry]) -> list[FleetEntry]:
+def _summed(out: Path, entries: Sequence[FleetEntry]) -> list[FleetEntry]:
     """Writes the summary; the entries as it tells them."""
     found = list(_one_of_each_serial(entries))
     write_summary(out, found)
     return found
 
 
-def unfinished(task: Task) -> FleetEntry:
-    """The entry of a unit that was not reached."""
+def _unfinished(task: Task, reason: str = _STOPPED) -> FleetEntry:
+    """The entry of a unit that nobody has done."""
     return FleetEntry(
         name=task.unit.name,
         axis=task.unit.axis,
         status="unfinished",
-        reason="the fleet was stopped before it: give the command again",
+        reason=reason,
     )
 
 

@@ -33,9 +33,8 @@ __all__ = [
     "Task",
     "clean_units",
     "do_unit",
-    "done_before",
     "failed",
-    "kept_entry",
+    "made_before",
     "set_aside",
     "write_entry",
 ]
@@ -86,16 +85,6 @@ def write_entry(folder: Path, entry: FleetEntry) -> FleetEntry:
     return entry
 
 
-def kept_entry(folder: Path, key: str) -> FleetEntry | None:
-    """The entry of a result that is whole and was made of the same things (`key`); None: it must be made again."""
-    try:
-        entry = checked(FleetEntry, read_json(folder / ENTRY, "the entry of a gyro"), ENTRY)
-        whole = entry.model_hash is not None and not faults(folder)
-        return entry if entry.key == key and entry.status == "done" and whole else None
-    except (GyrotcError, OSError, ValueError, RecursionError):
-        return None
-
-
 @dataclass(frozen=True, slots=True)
 class Task:
     """A unit with all that its job needs; goes to another process, maybe on another machine, as it is.
@@ -136,17 +125,21 @@ class Task:
         return digest_of([self.program, options, inputs_of(self.unit.dataset)])
 
 
-def done_before(task: Task) -> FleetEntry | None:
-    """The entry of an earlier call that still holds; None if the job must be done, or the task has no key.
+def made_before(task: Task) -> FleetEntry | None:
+    """The entry that an earlier call has left with its result, done or failed, if it still holds; else None.
 
-    It holds if inputs, options and program have the same hashes, and every file of the result still has its own.
+    It holds if inputs, options and program have the same hashes (the task's key), and every file of the result still
+    has its own.
     """
-    try:
-        entry = kept_entry(task.out, task.key) if task.key and not task.unit.refused else None
-    except OSError:
+    if not task.key or task.unit.refused:
         return None
-    now = {"name": task.unit.name, "dataset": task.shown, "axis": task.unit.axis}
-    return entry and entry.model_copy(update=now)
+    try:
+        entry = checked(FleetEntry, read_json(task.out / ENTRY, "the entry of a gyro"), ENTRY)
+        if entry.key != task.key or entry.model_hash is None or faults(task.out):
+            return None
+    except (GyrotcError, OSError, ValueError, RecursionError):
+        return None
+    return entry.model_copy(update={"name": task.unit.name, "dataset": task.shown, "axis": task.unit.axis})
 
 
 def do_unit(task: Task) -> FleetEntry:

@@ -23,7 +23,6 @@ __all__ = [
     "LikelyStep",
     "Reason",
     "ResidualSeries",
-    "ShardEntries",
     "Spread",
 ]
 
@@ -181,12 +180,6 @@ class FleetEntry(FleetUnit):
         """What a summary says of it."""
         known = self.model_fields_set & set(FleetUnit.model_fields)
         return FleetUnit(**{name: getattr(self, name) for name in FleetUnit.model_fields if name in known})
-
-
-class ShardEntries(Part):
-    """`shards/k-of-N.json`: gyros of a share that are not done; the others have their `entry.json`."""
-
-    entries: tuple[FleetEntry, ...] = Field(description="each with its `key`")
 
 
 class Spread(Part):

@@ -47,7 +47,8 @@ def gyro(folder: Path, serial: str, *, seed: int = 1) -> None:
 
 def done_before(task: Task) -> FleetEntry | None:
     """As a fleet asks it: by what the recordings hold now."""
-    return units.done_before(task.keyed())
+    entry = units.made_before(task.keyed())
+    return entry if entry is not None and entry.status == "done" else None
 
 
 @pytest.fixture

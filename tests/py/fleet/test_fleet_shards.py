@@ -6,16 +6,17 @@ import os
 import pickle
 import re
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from conftest import Command
+from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.fleet import run as pools
-from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
-from gyrotc.fleet.run import run_fleet, tasks_of
-from gyrotc.fleet.shards import Share, gather, mine, run_share, share_of
+from gyrotc.fleet.manifest import Fleet, Share, Unit, load_manifest, mine, share_of
+from gyrotc.fleet.run import gather, run_fleet, run_share, tasks_of
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.store.marker import MARKER
@@ -32,11 +33,11 @@ def gyro(folder: Path, serial: str, *, seed: int) -> None:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """All files of a fleet but markers, shares and the catalogue's pages; without the seconds that training took."""
+    """All files of a fleet but markers and the catalogue's pages; without the seconds that training took."""
     found = {}
     for path in out.rglob("*"):
         name = path.relative_to(out).as_posix()
-        if not path.is_file() or path.name == MARKER or name.startswith("shards/") or ".sqlite" in name:
+        if not path.is_file() or path.name == MARKER or ".sqlite" in name:
             continue
         found[name] = path.read_bytes()
         if path.name == "training.json":
@@ -64,11 +65,38 @@ def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     assert f"share 1/{N}" in told.stdout and not (out / "fleet.json").exists()
     early = gather(fleet, out)
     assert {e.status for e in early if e.name not in told.stdout} <= {"unfinished"}
-    for k in range(2, N + 1):
-        run_share(fleet, out, Share(k, N), jobs=1)
+    failed = [
+        e for k in range(2, N + 1) for e in run_share(fleet, out, Share(k, N), jobs=1) if e.status != "done"
+    ]
+    assert not (out / "fleet.json").exists(), "a summary outlasts what it says"
+    assert ("RLG-3: failed" in told.stdout) != ([entry.name for entry in failed] == ["RLG-3"])
     done = gyrotc("fleet", lot / "d", "--out", out, "--gather")
-    assert done.returncode == 1 and "RLG-3: failed" in done.stdout
+    assert done.returncode == 1 and "RLG-3: unfinished; no share has made it" in done.stdout
+    assert "3 of 4 done, 0 failed" in done.stdout
+    run_fleet(fleet, out)
     assert contents(out) == contents(lot / "whole")
+
+
+def test_a_share_leaves_its_results_and_nothing_else(tmp_path: Path) -> None:
+    for k, serial in enumerate(("RLG-1", "RLG-2")):
+        gyro(tmp_path / "d" / serial, serial, seed=k)
+    (tmp_path / "d" / "RLG-2" / "run-01.csv").write_text("time_s,rate_dph\n")
+    fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
+    assert [entry.status for entry in run_share(fleet, out, Share(1, 1), jobs=1)] == ["done", "failed"]
+    assert [path.name for path in out.iterdir()] == ["RLG-1"]
+    found = gather(fleet, out)
+    assert [(entry.status, entry.kept) for entry in found] == [("done", True), ("unfinished", False)]
+    assert "no share" in (found[1].reason or "")
+    assert (out / "fleet.html").exists() and (out / "catalogue").exists()
+
+
+def test_a_result_that_misses_its_limits_is_gathered_as_failed(tmp_path: Path) -> None:
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1", seed=1)
+    (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\ntable_bytes = 1\n")
+    fleet = replace(load_manifest(tmp_path / "d"), limits=load_limits(tmp_path / "limits.toml"))
+    made = run_share(fleet, tmp_path / "out", Share(1, 1), jobs=1)
+    assert [entry.status for entry in made] == ["failed"] and "table_bytes" in (made[0].reason or "")
+    assert [e.content() for e in gather(fleet, tmp_path / "out")] == [e.content() for e in made]
 
 
 @pytest.mark.slow

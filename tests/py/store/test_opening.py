@@ -74,13 +74,10 @@ COMMANDS = {
     "stamp": ("stamp", "fleet/RLG-1/model.json"),
     "certificate": ("certificate", "fleet/RLG-1", "--draft", "--out", "C"),
     "fleet": ("fleet", "data", "--out", "fleet"),  # whose gyro is done before: no process is needed for it
-    "shard": ("fleet", "data", "--out", "fleet", "--shard", "1/1"),
 }
 
 
-@pytest.fixture(
-    params=quick_and_slow([name for name in COMMANDS if name not in ("report", "shard")], ["report", "shard"])
-)
+@pytest.fixture(params=quick_and_slow([name for name in COMMANDS if name != "report"], ["report"]))
 def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
     found: tuple[str, ...] = COMMANDS[request.param]
     return found
