@@ -11,8 +11,7 @@ from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.table import Table
 from gyrotc.verify.bounds import instruction_bounds
-from gyrotc.verify.sizes import function_costs
-from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
+from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program, runtime_object
 
 __all__ = ["MODELS", "bounds", "bounds_of", "model_of"]
 
@@ -49,8 +48,8 @@ def bounds_of(model: Model, target: Target) -> list[dict[str, Any]]:
         c, work = Path(place) / "c", Path(place) / "work"
         work.mkdir()
         tables = {n: quantise(model, n) for n in NUMERICS}
-        function_costs(target, c, work)
-        found = instruction_bounds(target, c, tables, model.symbol, work / "functions" / "gtc.o")
+        runtime = runtime_object(target, c, work)
+        found = instruction_bounds(target, c, tables, model.symbol, runtime, work)
         return [
             {"numeric": n, "function": function, "bound": most[function], "counted": counted, "calls": calls}
             for n, most in found.items()

@@ -14,8 +14,7 @@ from pathlib import Path
 from gyrotc.model import load_model
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import NUMERICS
-from gyrotc.verify.sizes import function_costs
-from gyrotc.verify.toolchain import all_targets, disassembly
+from gyrotc.verify.toolchain import all_targets, disassembly, runtime_object
 
 __all__ = ["gaussian_instructions"]
 
@@ -36,8 +35,7 @@ def gaussian_instructions() -> dict[str, float]:
         emit(load_model(_MODEL), Path(place))
         c, work = Path(place) / "c", Path(place) / "work"
         work.mkdir()
-        function_costs(target, c, work)
-        rows = disassembly(target, work / "functions" / "gtc.o")
+        rows = disassembly(target, runtime_object(target, c, work).put(work / "gtc.o"))
         owner = _owners((c / "gtc.c").read_text("ascii"))
     return {n: _counted(rows, owner, f"gtc_{n}_curve_apply") / _GAUSSIANS for n in NUMERICS}
 

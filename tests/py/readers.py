@@ -397,7 +397,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         small = {
             k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1
         }
-        path.write_bytes(kept._packed(signature_bank._content(replace(bank, **small))))
+        path.write_bytes(kept._packed("a.bank", signature_bank._content(replace(bank, **small))))
     return path.read_bytes()
 
 

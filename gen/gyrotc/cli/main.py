@@ -49,8 +49,9 @@ def crash_line(error: BaseException) -> str:
 
 def _kept(number: str, text: str) -> str:
     """Where the report is: the user's folder of state, else the one of temporary files."""
-    root = os.environ.get("XDG_STATE_HOME")
-    state = (Path(root) if root else Path.home() / ".local" / "state") / "gyrotc"
+    from platformdirs import user_state_path
+
+    state = user_state_path("gyrotc", appauthor=False)
     for folder in (state, Path(tempfile.gettempdir())):
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)

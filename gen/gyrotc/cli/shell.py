@@ -64,7 +64,7 @@ def cache(
         typer.Option("--limit", min=0.0, max=1e6, help="Most GB that it may take, from now on; default 2."),
     ] = None,
 ) -> None:
-    """What gyrotc keeps between calls of diagnose: where, how much of it, and how much it may be.
+    """What gyrotc keeps between calls (diagnoses, compiled runtimes): where, how much, and how much it may be.
 
     Example: gyrotc cache --limit 0.5
     """
@@ -74,6 +74,7 @@ def cache(
         kept.set_limit(round(limit_gb * 1e9))
     if clear:
         kept.clear()
-    (banks, _), (diagnoses, _), (_, size) = kept.held("bank"), kept.held("diagnosis"), kept.held()
-    counted = f"{banks} banks of signatures, {diagnoses} diagnoses"
+    (banks, _), (diagnoses, _), (objects, _) = (kept.held(kind) for kind in ("bank", "diagnosis", "object"))
+    counted = f"{banks} banks of signatures, {diagnoses} diagnoses, {objects} objects of compilers"
+    _, size = kept.held()
     tell(f"{kept.folder()}: {counted}, {size / 1e9:.3f} GB of at most {kept.limit() / 1e9:g} GB")

@@ -1,8 +1,9 @@
 """What is kept between calls, by hashes of what it depends on.
 
-A file is the SHA-256 of its content and then the content. What protects whom: the folder is the user's own (made with
-mode 0700; one that belongs to somebody else, or that others may write, is not used), the checksum finds damage, and who
-reads a content takes nothing from it but what it should hold. Whatever does not fit is thrown away and computed again.
+A file is the SHA-256 of its name and content and then the content. What protects whom: the folder is the user's own
+(made with mode 0700; one that belongs to somebody else, or that others may write, is not used), the checksum finds
+damage and what lies under another's name, and who reads a content takes nothing from it but what it should hold.
+Whatever does not fit is thrown away and computed again.
 `joblib.Memory` keeps results on disk as well, but has neither: it unpickles whatever lies there.
 """
 
@@ -17,6 +18,8 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
+
+from platformdirs import user_cache_path
 
 from .. import __version__, _core
 from ..common.errors import InputError
@@ -77,13 +80,12 @@ T = TypeVar("T")
 _MOST_BYTES = 2 * 10**9  # some dozens of banks of signatures, beside which diagnoses are small
 _LIMIT = "limit_bytes"  # a file beside what is kept that says otherwise
 _MAGIC = b"gyrotc kept\n"
-_SUM_BYTES = hashlib.sha256().digest_size
+_HEAD_BYTES = len(_MAGIC) + hashlib.sha256().digest_size
 
 
 def folder() -> Path:
     """Where everything is kept."""
-    root = os.environ.get("XDG_CACHE_HOME")
-    return (Path(root) if root else Path.home() / ".cache") / "gyrotc" / "kept"
+    return user_cache_path("gyrotc", appauthor=False) / "kept"
 
 
 def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
@@ -104,8 +106,8 @@ def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
 def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
     try:
         data = read_input(path, "recording_mib", "what was kept")
-        head, content = data[: len(_MAGIC) + _SUM_BYTES], data[len(_MAGIC) + _SUM_BYTES :]
-        if head == _MAGIC + hashlib.sha256(content).digest():
+        content = data[_HEAD_BYTES:]
+        if data == _packed(path.name, content):
             found = content_of(content)
             if found is not None:
                 os.utime(path, follow_symlinks=False)
@@ -123,12 +125,12 @@ def keep(name: str, content: bytes) -> None:
     """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
     with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
         if _is_own():
-            write_atomically(folder() / name, _packed(content))
+            write_atomically(folder() / name, _packed(name, content))
             _trim()
 
 
-def _packed(content: bytes) -> bytes:
-    return _MAGIC + hashlib.sha256(content).digest() + content
+def _packed(name: str, content: bytes) -> bytes:
+    return _MAGIC + hashlib.sha256(name.encode() + b"\n" + content).digest() + content
 
 
 def _is_own() -> bool:

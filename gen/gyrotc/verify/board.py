@@ -23,7 +23,18 @@ from .board_log import BoardComparison, BoardLog, BoardOutput, compared_words, r
 from .bounds import instruction_bounds
 from .emitted import board_files, checked_sources
 from .sizes import function_costs
-from .toolchain import Target, compile_objects, compiler_version, link, run_program, symbols, writable_bytes
+from .toolchain import (
+    Object,
+    Symbol,
+    Target,
+    compile_objects,
+    compiler_version,
+    link,
+    run_program,
+    runtime_object,
+    symbols,
+    writable_bytes,
+)
 
 __all__ = ["Job", "board_entries", "check_identity", "log_entries", "log_parts"]
 
@@ -56,14 +67,14 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
     """Compiles runtime and table once, and a test program for each arithmetic."""
-    shared: list[Path] | CheckFailed
+    shared: _Shared | CheckFailed
     functions: dict[str, dict[str, FunctionCost]] = {}
     files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
     try:
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
-        sources = [c / name for name in ("gtc.c", f"gtc_{job.model.id}.c")]
-        shared = compile_objects(target, sources, work, include=c)
-        functions = _functions(job, target, c, work)
+        runtime = runtime_object(target, c, work, fresh=job.trusted)
+        shared = _shared(job, target, c, work, runtime)
+        functions = _functions(job, target, c, work, runtime)
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
@@ -84,17 +95,36 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             yield entry(status="fail", error=str(error))
 
 
-def _functions(job: Job, target: Target, c: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """Objects of runtime and table, which the programs of all arithmetics have: symbols, writable static data."""
+
+    objects: tuple[Path, ...]
+    symbols: tuple[Symbol, ...]
+    writable_bytes: int
+
+
+def _shared(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> _Shared:
+    (table,) = compile_objects(target, [c / f"gtc_{job.model.id}.c"], work, include=c)
+    return _Shared(
+        (runtime.put(work / "gtc.o"), table),
+        (*runtime.symbols, *symbols(target, table)),
+        runtime.writable_bytes + writable_bytes(target, table),
+    )
+
+
+def _functions(
+    job: Job, target: Target, c: Path, work: Path, runtime: Object
+) -> dict[str, dict[str, FunctionCost]]:
     """Code, stack and the most instructions of each public function, by arithmetic.
 
     Code of other levels may have loops that no line of the text bounds: then no bound is stated, and the bits count.
     """
-    costs = function_costs(target, c, work)
+    costs = function_costs(runtime)
     if not costs:
         return costs
-    runtime = work / "functions" / "gtc.o"
     try:
-        bounds = instruction_bounds(target, c, job.tables, job.model.symbol, runtime)
+        bounds = instruction_bounds(target, c, job.tables, job.model.symbol, runtime, work)
     except CheckFailed:
         return costs
     for n, most in bounds.items():
@@ -102,14 +132,14 @@ def _functions(job: Job, target: Target, c: Path, work: Path) -> dict[str, dict[
     return costs
 
 
-def _ran(job: Job, target: Target, numeric: str, shared: list[Path], work: Path, c: Path) -> dict[str, Any]:
+def _ran(job: Job, target: Target, numeric: str, shared: _Shared, work: Path, c: Path) -> dict[str, Any]:
     """What a target showed of one arithmetic, by the names of `VerifiedTarget`."""
     defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
     if target.counts:
         defines.append('BOARD_HEADER="board.h"')
     test = compile_objects(target, [c / "board_test.c"], work, include=c, defines=defines)
     program = work / f"board_{numeric}"
-    link(target, [*test, *shared], program)
+    link(target, [*test, *shared.objects], program)
     run = run_program(target, program)
     text = run.stdout.decode("ascii", "replace")
     # Some simulators print what a program says among their own messages.
@@ -165,17 +195,17 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
     return found
 
 
-def _sizes(target: Target, program: Path, objects: list[Path]) -> dict[str, int]:
+def _sizes(target: Target, program: Path, shared: _Shared) -> dict[str, int]:
     """Code and constants of runtime and table that the program links, and their writable static data.
 
     What is constant is told by the objects: linker scripts put constants beside the code.
     """
-    own = {symbol.name: symbol.kind for symbol in symbols(target, *objects)}
+    own = {symbol.name: symbol.kind for symbol in shared.symbols}
     linked = {symbol.name: symbol for symbol in symbols(target, program) if symbol.name in own}.values()
     return {
         "code_bytes": sum(symbol.size for symbol in linked if own[symbol.name] in _CODE),
         "read_only_bytes": sum(symbol.size for symbol in linked if own[symbol.name] in _CONSTANT),
-        "ram_bytes": writable_bytes(target, *objects),
+        "ram_bytes": shared.writable_bytes,
     }
 
 

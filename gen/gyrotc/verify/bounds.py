@@ -9,19 +9,33 @@ known of the runtime beside its loops (`loops`) stands here, each fact with its 
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ..common.errors import CheckFailed
-from ..store.files import write_own
+from ..store import cache
+from ..store.files import canonical_json, digest_of, write_own
 from ..target.table import Table
-from .flow import MEMORY, POWER, SHORT_QUOTIENTS, Block, Flow, Loop, LoopText, counts_of, parse_flows, totals
+from .flow import (
+    MEMORY,
+    POWER,
+    SHORT_QUOTIENTS,
+    Block,
+    Counts,
+    Flow,
+    Loop,
+    LoopText,
+    counts_of,
+    parse_flows,
+    totals,
+)
 from .sizes import PUBLIC, TERM_CODES
-from .toolchain import Target, compile_objects, disassembly, link, symbols
+from .toolchain import Object, Target, compile_objects, disassembly, link, symbols
 
 __all__ = ["Paths", "Program", "instruction_bounds"]
 
@@ -335,10 +349,14 @@ int main(void)
 """
 
 
+Bounds = dict[str, dict[str, int]]
+
+
 def instruction_bounds(
-    target: Target, c_folder: Path, tables: Mapping[str, Table], symbol: str, runtime: Path
-) -> dict[str, dict[str, int]]:
-    """The most instructions of each public function with a table, by arithmetic.
+    target: Target, c_folder: Path, tables: Mapping[str, Table], symbol: str, runtime: Object, work: Path
+) -> Bounds:
+    """The most instructions of each public function with a table, by arithmetic; those of an earlier call where the
+    runtime is the same and the tables have the same sizes.
 
     Arithmetics for which the target has no instructions, so that the compiler's library computes, are left out; and
     all of them for targets without Thumb-2.
@@ -348,14 +366,36 @@ def instruction_bounds(
         c_folder: Has the headers and the tables' source `gtc_<id>.c`.
         tables: Of the arithmetics that the source holds.
         symbol: The id of the tables.
-        runtime: The object of `gtc.c`, with lines (`-g`); the program is built beside it.
+        runtime: The object of `gtc.c`, with lines (`-g`).
+        work: A folder to build in.
 
     Raises:
         CheckFailed: The compiler refused, or the code has no bound.
     """
     if not _THUMB_2.intersection(target.flags):
         return {}
-    program = _linked(target, c_folder, list(tables), symbol, runtime)
+    counts = {numeric: counts_of(table) for numeric, table in tables.items()}
+    linked = [target.flags, target.link, target.script, target.bare]
+    asked = [runtime.name, linked, [[numeric, asdict(known)] for numeric, known in counts.items()]]
+    name = f"{digest_of(asked)}.bounds" if runtime.name else ""
+    found = cache.kept(name, lambda data: _checked(json.loads(data), counts)) if name else None
+    if found is None:
+        found = _bounds(target, c_folder, counts, symbol, runtime, work)
+        if name:
+            cache.keep(name, canonical_json(found))
+    return found
+
+
+def _checked(found: Bounds, counts: Mapping[str, Counts]) -> Bounds | None:
+    numbers = [n for of_one in found.values() for n in of_one.values()]
+    sound = set(found) <= set(counts) and all(set(of_one) == set(PUBLIC) for of_one in found.values())
+    return found if sound and all(type(n) is int and n > 0 for n in numbers) else None
+
+
+def _bounds(
+    target: Target, c_folder: Path, counts: Mapping[str, Counts], symbol: str, runtime: Object, work: Path
+) -> Bounds:
+    program = _linked(target, c_folder, list(counts), symbol, runtime, work)
     flows = parse_flows("\n".join(disassembly(target, program)), "gtc.c")
     linked = symbols(target, program)
     addresses = {s.name: s.address & ~1 for s in linked}
@@ -363,14 +403,12 @@ def instruction_bounds(
     headers = "\n".join((c_folder / name).read_text("ascii") for name in ("gtc.h", "gtc.c"))
     macros = {name: int(number) for name, number in _MACRO.findall(headers)}
     macros["GTC_SAVE_WORDS"] = next(s.size // 4 for s in linked if s.name == "gtc_bound_saved")
-    found: dict[str, dict[str, int]] = {}
-    for numeric, table in tables.items():
+    found: Bounds = {}
+    for numeric, known in counts.items():
         if numeric == "f32" and "-mfloat-abi=soft" in target.flags:
             continue
-        of_table = Program(flows, addresses, LoopText(lines, macros, counts_of(table)))
-        found[numeric] = {
-            f: _bound(of_table, numeric, f, _public(addresses, numeric, f), table) for f in PUBLIC
-        }
+        of_table = Program(flows, addresses, LoopText(lines, macros, known))
+        found[numeric] = {f: _bound(of_table, numeric, f, _public(addresses, numeric, f)) for f in PUBLIC}
     return found
 
 
@@ -379,9 +417,10 @@ def _public(addresses: Mapping[str, int], numeric: str, function: str) -> int:
     return next(address for name, address in addresses.items() if linked.match(name))
 
 
-def _linked(target: Target, c_folder: Path, numerics: list[str], symbol: str, runtime: Path) -> Path:
+def _linked(
+    target: Target, c_folder: Path, numerics: list[str], symbol: str, runtime: Object, work: Path
+) -> Path:
     """A program with every public function and the tables."""
-    work = runtime.parent
     source = work / "bound.c"
     names = [f"&gtc_{symbol}_{n}" for n in numerics] + [
         f"(void *)gtc_{n}_{f}" for n in numerics for f in PUBLIC
@@ -391,17 +430,18 @@ def _linked(target: Target, c_folder: Path, numerics: list[str], symbol: str, ru
     lax = target.model_copy(update={"flags": (*target.flags, "-Wno-pedantic")})  # functions as addresses
     objects = compile_objects(lax, [c_folder / f"gtc_{symbol}.c", source], work, include=c_folder)
     placed = target.model_copy(update={"link": (*target.link, f"-Wl,--section-start=.text={_TEXT:#x}")})
-    link(placed, [runtime, *objects], work / "bound")
+    link(placed, [runtime.put(work / "gtc.o"), *objects], work / "bound")
     return work / "bound"
 
 
-def _bound(program: Program, numeric: str, function: str, address: int, table: Table) -> int:
+def _bound(program: Program, numeric: str, function: str, address: int) -> int:
+    counts = program.text.counts
     paths = Paths(program, numeric)
     paths.whole(address)
-    for text, most in totals(program.text.macros, function, table).items():
+    for text, most in totals(program.text.macros, function, counts).items():
         paths.limit(paths.turns.get(text, []), most)
-    _of_blocks(paths, function, table.n_channels, int(table.guards[6]))
-    _of_memories(paths, function, program.text.counts.kinds.count(MEMORY))
+    _of_blocks(paths, function, counts.by_name["n_channels"], counts.first_missing_blocks)
+    _of_memories(paths, function, counts.kinds.count(MEMORY))
     if function == "angle":  # an increment with more than 32 bits is refused
         long = [{e: 1.0} for e in paths.long_quotients]
         paths.limit([*long, *paths.stores("*increment = (int_least32_t)out;")], 1)

@@ -23,7 +23,7 @@ from ..store.scratch import scratch_folder
 from ..target.q31 import exp2_table
 from ..target.table import Table
 from .emitted import checked_sources, table_files
-from .toolchain import Target, all_targets, compile_objects, confined, link
+from .toolchain import Target, all_targets, compile_objects, confined, link, runtime_object
 
 __all__ = ["Visited", "visit_all"]
 
@@ -95,7 +95,8 @@ def _host() -> Target:
 
 def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trusted: bool) -> Path:
     c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-    emitted = compile_objects(target, [c / "gtc.c", c / f"gtc_{model.id}.c"], work, include=c)
+    runtime = runtime_object(target, c, work, fresh=trusted).put(work / "gtc.o")
+    emitted = [runtime, *compile_objects(target, [c / f"gtc_{model.id}.c"], work, include=c)]
     # The program itself is no code for targets: it may use what the host has.
     loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})
     defines = [f"TABLE=gtc_{model.symbol}_q31", f'HEADER="gtc_{model.id}.h"']

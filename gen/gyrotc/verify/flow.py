@@ -285,7 +285,7 @@ _BITS = 32  # of a word: loops over its bits
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Of a table, what limits its loops."""
+    """Of a table, what limits its loops: all that a bound on instructions takes from it."""
 
     by_name: dict[str, int]
     centers: int  # of the largest network
@@ -295,6 +295,8 @@ class Counts:
     kinds: tuple[int, ...]  # of the terms
     stand_ins: int = 0
     stand_in_centers: int = 0  # of the largest of their networks
+    records: dict[str, int] = field(default_factory=dict)  # of each array
+    first_missing_blocks: int = 0  # of the first channel
 
 
 def counts_of(table: Table) -> Counts:
@@ -311,6 +313,8 @@ def counts_of(table: Table) -> Counts:
         tuple(int(k) for k in table.terms.reshape(-1, ARRAYS["terms"])[:, 0]),
         table.n_stand_ins,
         int(max(table.networks.reshape(-1, ARRAYS["networks"])[n_map:, 0], default=0)),
+        sizes,
+        int(table.guards[6]),
     )
 
 
@@ -398,14 +402,14 @@ class LoopText:
         return self.counts.by_name.get(word, self.macros.get(word))
 
 
-def totals(macros: Mapping[str, int], function: str, table: Table) -> dict[str, int]:
+def totals(macros: Mapping[str, int], function: str, counts: Counts) -> dict[str, int]:
     """Turns that all calls of a function that takes the words of an array make together."""
-    size = {name: getattr(table, name).size // (record or 1) for name, record in ARRAYS.items()}
+    size = counts.records
     numbers = (
         macros["N_NUMBERS"] + 7 * size["networks"] + 5 * size["centers"] + 5 * size["guards"] + 6 * size["terms"]
         + size["sigma"]
     )  # fmt: skip
-    words = macros["GTC_SAVE_WORDS"] if function in ("save", "restore") else len(table.words)
-    counts = macros["N_WHOLE"] - macros["FIRST_COUNT"]
-    wholes = macros["N_WHOLE"] + (2 if function == "check" else 1) * counts
+    words = macros["GTC_SAVE_WORDS"] if function in ("save", "restore") else counts.words
+    known = macros["N_WHOLE"] - macros["FIRST_COUNT"]
+    wholes = macros["N_WHOLE"] + (2 if function == "check" else 1) * known
     return {_NUMBERS: numbers, _WORDS: words, _WHOLES: wholes}

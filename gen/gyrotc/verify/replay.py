@@ -30,7 +30,7 @@ from ..target.table import Table, Words
 from ..train.samples import blocks_since_power_on, missed_before
 from .board import Job
 from .emitted import checked_sources, table_files
-from .toolchain import Target, compile_c, run_program
+from .toolchain import Target, compile_objects, link, run_program, runtime_object
 
 __all__ = ["ReplayCase", "Replayed", "history_of", "replay_dataset", "replay_on", "replay_program"]
 
@@ -106,8 +106,9 @@ def replay_program(
         write_own(source, text)
         program = work / "replay"
         c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-        sources = [source, c / "gtc.c", c / f"gtc_{model.id}.c"]
-        compile_c(target, sources, program, include=c)
+        runtime = runtime_object(target, c, work, fresh=trusted)
+        objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
+        link(target, [runtime.put(work / "gtc.o"), *objects], program)
         yield program
 
 

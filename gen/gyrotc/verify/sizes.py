@@ -21,7 +21,7 @@ from ..store.scratch import scratch_folder
 from ..tables.text import example_period_us
 from ..target.table import Table
 from .emitted import checked_sources, table_files
-from .toolchain import Target, all_targets, compile_objects, link, symbols
+from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
 
 __all__ = ["PUBLIC", "TERM_CODES", "Footprint", "Graph", "footprint", "function_costs", "parse_graph"]
 
@@ -65,17 +65,13 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
         source = work / "footprint.c"
         write_own(source, text)
         c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-        return _measured(target, c, [c / "gtc.c", c / f"gtc_{model.id}.c"], source)
-
-
-def _measured(target: Target, c_folder: Path, sources: list[Path], main: Path) -> Footprint:
-    objects = compile_objects(target, sources, main.parent, include=c_folder)
-    program = main.parent / "footprint"
-    link(target, [*objects, *compile_objects(target, [main], main.parent, include=c_folder)], program)
-    own = {symbol.name for symbol in symbols(target, *objects)}
-    linked = symbols(target, program)
-    state = next(symbol.size for symbol in linked if symbol.name == _STATE)
-    return Footprint(target.name, sum(symbol.size for symbol in linked if symbol.name in own), state)
+        runtime = runtime_object(target, c, work, fresh=trusted)
+        objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
+        link(target, [runtime.put(work / "gtc.o"), *objects], work / "footprint")
+        own = {symbol.name for symbol in (*runtime.symbols, *symbols(target, objects[1]))}
+        linked = symbols(target, work / "footprint")
+        state = next(symbol.size for symbol in linked if symbol.name == _STATE)
+        return Footprint(target.name, sum(symbol.size for symbol in linked if symbol.name in own), state)
 
 
 PUBLIC = (
@@ -154,22 +150,16 @@ def parse_graph(text: str) -> Graph:
     return graph
 
 
-def function_costs(target: Target, c_folder: Path, work: Path) -> dict[str, dict[str, FunctionCost]]:
+def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
     """Costs by arithmetic and public function; empty without a gcc that tells.
 
-    It leaves the runtime's object, with lines of its text, as `functions/gtc.o` in `work`.
-
     Raises:
-        CheckFailed: The compiler refused, or a stack has no bound.
+        CheckFailed: A stack has no bound.
     """
-    if not target.compiler.endswith("-gcc") or target.counts != "instructions":
+    if not runtime.graph:
         return {}
-    own = work / "functions"
-    own.mkdir()
-    told = target.model_copy(update={"flags": (*target.flags, "-g", "-fstack-usage", "-fcallgraph-info=su")})
-    objects = compile_objects(told, [c_folder / "gtc.c"], own, include=c_folder)
-    graph = parse_graph((own / "gtc.ci").read_text(encoding="utf-8", errors="replace"))
-    sizes = {s.name: s.size for s in symbols(target, *objects)}
+    graph = parse_graph(runtime.graph)
+    sizes = {s.name: s.size for s in runtime.symbols}
     return {
         n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)
     }

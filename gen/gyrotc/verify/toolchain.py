@@ -3,6 +3,9 @@
 What is compiled and run may be somebody else's. Every command runs in the folder of its work, with an environment of
 its own, limits of time, memory and file size, no core dumps, and all of its processes end with it.
 
+What is the same for every serial, the runtime above all, is compiled once: `shared_object` keeps objects and what was
+measured on them between calls.
+
 Bare-metal targets are linked with parts of `bare/`: start-up code, and the few functions of the C
 library that the test programs use. Their standard input is the file `stdin.bin` of the working folder.
 """
@@ -10,7 +13,10 @@ library that the test programs use. Their standard input is the file `stdin.bin`
 from __future__ import annotations
 
 import functools
+import hashlib
+import json
 import os
+import platform
 import re
 import shutil
 import signal
@@ -26,12 +32,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import read_toml
-from ..store.files import write_own
+from ..store import cache
+from ..store.files import canonical_json, digest_of, write_own
 from ..store.scratch import scratch_folder
 
 __all__ = [
     "C_FLAGS",
     "LIMIT_S",
+    "Object",
     "ProgramRun",
     "Symbol",
     "Target",
@@ -46,6 +54,8 @@ __all__ = [
     "load_target",
     "run_program",
     "run_to_end",
+    "runtime_object",
+    "shared_object",
     "symbols",
     "writable_bytes",
 ]
@@ -190,6 +200,10 @@ class Target(BaseModel):
         """Flags of the compiler, as results report them."""
         return (*C_FLAGS, *self.flags)
 
+    def compiling(self) -> Target:
+        """What of it the compiler sees: targets that are alike in this have the same objects."""
+        return Target(name=self.name, compiler=self.compiler, package="", flags=self.flags, bare=self.bare)
+
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
@@ -227,8 +241,7 @@ def compile_objects(
     Raises:
         CheckFailed: The compiler refused; the message holds its first lines.
     """
-    bare = [f"-I{_BARE}"] if target.bare else []
-    flags = [*target.all_flags, *(f"-D{d}" for d in defines), *bare, f"-I{include.absolute()}"]
+    flags = [*_flags(target, include), *(f"-D{d}" for d in defines)]
     objects = []
     for source in sources:
         objects.append(folder.absolute() / f"{source.stem}.o")
@@ -237,13 +250,155 @@ def compile_objects(
     return objects
 
 
+def _flags(target: Target, include: Path) -> list[str]:
+    bare = [f"-I{_BARE}"] if target.bare else []
+    return [*target.all_flags, *bare, f"-I{include.absolute()}"]
+
+
+@dataclass(frozen=True, slots=True)
+class Object:
+    """A compiled source that is the same for every serial, and what was measured on it.
+
+    Attributes:
+        name: Hash of what it was made of; empty where that cannot be told.
+        code: The file.
+        graph: Who calls whom, and the stack of each function, as gcc writes it; empty where it was not asked for.
+    """
+
+    name: str
+    code: bytes
+    symbols: tuple[Symbol, ...]
+    writable_bytes: int
+    graph: str
+
+    def put(self, path: Path) -> Path:
+        """Writes the file; returns its path."""
+        write_own(path, self.code)
+        return path
+
+
+_GRAPH = (
+    "-g",
+    "-fstack-usage",
+    "-fcallgraph-info=su",
+)  # debug information does not change code: gcc's manual, 3.10
+_made: dict[str, Object] = {}  # by name, of this process
+
+
+def runtime_object(target: Target, c_folder: Path, work: Path, *, fresh: bool = False) -> Object:
+    """The runtime, with lines of its text and its graph of calls where the compiler gives them; as `shared_object`."""
+    told = target.compiler.endswith("-gcc") and target.counts == "instructions"
+    flags = (*target.flags, *_GRAPH) if told else target.flags
+    return shared_object(
+        target.model_copy(update={"flags": flags}), c_folder / "gtc.c", work, include=c_folder, fresh=fresh
+    )
+
+
+def shared_object(target: Target, source: Path, work: Path, *, include: Path, fresh: bool = False) -> Object:
+    """Compiles a source, or takes what an earlier call made of the same text, headers, flags, compiler and gyrotc.
+
+    Args:
+        work: A folder for the compiler.
+        fresh: Compiles in any case: an assembler may read files that no text tells.
+
+    Raises:
+        CheckFailed: The compiler refused.
+    """
+    name = "" if fresh else _name_of(target, source, work, include)
+    found = _made.get(name) or (cache.kept(name, functools.partial(_object, name)) if name else None)
+    if found is None:
+        (path,) = compile_objects(target, [source], work, include=include)
+        graph = path.with_suffix(".ci")
+        found = Object(
+            name,
+            path.read_bytes(),
+            tuple(symbols(target, path)),
+            writable_bytes(target, path),
+            graph.read_text(encoding="utf-8", errors="replace") if graph.exists() else "",
+        )
+        if name:
+            cache.keep(name, _content(found))
+    if name:
+        _made[name] = found
+    return found
+
+
+def _content(found: Object) -> bytes:
+    """A line of JSON, then the file."""
+    rows = [[s.name, s.kind, s.size, s.address] for s in found.symbols]
+    told = {"symbols": rows, "writable_bytes": found.writable_bytes, "graph": found.graph}
+    return canonical_json(told) + b"\n" + found.code
+
+
+def _object(name: str, content: bytes) -> Object | None:
+    line, _, code = content.partition(b"\n")
+    told = json.loads(line)
+    rows = tuple(Symbol(*row) for row in told["symbols"])
+    sound = code and type(told["writable_bytes"]) is int and type(told["graph"]) is str
+    return Object(name, code, rows, told["writable_bytes"], told["graph"]) if sound else None
+
+
+def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
+    """Name under which the object of a source is kept; empty where the compiler or the processor cannot be told."""
+    compiler = _identity(target.compiler)
+    processor = _processor() if "-march=native" in target.flags else "any"
+    if not compiler or not processor:
+        return ""
+    command = [target.compiler, *_flags(target, include), "-E", str(source.absolute())]
+    text = _command(target, command, work)
+    places = (str(path.absolute()).encode() for path in (work, include, source.parent))
+    for place in sorted(places, key=len, reverse=True):  # in lines that say where the text stood
+        text = text.replace(place, b"")
+    flags = [*target.all_flags, len(target.bare)]
+    made_of = [cache.program_of(), compiler, processor, flags, hashlib.sha256(text).hexdigest()]
+    return f"{digest_of(made_of)}.object"
+
+
+@functools.cache
+def _identity(compiler: str) -> list[str]:
+    """What tells one installed compiler from another: its version, and the programs that it consists of."""
+    programs = (
+        [compiler] if "clang" in compiler else [compiler, _tool(compiler, "cc1"), _tool(compiler, "as")]
+    )
+    found = [compiler_version(compiler)]
+    for program in programs:
+        path = shutil.which(program)
+        if path is None:
+            return []
+        facts = Path(path).resolve().stat()
+        found.append(f"{Path(path).resolve()} {facts.st_size} {facts.st_mtime_ns}")
+    return found
+
+
+@functools.cache
+def _processor() -> str:
+    """What tells the code that `-march=native` makes here from that of another machine; empty: not known."""
+    with suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
+        told = re.findall(
+            r"^(?:model name|vendor_id|cpu family|model|flags|Features|CPU \w+)\s*:.*$", text, re.M
+        )
+        return digest_of([platform.machine(), *told]) if told else ""
+    return ""
+
+
+@functools.cache
+def _bare_objects(target: Target) -> tuple[tuple[str, Object], ...]:
+    """The parts of `bare/` that a target is linked with, by the names of their files."""
+    with scratch_folder() as work:
+        return tuple(
+            (f"{Path(name).stem}.o", shared_object(target, _BARE / name, work, include=_BARE))
+            for name in target.bare
+        )
+
+
 def link(target: Target, objects: Sequence[Path], program: Path) -> None:
     """Links objects, and the bare parts of the target, into a program.
 
     Raises:
         CheckFailed: The linker refused.
     """
-    parts = compile_objects(target, [_BARE / f for f in target.bare], program.parent, include=_BARE)
+    parts = [part.put(program.parent / name) for name, part in _bare_objects(target.compiling())]
     script = ["-T", str(_BARE / target.script)] if target.script else []
     files = [str(f.absolute()) for f in (*objects, *parts)]
     arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections"]
@@ -327,16 +482,25 @@ def compiler_version(compiler: str) -> str:
     return compiler
 
 
-def _command(target: Target, command: list[str], folder: Path) -> None:
+def _command(target: Target, command: list[str], folder: Path) -> bytes:
+    """Runs a compiler; what it prints."""
     done = run_to_end(command, folder, f"{target.name}: {target.compiler}")
     if done.returncode != 0:
         lines = "\n".join(done.stderr.splitlines()[:_SHOWN_LINES])
         raise CheckFailed(f"{target.name}: {target.compiler} failed:\n{lines}")
+    return done.stdout
+
+
+def _links(target: Target) -> bool:
+    """Whether an empty program can be built: a compiler may lack the C library of the target."""
+    if target.bare:  # its parts are linked in, whose objects are those that will be needed
+        return _links_empty(target)
+    flags = tuple(f for f in target.flags if not f.startswith("-O") and f != "-march=native")
+    return _links_empty(target.model_copy(update={"name": target.compiler, "flags": flags, "default": False}))
 
 
 @functools.cache
-def _links(target: Target) -> bool:
-    """Whether an empty program can be built: a compiler may lack the C library of the target."""
+def _links_empty(target: Target) -> bool:
     with scratch_folder() as work:
         source = work / "empty.c"
         write_own(source, "int main(void)\n{\n    return 0;\n}\n")

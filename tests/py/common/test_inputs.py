@@ -310,7 +310,7 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         b"x",
         whole[:-1],
         content,
-        kept._packed(content),
+        kept._packed(path.name, content),
     ):
         path.write_bytes(foreign)
         assert kept.kept(path.name, signature_bank._bank) is None

@@ -145,15 +145,18 @@ def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, co
     diagnosis.diagnosed(recordings)
     [path] = cache.folder().glob("*.diagnosis")
     whole = path.read_bytes()
-    content = json.loads(whole[len(cache._packed(b"")) :])
+    content = json.loads(whole[len(cache._packed("", b"")) :])
     for damaged in (
         b"",
         whole[:-1],
         whole[:100] + b"0" + whole[101:],
-        cache._packed(b"[]"),
-        cache._packed(json.dumps(content | {"files": {"../report.html": ""}}).encode()),
-        cache._packed(json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
-        cache._packed(json.dumps(content | {"result": {}}).encode()),
+        cache._packed("0" * 64 + ".diagnosis", whole[len(cache._packed("", b"")) :]),  # of another name
+        cache._packed(path.name, b"[]"),
+        cache._packed(path.name, json.dumps(content | {"files": {"../report.html": ""}}).encode()),
+        cache._packed(
+            path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()
+        ),
+        cache._packed(path.name, json.dumps(content | {"result": {}}).encode()),
     ):
         path.write_bytes(damaged)
         before = counted.count

@@ -15,7 +15,7 @@ from gyrotc.verify import board
 from gyrotc.verify.bounds import Paths, Program
 from gyrotc.verify.flow import Counts, LoopText, parse_flows
 from gyrotc.verify.sizes import PUBLIC
-from gyrotc.verify.toolchain import all_targets
+from gyrotc.verify.toolchain import Object, all_targets
 
 sys.path.insert(0, str(ROOT))
 
@@ -154,4 +154,6 @@ def test_a_target_whose_code_has_no_bound_is_verified_without_one(
     monkeypatch.setattr(board, "function_costs", lambda *_: {"f32": {"map": cost}})
     monkeypatch.setattr(board, "instruction_bounds", refuse)
     job = SimpleNamespace(tables={}, model=SimpleNamespace(symbol="a"))
-    assert board._functions(job, all_targets()["cortex-m4f"], tmp_path, tmp_path) == {"f32": {"map": cost}}
+    runtime = Object("", b"", (), 0, "")
+    found = board._functions(job, all_targets()["cortex-m4f"], tmp_path, tmp_path, runtime)
+    assert found == {"f32": {"map": cost}}

@@ -10,7 +10,7 @@ from conftest import ROOT
 from emitted import emitted, measured
 from gyrotc.common.errors import CheckFailed
 from gyrotc.verify.sizes import PUBLIC, function_costs, parse_graph
-from gyrotc.verify.toolchain import all_targets
+from gyrotc.verify.toolchain import all_targets, runtime_object
 
 GRAPH = """
 node: { title: "gtc.c:gtc_f32_map" label: "gtc_f32_map\\ngtc.c:1:1\\n16 bytes (static)" }
@@ -67,7 +67,7 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
     folder = emitted(tmp_path / "model")
-    costs = function_costs(target, folder / "c", tmp_path)
+    costs = function_costs(runtime_object(target, folder / "c", tmp_path))
     for numeric in ("f32", "q31"):
         found = costs[numeric]
         assert list(found) == list(PUBLIC)
