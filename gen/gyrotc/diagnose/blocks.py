@@ -31,7 +31,7 @@ class Record:
     Attributes:
         name: Name of the run in messages and tables.
         history: The whole record at its native rate.
-        rate_dph: Measured rate, deg/h, shape (n,).
+        rate_dph: Measured rate less the mean of all runs, deg/h, shape (n,); 0 where it does not count.
         usable: Rows in the run's span, outside its exclusions, with a finite rate, shape (n,).
         environment: Environment as the data set names it.
         channels: Auxiliary channels by name, shape (n,) each.
@@ -173,6 +173,9 @@ _MAX_BLOCKS = 5000  # above it longer
 def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float) -> Records:
     """Records of all runs of one role.
 
+    The mean rate is taken off: the static map leaves out weak directions, and with them a trace of any constant, which
+    beside a large one (Earth's rate) would look like an effect.
+
     Blocks are `average_s` long, shorter down to `block_s` where the recordings are short.
 
     Raises:
@@ -188,9 +191,12 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
         if run.started is not None and first is not None:
             day = (run.started - first).total_seconds() / 86400.0
         found.append(_record(run, dataset.channels, k, len(runs), day, block_s))
-    if sum(int(r.usable.sum()) for r in found) == 0:
+    count = sum(int(r.usable.sum()) for r in found)
+    if count == 0:
         raise InputError(str(dataset.folder), "no usable row", "rows with a temperature and a rate")
-    return Records(tuple(found), block_length(found, block_s, average_s))
+    mean_dph = sum(float(r.rate_dph.sum()) for r in found) / count
+    centred = [replace(r, rate_dph=np.where(r.usable, r.rate_dph - mean_dph, 0.0)) for r in found]
+    return Records(tuple(centred), block_length(found, block_s, average_s))
 
 
 def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> float:

@@ -167,12 +167,18 @@ class Run:
 
 
 def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """Runs of one role with spans of one file that touch as one, in order of file and time.
+    """Runs of one role with spans of one file that touch as one, in order of file and time; copies of a run once.
 
-    So neither the order of runs in a description nor where a recording is cut changes what is learnt.
+    So neither the order of runs in a description, nor where a recording is cut, nor how often it was handed over changes
+    what is learnt.
     """
     found: list[Run] = []
+    known: set[tuple[object, ...]] = set()
     for run in sorted(runs, key=lambda run: (run.file, -np.inf if run.from_s is None else run.from_s)):
+        same = (run.sha256, run.role, run.from_s, run.to_s, run.exclude)
+        if same in known:
+            continue
+        known.add(same)
         last = found[-1] if found else None
         if (
             last is not None

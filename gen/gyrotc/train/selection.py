@@ -60,7 +60,7 @@ YARDSTICKS = ("constant", "cubic", "cubic_slope")
 """What anyone would fit: least squares on few columns, the commonest corrections of such gyros."""
 _EQUAL = 0.01  # of a score, so 1 % of RMS: half of what "no worse than trivial" allows (docs/real.md)
 _LEAST_PIECES = 3  # runs or power-ons: with fewer their scatter says nothing
-_LEAST_NOISE = 1e-6  # of the largest mean: rates without any noise differ by rounding only
+_LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ by rounding only
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +219,7 @@ def climb(
     folds = history_folds(means, groups) if folds is None else folds
     judged = average(means, average_s)
     noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
-    noise = max(
-        noise, _LEAST_NOISE * float(np.abs(judged.bias_dph).max()), float(np.finfo(np.float64).tiny) ** 0.5
-    )
+    noise = max(noise, _LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
     square = np.array([_squares(fold, means, kept, scaling, process, average_s) for fold in folds])
     square = square.reshape(len(folds), len(RUNGS))
     return Ladder(folds, np.sqrt(square), 0.5 * np.log(square + noise**2), noise, pieces_of(folds))

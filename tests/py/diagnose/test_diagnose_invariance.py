@@ -21,6 +21,7 @@ from gyrotc.diagnose.pipeline import Analysis, analyse
 from gyrotc.diagnose.search import open_search
 from gyrotc.diagnose.summary import verdict_of
 from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset, Run, joined_runs
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
@@ -124,6 +125,41 @@ def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[st
     )
 
 
+def answer_of(dataset: Dataset) -> Answer:
+    runs = replace(dataset, runs=joined_runs(dataset.runs))
+    return answer(records_of(runs, "train", block_s=10.0, average_s=100.0), declared_noise(runs))
+
+
+@pytest.mark.parametrize("constant_dph", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
+def test_a_constant_in_the_rate_changes_nothing(made: Callable[[str], Case], constant_dph: float) -> None:
+    """Earth's rate that was left in, a hundred times the effect and more."""
+    case = made("hysteresis")
+    dataset = load(case.folder)
+
+    def shifted(run: Run) -> Run:
+        rows = run.rows()
+        return replace(run, reader=lambda: replace(rows, rate_dph=rows.rate_dph + constant_dph))
+
+    same_answer(answer_of(replace(dataset, runs=tuple(shifted(run) for run in dataset.runs))), case)
+
+
+@pytest.mark.slow
+def test_a_run_that_was_handed_over_twice_counts_once(made: Callable[[str], Case]) -> None:
+    case = made("hysteresis")
+    dataset = load(case.folder)
+    copies = tuple(replace(run, file=f"copy-{run.file}") for run in dataset.runs)
+    same_answer(answer_of(replace(dataset, runs=(*dataset.runs, *copies))), case)
+
+
+def same_answer(found: Answer, case: Case) -> None:
+    """Verdict, causes and parameters, these to within a thousandth."""
+    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
+    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
+    assert {n: p.value for n, p in now.items()} == pytest.approx(
+        {n: p.value for n, p in was.items()}, rel=1e-3
+    )
+
+
 @pytest.mark.slow
 def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) -> None:
     case = made("hysteresis")
@@ -138,10 +174,7 @@ def test_the_order_of_the_runs_does_not_matter(made: Callable[[str], Case]) -> N
     order = np.random.default_rng(3).permutation(len(case.records.runs))
     runs = [case.records.runs[k] for k in order]
     turned = [replace(r, history=replace(r.history, run=k)) for k, r in enumerate(runs)]
-    found = answer(Records(tuple(turned), case.records.block_s), case.declared)
-    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
-    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
-    assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-3)
+    same_answer(answer(Records(tuple(turned), case.records.block_s), case.declared), case)
 
 
 def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
