@@ -1,31 +1,20 @@
-"""`python -m bench docs [--only PART]`: figures into docs/results/, sections of docs/results.md."""
+"""`python -m bench docs [--only PART]`: figures into docs/results/summary.json, sections of docs/results.md."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import platform
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+
+from results import machine, recorded, write
 
 _PACKAGES = ("gyrotc", "numpy", "scipy", "scikit-learn", "fastcan", "sysidentpy", "minisom")
 
 
 def _machine() -> str:
-    """Processor, system and Python."""
-    info = Path("/proc/cpuinfo")
-    names = (
-        [
-            line.split(":", 1)[1].strip()
-            for line in info.read_text().splitlines()
-            if line.startswith("model name")
-        ]
-        if info.exists()
-        else []
-    )
-    return f"{names[0] if names else platform.processor()}, {platform.system()}, Python {platform.python_version()}"
+    return f"{machine()}, Python {platform.python_version()}"
 
 
 def _say(text: str) -> None:
@@ -36,6 +25,7 @@ def _training(docs: Path) -> None:
     """Training beside its peers, which the environment of `make bench` has."""
     from .accuracy import accuracy
     from .invariance import invariance
+    from .page import section
     from .speed import speed
 
     result = {
@@ -46,40 +36,29 @@ def _training(docs: Path) -> None:
         "accuracy": accuracy(_say),
         "invariance": invariance(_say),
     }
-    _write_training(docs, result)
+    write(docs, "bench", result, section)
 
 
 def _raw(docs: Path) -> None:
     """The job on raw recordings alone, which has no peer; the other figures of training stay."""
+    from .page import section
     from .speed import raw
 
-    result = json.loads((docs / "results" / "bench.json").read_text("utf-8"))
+    result = recorded(docs, "bench")
     result["speed"]["raw"] = raw(_say)
-    _write_training(docs, result)
-
-
-def _write_training(docs: Path, result: dict[str, Any]) -> None:
-    from .page import filled
-
-    (docs / "results").mkdir(exist_ok=True)
-    (docs / "results" / "bench.json").write_text(
-        json.dumps(result, indent=1, ensure_ascii=False) + "\n", "utf-8"
-    )
-    page = docs / "results.md"
-    page.write_text(filled(page.read_text("utf-8") if page.exists() else None, result), "utf-8")
+    write(docs, "bench", result, section)
 
 
 def _runtime(docs: Path) -> None:
     """The C runtime, in emulators."""
     from .runtime import runtime
-    from .runtime_page import section, write
+    from .runtime_page import section
 
     write(docs, "runtime", runtime(_say), section)
 
 
 def _sigma(docs: Path) -> None:
     """Whether the uncertainty of corrections holds, on simulated gyros."""
-    from .runtime_page import write
     from .sigma import coverage
     from .sigma_cost import cost
     from .sigma_page import section
@@ -91,7 +70,6 @@ def _bounds(docs: Path) -> None:
     """Static bounds on instructions, beside what an emulator counts."""
     from .bounds import bounds
     from .bounds_page import section
-    from .runtime_page import write
 
     write(docs, "bounds", {"rows": bounds()}, section)
 

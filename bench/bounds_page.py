@@ -1,12 +1,8 @@
-"""The section `bounds` of docs/results.md, from docs/results/bounds.json."""
+"""The section `bounds` of docs/results.md."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
 
 from results import table
 

@@ -149,7 +149,6 @@ def section(result: dict[str, Any]) -> str:
 
 def main(arguments: list[str]) -> int:
     """Status 1 where U does not hold 93 to 97 % together."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
     from results import write
 
     units = int(arguments[1]) if len(arguments) > 1 else UNITS

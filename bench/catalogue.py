@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 from gyrotc.fleet.catalogue import SCHEMA, catalogued
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
 from results import write
 
 __all__ = ["section", "times"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import re
 import resource
 import subprocess
@@ -18,6 +17,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
+
+from results import machine, write
 
 __all__ = ["fleet_figures", "section"]
 
@@ -38,7 +39,6 @@ _ROW = (
     "| {elapsed_s:.1f} s | {cpu_s:.1f} s | {per_process_s:.1f} s | {each_ms:.0f} ms | {failed} "
     "| {median:.4f} / {worst:.4f} | {load:.1f} |"
 )
-_MARKS = re.compile(r"(<!-- fleet -->\n).*?(<!-- /fleet -->)", re.DOTALL)
 
 
 def fleet_figures(serials: int) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def fleet_figures(serials: int) -> dict[str, Any]:
     ratio = summary["figures"]["rms_over_floor"]
     return {
         "schema": "gyrotc.bench-fleet/1",
-        "machine": _machine(),
+        "machine": machine(),
         "serials": serials,
         "jobs": _JOBS,
         "exit_status": done.returncode,
@@ -95,12 +95,6 @@ def _cpu_s() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _machine() -> str:
-    info = Path("/proc/cpuinfo")
-    names = re.findall(r"^model name\s*: (.+)$", info.read_text(), re.MULTILINE) if info.exists() else []
-    return f"{names[0] if names else platform.processor()}, {max(len(names), 1)} threads, {platform.system()}"
-
-
 def section(figures: dict[str, Any]) -> str:
     """The section of docs/results.md as text."""
     row = _ROW.format(
@@ -113,21 +107,13 @@ def section(figures: dict[str, Any]) -> str:
     return _SECTION.format(**figures, row=row)
 
 
-def filled(page: str, figures: dict[str, Any]) -> str:
-    """The page with the section between its marks replaced, or added at its end."""
-    text = page if _MARKS.search(page) else f"{page.rstrip()}\n\n<!-- fleet -->\n<!-- /fleet -->\n"
-    return _MARKS.sub(lambda found: found[1] + section(figures) + found[2], text)
-
-
 def main(docs: Path, serials: int) -> None:
     figures = fleet_figures(serials)
     print(json.dumps(figures, indent=1), file=sys.stderr)
     print(f"{1e3 * figures['cpu_s'] / serials:.0f} ms of processor time a serial", file=sys.stderr)
     if figures["exit_status"]:
         sys.exit("a serial failed: nothing written")
-    (docs / "results" / "fleet.json").write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
-    page = docs / "results.md"
-    page.write_text(filled(page.read_text("utf-8"), figures), "utf-8")
+    write(docs, "fleet", figures, section)
 
 
 if __name__ == "__main__":

@@ -6,10 +6,7 @@ process of its own; CPU time, elapsed time and peak memory are those of that pro
 
 from __future__ import annotations
 
-import json
 import os
-import platform
-import re
 import subprocess
 import sys
 import tempfile
@@ -22,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 from numpy.typing import NDArray
+from results import machine, write
 
 __all__ = ["import_figures", "section"]
 
@@ -39,7 +37,6 @@ units, and hashes the file; it reads a block at a time on one processor. The loa
 
 Load {load:.1f}; {versions}.
 """
-_MARKS = re.compile(r"(<!-- import -->\n).*?(<!-- /import -->)", re.DOTALL)
 _PEERS = {
     "pandas": (
         "import sys, pandas as pd\n"
@@ -90,7 +87,7 @@ def import_figures(megabytes: float) -> dict[str, Any]:
     packages = ("gyrotc", "pandas", "polars", "pyarrow")
     return {
         "schema": "gyrotc.bench-import/1",
-        "machine": _machine(),
+        "machine": machine(),
         "bytes": size,
         "rows": rows,
         "load": load,
@@ -133,12 +130,6 @@ def _measured(command: list[str]) -> dict[str, Any]:
     return {"elapsed_s": elapsed, "cpu_s": used.ru_utime + used.ru_stime, "peak_mib": used.ru_maxrss / 1024.0}
 
 
-def _machine() -> str:
-    info = Path("/proc/cpuinfo")
-    names = re.findall(r"^model name\s*: (.+)$", info.read_text(), re.MULTILINE) if info.exists() else []
-    return f"{names[0] if names else platform.processor()}, {max(len(names), 1)} threads, {platform.system()}"
-
-
 def section(figures: dict[str, Any]) -> str:
     """The section of docs/results.md as text."""
     table = "\n".join(_row(name, one) for name, one in figures["readers"].items())
@@ -162,13 +153,7 @@ def _row(name: str, one: dict[str, Any]) -> str:
 def main() -> None:
     docs, size = Path(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else _MEGABYTES
     figures = import_figures(size)
-    (docs / "results").mkdir(exist_ok=True)
-    (docs / "results" / "import.json").write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
-    page = docs / "results.md"
-    text = page.read_text("utf-8") if page.exists() else "# Results\n"
-    if not _MARKS.search(text):
-        text = text.rstrip() + "\n\n<!-- import -->\n<!-- /import -->\n"
-    page.write_text(_MARKS.sub(lambda m: m[1] + section(figures) + m[2], text), "utf-8")
+    write(docs, "import", figures, section)
     print(section(figures))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import tempfile
 import time
@@ -12,11 +11,10 @@ from typing import Any
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.page import summary_of
 from gyrotc.fleet.run import run_fleet
+from lot import FAULTS, Lot
+from results import write
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "py"))
-
-from lot import FAULTS, Lot  # noqa: E402
 
 __all__ = ["planted_lots", "section"]
 
@@ -32,7 +30,6 @@ that the fault concerns has its reason. Healthy gyros accused: {accused} of {hea
 | --- | --- |
 {rows}
 """
-_MARKS = re.compile(r"(<!-- lot -->\n).*?(<!-- /lot -->)", re.DOTALL)
 
 
 def planted_lots(draws: int, seed: int) -> dict[str, Any]:
@@ -83,16 +80,11 @@ def section(figures: dict[str, Any]) -> str:
 
 def main(arguments: list[str]) -> int:
     """Status 1 where a fault was named in under seven of eight draws, or more than one healthy gyro was accused."""
-    docs = ROOT / arguments[0] / "results.md"
     draws, seed = (int(a) for a in (*arguments[1:], *map(str, (_DRAWS, _SEED)[len(arguments) - 1 :])))
     figures = planted_lots(draws, seed)
-    text = section(figures)
-    print(text)
+    print(section(figures))
     if draws == _DRAWS:
-        old = docs.read_text("utf-8")
-        block = f"<!-- lot -->\n{text}<!-- /lot -->"
-        new = _MARKS.sub(lambda _: block, old) if _MARKS.search(old) else f"{old.rstrip()}\n\n{block}\n"
-        docs.write_text(new, "utf-8")
+        write(ROOT / arguments[0], "lot", figures, section)
     return int(min(figures["named"].values()) < 7 * draws / 8 or figures["accused"] > 1)
 
 

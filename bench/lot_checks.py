@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gyrotc.train.means import UnitMeans
-from gyrotc.lot.earlier import posterior_of_means, stated_sigma_dph, widened
-from gyrotc.lot.earlier import held
-from gyrotc.lot.learn import sums_of
-from gyrotc.lot.learn import FALSE_ALARM
+from gyrotc.lot.earlier import held, posterior_of_means, stated_sigma_dph, widened
+from gyrotc.lot.learn import FALSE_ALARM, sums_of
 from gyrotc.lot.use import LotPrior
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
-from gyrotc.train.means import unit_means
 from gyrotc.train.evidence import fit_process
+from gyrotc.train.means import UnitMeans, unit_means
 from gyrotc.train.methods import fit
 from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray

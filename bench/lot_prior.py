@@ -4,12 +4,11 @@ Lots are simulated from physics (`gyrotc.simulate.lot`); 60 fully calibrated uni
 a single run of 2.5 h (0 C → 60 C, two hours there, → −40 C at 5 C/min), the first of them from longer programmes, too.
 Judged on the full exam of six environments: RMS over the floor of the noise that was really added, and the map's own
 error, RMS of (map − truth), over the same. Nothing is tuned on these lots: without a SEED a new one is drawn, and
-every draw stays in `docs/results/`.
+every draw stays on the page.
 """
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import secrets
 import sys
@@ -238,26 +237,15 @@ def _one(job: tuple[Case, int]) -> dict[str, Any]:
     return measured(*job)
 
 
-def _compact(cases: list[dict[str, Any]]) -> str:
-    """A line for each unit, figures in five digits."""
-    rounded = json.loads(json.dumps(cases), parse_float=lambda text: float(f"{float(text):.5g}"))
-    parts = []
-    for case in rounded:
-        units = ",\n  ".join(json.dumps(unit) for unit in case.pop("units"))
-        parts.append(json.dumps(case)[:-1] + f', "units": [\n  {units}\n ]}}')
-    return "[\n " + ",\n ".join(parts) + "\n]\n"
-
-
 def main(arguments: list[str]) -> int:
-    from .lot_prior_page import write_page
+    from .lot_prior_page import quoted, write_page
 
     docs = ROOT / arguments[0]
     seed = int(arguments[1]) if len(arguments) > 1 else secrets.randbelow(9000) + 1000
     print(f"seed {seed}", flush=True)
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         cases = pool.map(_one, [(case, seed) for case in CASES], chunksize=1)
-    (docs / "results" / f"lot-prior-{seed}.json").write_text(_compact(cases), "utf-8")
-    print(write_page(docs))
+    write_page(docs, {"draws": {str(seed): [quoted(case) for case in cases]}})
     return 0
 
 

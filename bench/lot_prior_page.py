@@ -1,18 +1,16 @@
-"""The section of docs/results.md about lots, from every draw in docs/results/lot-prior-*.json."""
+"""The section of docs/results.md about lots, of every draw."""
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from results import recorded, write
 
-__all__ = ["section", "write_page"]
+__all__ = ["quoted", "section", "write_page"]
 
-_MARKS = re.compile(r"<!-- lot-prior -->\n.*?<!-- /lot-prior -->", re.DOTALL)
 _WAYS = {
     "lot": "**with the lot**",
     "auto": "without: the ladder (`build`)",
@@ -42,79 +40,96 @@ _STRANGERS = " ".join(
 )
 
 
-def _pair(values: Sequence[float], digits: int) -> str:
-    return f"{np.median(values):.{digits}f} / {np.max(values):.{digits}f}"
+def quoted(case: dict[str, Any]) -> dict[str, Any]:
+    """What the page says of a lot, from what was found for each of its units."""
+    units = case["units"]
+    short = [u["2.5 h"] for u in units]
+    longer = [name for name in ("8 h", "six runs") if any(name in u for u in units)]
+    told = {name: case[name] for name in ("case", "family", "told", "learnt_s", "strangers_refused")}
+    return told | {
+        "best_power": case.get("best_power"),
+        "ways": {way: found for way in _WAYS if (found := _spread([row[way] for row in short if way in row]))},
+        "better": float(np.mean([row["lot"][0] <= row["auto"][0] for row in short])),
+        "coverage": np.mean([row["coverage"] for row in short], axis=0).tolist(),
+        "refused": float(np.mean([not row["accepted"] for row in short])),
+        "longer": {name: _medians([u[name] for u in units if name in u]) for name in longer},
+        "recalibration": _checked(case["recalibration"]) if case.get("recalibration") else None,
+    }
 
 
-def _ways(units: Sequence[dict[str, Any]], name: str) -> str:
-    rows = [u[name] for u in units if name in u]
-    lines = ["| way | RMS ÷ floor | error |", "| --- | --- | --- |"]
-    for way, text in _WAYS.items():
-        if found := [row[way] for row in rows if way in row]:
-            ratio, error = zip(*found, strict=True)
-            lines.append(f"| {text} | {_pair(ratio, 3)} | {_pair(error, 2)} |")
-    return "\n".join(lines)
+def _spread(found: Sequence[Sequence[float]]) -> list[float]:
+    """Median and worst of RMS ÷ floor and of the error."""
+    return [float(f(column)) for column in zip(*found, strict=True) for f in (np.median, np.max)]
 
 
-def _longer(units: Sequence[dict[str, Any]]) -> str:
-    told = []
-    for name in ("8 h", "six runs"):
-        rows = [u[name] for u in units if name in u]
-        (with_lot, its), (alone, other) = (
-            np.median([row[w] for row in rows], axis=0) for w in ("lot", "mrbf")
-        )
-        told.append(f"{name}: {with_lot:.3f} ({its:.2f}) with the lot, {alone:.3f} ({other:.2f}) without")
-    return f"Longer programmes, {len(rows)} units, medians of RMS ÷ floor (error): {'; '.join(told)}."
+def _medians(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    return {"units": len(rows)} | {
+        way: np.median([row[way] for row in rows], axis=0).tolist() for way in ("lot", "mrbf")
+    }
+
+
+def _checked(checked: dict[str, Any]) -> dict[str, Any]:
+    """Of check runs of 2.5 h against earlier models of five runs."""
+    p = np.array(checked["unchanged"])
+    return {
+        "units": len(p),
+        "told": [float(np.mean(p < level)) for level in (0.01, 0.05)],
+        "named": {
+            kind: [float(np.mean(row[key])) for key in ("seen", "right")]
+            for kind, row in checked["named"].items()
+        },
+    }
 
 
 def _case(case: dict[str, Any]) -> str:
-    units = case["units"]
-    short = [u["2.5 h"] for u in units]
-    coverage = np.mean([row["coverage"] for row in short], axis=0)
-    better = np.mean([row["lot"][0] <= row["auto"][0] for row in short])
-    accused = np.mean([not row["accepted"] for row in short])
+    rows = [
+        f"| {_WAYS[way]} | {rms:.3f} / {worst:.3f} | {error:.2f} / {most:.2f} |"
+        for way, (rms, worst, error, most) in case["ways"].items()
+    ]
+    longer = [
+        f"{name}: {row['lot'][0]:.3f} ({row['lot'][1]:.2f}) with the lot, {row['mrbf'][0]:.3f} "
+        f"({row['mrbf'][1]:.2f}) without"
+        for name, row in case["longer"].items()
+    ]
+    units = next(iter(case["longer"].values()))["units"]
     lines = [
         f"#### {case['case'][0].upper()}{case['case'][1:]} (family {case['family']:g})",
         "",
         f"`gyrotc lot`: {case['told']}. {case['learnt_s']:.1f} s of processor time.",
         "",
-        _ways(units, "2.5 h"),
+        "| way | RMS ÷ floor | error |",
+        "| --- | --- | --- |",
+        *rows,
         "",
-        f"Better with the lot than with the ladder alone: {better:.0%} of units. The truth lies within 1 / 1.96 sigma "
-        f"of the table at {coverage[0]:.1%} / {coverage[1]:.1%} of the exam. Own units refused: {accused:.1%}.",
-        _longer(units),
+        f"Better with the lot than with the ladder alone: {case['better']:.0%} of units. The truth lies within 1 / 1.96 "
+        f"sigma of the table at {case['coverage'][0]:.1%} / {case['coverage'][1]:.1%} of the exam. Own units refused: "
+        f"{case['refused']:.1%}.",
+        f"Longer programmes, {units} units, medians of RMS ÷ floor (error): {'; '.join(longer)}.",
     ]
     if refused := case["strangers_refused"]:
         told = ", ".join(f"{share:.1%} from {name}" for name, share in refused.items())
-        most = case.get("best_power")
+        most = case["best_power"]
         beside = f" A test that knew each stranger's map would refuse {most:.1%} from 2.5 h." if most else ""
         lines.append(f"Strangers (another lot's units) refused: {told}.{beside}")
-    if checked := case.get("recalibration"):
-        lines += ["", _recalibration(checked)]
+    if case["recalibration"]:
+        lines += ["", _recalibration(case["recalibration"])]
     return "\n".join(lines)
 
 
 def _recalibration(checked: dict[str, Any]) -> str:
-    """Of check runs of 2.5 h against earlier models of five runs."""
-    p = np.array(checked["unchanged"])
     named = ", ".join(
-        f"{kind} seen {np.mean(row['seen']):.0%}, named right {np.mean(row['right']):.0%}"
-        for kind, row in checked["named"].items()
+        f"{kind} seen {seen:.0%}, named right {right:.0%}" for kind, (seen, right) in checked["named"].items()
     )
     return (
-        f"Recalibration: a check run of 2.5 h against the model of the five runs before it, {len(p)} units. Not changed: "
-        f"{np.mean(p < 0.01):.1%} told to have changed at 1 %, {np.mean(p < 0.05):.1%} at 5 %. Planted changes (offset "
-        f"of one sigma of 50-s means, slope of two over 100 C, a bump of three with 6 C): {named}."
+        f"Recalibration: a check run of 2.5 h against the model of the five runs before it, {checked['units']} units. "
+        f"Not changed: {checked['told'][0]:.1%} told to have changed at 1 %, {checked['told'][1]:.1%} at 5 %. Planted "
+        f"changes (offset of one sigma of 50-s means, slope of two over 100 C, a bump of three with 6 C): {named}."
     )
 
 
 def _coverage(draws: dict[str, list[dict[str, Any]]]) -> str:
     """Over all draws; units of a lot share how well it is known, so lots count, not units."""
-    lots = [
-        np.mean([u["2.5 h"]["coverage"] for u in case["units"]], axis=0)
-        for cases in draws.values()
-        for case in cases
-    ]
+    lots = [case["coverage"] for cases in draws.values() for case in cases]
     mean, error = np.mean(lots, axis=0), np.std(lots, axis=0, ddof=1) / np.sqrt(len(lots))
     return (
         f"Over all {len(lots)} lots of all draws the truth lies within 1 / 1.96 sigma of the table at {mean[0]:.1%} ± "
@@ -124,28 +139,21 @@ def _coverage(draws: dict[str, list[dict[str, Any]]]) -> str:
     )
 
 
-def _speed(docs: Path) -> str:
-    file = docs / "results" / "lot-speed.json"
-    if not file.is_file():
-        return ""
+def _speed(rows: Sequence[dict[str, Any]]) -> str:
     lines = ["### Learning from 50 to 400 units (`python -m bench.lot_speed docs`)", ""]
     lines += [
         "| units | processor time, s | memory, MiB | clusters, directions |",
         "| --- | --- | --- | --- |",
     ]
-    for row in json.loads(file.read_text("utf-8")):
+    for row in rows:
         lines.append(
             f"| {row['units']} | {row['cpu_s']:.1f} | {row['memory_mib']:.0f} | {row['clusters']}, {row['directions']} |"
         )
     return "\n".join(lines) + "\n"
 
 
-def _strangers(docs: Path) -> str:
+def _strangers(rows: Sequence[dict[str, Any]]) -> str:
     """Of each draw, and over all: a unit is a trial, draws differ in how many of them agree with the lot."""
-    file = docs / "results" / "lot-strangers.json"
-    if not file.is_file():
-        return ""
-    rows = json.loads(file.read_text("utf-8"))
     names = ("refused", "ratio_refused", "map_refused", "accused", "ratio_accused")
     lines = [
         "### What a run of 2.5 h can show of a stranger (`python -m bench.lot_strangers docs`)",
@@ -164,22 +172,20 @@ def _strangers(docs: Path) -> str:
     return "\n".join([*lines, "| mean ± one standard error | " + " | ".join(told) + " |"]) + "\n\n"
 
 
-def section(draws: dict[str, list[dict[str, Any]]]) -> str:
-    """The section, a part for each draw."""
+def section(record: dict[str, Any]) -> str:
+    """The section: every draw, what a run shows of a stranger, and what learning costs."""
+    draws = record["draws"]
     parts = [_HEAD, _coverage(draws)]
     for seed, cases in draws.items():
         parts.append(f"### Seed {seed}\n\n" + "\n\n".join(_case(case) for case in cases) + "\n")
-    return "\n".join(parts)
+    strangers, speed = record.get("strangers"), record.get("speed")
+    return (
+        "\n".join(parts) + (_strangers(strangers) if strangers else "") + (_speed(speed) if speed else "")
+    )
 
 
-def write_page(docs: Path) -> str:
-    """Writes the section into docs/results.md; returns it."""
-    files = sorted((docs / "results").glob("lot-prior-*.json"))
-    text = section({file.stem.rpartition("-")[2]: json.loads(file.read_text("utf-8")) for file in files})
-    text += _strangers(docs) + _speed(docs)
-    page = docs / "results.md"
-    old = page.read_text("utf-8")
-    block = f"<!-- lot-prior -->\n{text}<!-- /lot-prior -->"
-    new = _MARKS.sub(lambda _: block, old) if _MARKS.search(old) else f"{old.rstrip()}\n\n{block}\n"
-    page.write_text(new, "utf-8")
-    return text
+def write_page(docs: Path, part: dict[str, Any]) -> None:
+    """Adds a draw, or replaces what is known of strangers or of speed, and makes the section anew."""
+    record = recorded(docs, "lot-prior") or {"draws": {}}
+    draws = dict(sorted({**record["draws"], **part.pop("draws", {})}.items()))
+    write(docs, "lot-prior", record | part | {"draws": draws}, section)

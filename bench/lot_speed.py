@@ -7,7 +7,6 @@ memory is what it needs.
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import resource
 import sys
@@ -52,8 +51,7 @@ def main(arguments: list[str]) -> int:
         with multiprocessing.get_context("spawn").Pool(1) as pool:
             found.append(pool.map(_measured, [units[:n]])[0])
         print(found[-1], flush=True)
-    (docs / "results" / "lot-speed.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-    write_page(docs)
+    write_page(docs, {"speed": found})
     return 0
 
 

@@ -10,7 +10,6 @@ Without seeds four new ones are drawn.
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import secrets
 import sys
@@ -19,16 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.train.means import UnitMeans
-from gyrotc.lot.learn import sums_of
-from gyrotc.lot.learn import UnitSums
-from gyrotc.lot.learn import FALSE_ALARM
+from gyrotc.lot.learn import FALSE_ALARM, UnitSums, sums_of
 from gyrotc.lot.use import LotPrior
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import draw_lot
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import cleaned, scaling_of
-from gyrotc.train.means import unit_means
+from gyrotc.train.means import UnitMeans, unit_means
 from numpy.typing import NDArray
 
 from .lot_checks import best_power, seen
@@ -148,8 +144,7 @@ def main(arguments: list[str]) -> int:
     found = [figures(draw, draws) for draw in draws]
     for row in found:
         print(row)
-    (docs / "results" / "lot-strangers.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-    write_page(docs)
+    write_page(docs, {"strangers": found})
     return 0
 
 

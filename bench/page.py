@@ -1,23 +1,14 @@
-"""docs/results.md from docs/results/bench.json: the section between its marks, written whole."""
+"""The section `bench` of docs/results.md: training beside its peers."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from .aims import AIMS
 
-__all__ = ["filled", "section"]
+__all__ = ["section"]
 
-_MARKS = re.compile(r"(<!-- bench -->\n).*?(<!-- /bench -->)", re.DOTALL)
-_EMPTY = """# Results
-
-Figures that programs wrote; nobody edits them by hand.
-
-<!-- bench -->
-<!-- /bench -->
-"""
 _DEFAULT = """The default method on {gyros} simulated gyros of each scenario: trained on set 1 of the paper's six
 environments, everything chosen from it; judged on set 2. RMS of compensated 100-s means ÷ RMS of the noise that
 was really added.
@@ -53,12 +44,6 @@ _ACCURACY = ("rms", "ratio", "rms_distance")
 _REFERENCE = 1.05
 
 Column = tuple[str, str, str]  # title, key, format
-
-
-def filled(page: str | None, result: dict[str, Any]) -> str:
-    """The page (None: a new one) with its section `bench` replaced."""
-    text = page if page is not None and _MARKS.search(page) else (page or "") + _EMPTY
-    return _MARKS.sub(lambda found: found[1] + section(result) + found[2], text)
 
 
 def section(result: dict[str, Any]) -> str:

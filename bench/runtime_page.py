@@ -1,18 +1,14 @@
-"""The section `runtime` of docs/results.md, from docs/results/runtime.json."""
+"""The section `runtime` of docs/results.md: what the C runtime costs."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
+from results import table
 
-from results import table, write
-
-__all__ = ["AIMS", "Aim", "section", "write"]
+__all__ = ["AIMS", "Aim", "section"]
 
 _HEAD = """## What the runtime costs (`make bench`)
 

@@ -1,13 +1,9 @@
-"""The section `sigma` of docs/results.md, from docs/results/sigma.json."""
+"""The section `sigma` of docs/results.md."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
 
 from results import table
 

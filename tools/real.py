@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.metrics import average
-from gyrotc.pages.plots import AFTER, BEFORE, svg
+from gyrotc.pages.plots import AFTER, BEFORE
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.tables.emit import emit
@@ -211,7 +211,7 @@ def _named(r: Result) -> str:
     return f"{r.case.name} {r.axis} without {r.case.left_out} ({r.method})"
 
 
-def picture(results: Sequence[Result]) -> str:
+def picture(results: Sequence[Result]) -> Figure:
     """Before (without its mean in training) and after compensation over time, a panel for each axis."""
     figure = Figure(figsize=(7.2, 1.9 * len(results)), layout="constrained")
     panels = figure.subplots(len(results), 1, sharex=True, squeeze=False)[:, 0]
@@ -227,7 +227,7 @@ def picture(results: Sequence[Result]) -> str:
     handles, labels = panels[0].get_legend_handles_labels()
     panels[0].legend(handles[:2], labels[:2], ncols=2, loc="best")
     panels[-1].set_xlabel("time, min (grey: left out of training)")
-    return svg(figure)
+    return figure
 
 
 def _traces(result: Result) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -261,7 +261,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
         for r in of_case:
             print(f"{_named(r)}: {r.rms:.4g}, best trivial {r.best_trivial:.4g}", flush=True)
         if case.pictured:
-            (docs / "real" / f"{case.name}.svg").write_text(picture(of_case), "utf-8")
+            picture(of_case).savefig(docs / "real" / f"{case.name}.png", dpi=125, metadata={"Software": None})
         results += of_case
     if results:
         (work / "real.json").write_text(json.dumps([_entry(r) for r in results], indent=1) + "\n", "utf-8")

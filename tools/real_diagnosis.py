@@ -1,4 +1,4 @@
-"""Diagnosis of measured recordings: tables and pictures of docs/diagnosis-real.md (part of `make real`).
+"""Diagnosis of measured recordings: tables of docs/diagnosis-real.md (part of `make real`).
 
 usage: python tools/real_diagnosis.py FOLDER-OF-DATA-SETS DOCS WORK
 """
@@ -158,11 +158,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
     data = _data(source, work, CYCLE)
     cycles: dict[str, Result] = {}
     for axis in "xyz":
-        folder = work / f"diagnosis-{axis}"
-        cycles[axis] = diagnosed(data, axis, folder)
-        for picture in ("residual", "before-and-after"):
-            svg = (folder / "pictures" / f"{picture}.svg").read_text("utf-8")
-            (docs / "real" / f"diagnosis-{axis}-{picture}.svg").write_text(svg, "utf-8")
+        cycles[axis] = diagnosed(data, axis, work / f"diagnosis-{axis}")
     rest = _data(source, work, ISOTHERMAL)
     still = {axis: diagnosed(rest, axis, work / f"diagnosis-still-{axis}") for axis in "xyz"}
     page = docs / "diagnosis-real.md"

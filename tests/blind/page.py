@@ -1,22 +1,24 @@
-"""docs/results/blind-SEED.json, one for each run, and the section of docs/results.md made of all of them."""
+"""The section of docs/results.md on blind runs: every run that was started."""
 
 from __future__ import annotations
 
-import json
-import re
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
+
+from results import recorded, write
+
 from .effects import FAMILY
 from .grade import Row
 from .table import markdown, table
 
-__all__ = ["answer_lines", "run_lines", "write_page", "write_section"]
+__all__ = ["answer_lines", "run_lines", "section", "write_page", "write_section"]
 
-_TITLE = "# Results\n\nFigures that programs wrote; nobody edits them by hand.\n"
 _HEAD = """## Hidden effects (`make blind`)
 
 Recordings with an effect that an independent generator hid in them (tests/blind: its own integration, maps,
@@ -29,41 +31,35 @@ that was started stands here, with what was done of it. Limits: 95 %, binomial (
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
     """Writes the run's file and the section of the page; everything else on the page stays."""
     told = {"table": table(rows), "named": _confusion(rows)}
-    write_section(docs, ("blind", "blind"), head | {"done": len(rows)}, told, _HEAD, _section)
+    write_section(docs, "blind", head | {"done": len(rows)}, told, section)
 
 
 def write_section(
     docs: Path,
-    names: tuple[str, str],
+    name: str,
     head: dict[str, Any],
     told: dict[str, Any],
-    title: str,
     section: Callable[[dict[str, Any]], str],
 ) -> None:
-    """Writes docs/results/NAME-SEED.json, and the section of docs/results.md made of all files of that name.
+    """Keeps the run, and makes the section of docs/results.md of all runs of that name.
 
     Args:
         docs: The folder docs.
-        names: Of the files, and of the marks that hold the section on the page.
+        name: Of the record, and of the marks that hold the section on the page.
         head: Seed, records, how many of them are done, code, commit, start of the run.
         told: What is told of it.
-        title: Begin of the section.
-        section: The text of one run from its file; the newest comes first.
+        section: Its text, from all runs, the newest first.
     """
-    (name, mark), folder = names, docs / "results"
-    folder.mkdir(parents=True, exist_ok=True)
     result = {**head, "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()), **told}
-    own = folder / f"{name}-{head['seed']}.json"
-    own.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    runs = [json.loads(p.read_text(encoding="utf-8")) for p in folder.glob(f"{name}-*.json")]
-    runs.sort(key=lambda r: str(r["started"]), reverse=True)
-    page = docs / "results.md"
-    text = page.read_text(encoding="utf-8") if page.exists() else _TITLE
-    marks = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)
-    if not marks.search(text):
-        text += f"\n<!-- {mark} -->\n<!-- /{mark} -->\n"
-    content = "\n".join([title, *map(section, runs)])
-    page.write_text(marks.sub(lambda m: m[1] + content + m[2], text), encoding="utf-8")
+    before = (recorded(docs, name) or {"runs": []})["runs"]
+    runs = [result, *(run for run in before if run["seed"] != head["seed"])]
+    runs.sort(key=lambda run: str(run["started"]), reverse=True)
+    write(docs, name, {"runs": runs}, section)
+
+
+def section(record: dict[str, Any]) -> str:
+    """The section as text."""
+    return "\n".join([_HEAD, *map(_section, record["runs"])])
 
 
 def _section(run: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The section `kills` of docs/results.md, from docs/results/kills.json."""
+"""The section `kills` of docs/results.md."""
 
 from __future__ import annotations
 
@@ -41,5 +41,5 @@ def section(result: dict[str, Any]) -> str:
 
 
 def write_page(docs: Path, result: dict[str, Any]) -> None:
-    """`docs/results/kills.json` and the section."""
+    """Keeps what was found, and makes the section."""
     write(docs, "kills", result, section)

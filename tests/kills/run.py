@@ -176,7 +176,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=(), help="these commands only")
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
     parser.add_argument("--json", type=Path, default=None, help="write the counts here")
-    parser.add_argument("--docs", type=Path, default=None, help="write results/kills.json and the page here")
+    parser.add_argument("--docs", type=Path, default=None, help="write the summary and the page here")
     arguments = parser.parse_args()
     if _IN_SHIM not in os.environ:
         _again_with_shim()

@@ -1,8 +1,7 @@
-"""The section `mutants` of docs/results.md, from docs/results/mutants.json."""
+"""The section `mutants` of docs/results.md."""
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
 
-from results import table, write
+from results import recorded, table, write
 
 __all__ = ["section", "write_page"]
 
@@ -41,7 +40,7 @@ def section(result: dict[str, Any]) -> str:
             f"`{m['file']}`",
             m["model"],
             m["seen_by"] or "**nobody**",
-            _told(m["told"] or m.get("survives", "")),
+            _cell(m["told"]),
         ]
         for m in mutants
     ]
@@ -58,21 +57,36 @@ def _rate(seen: Sequence[str | None]) -> str:
     return f"{100.0 * sum(who is not None for who in seen) / len(seen):.0f} %"
 
 
-def _told(text: str) -> str:
-    """The first words of an objection, as a cell of a table."""
-    short = text if len(text) <= 110 else text[:107] + "..."
-    return short.replace("|", "\\|").replace("<", "&lt;")
+def _short(text: str) -> str:
+    """The first words of an objection."""
+    return text if len(text) <= 110 else text[:107] + "..."
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;")
 
 
 def write_page(docs: Path, found: Sequence[dict[str, Any]], names: Sequence[str]) -> None:
-    """`docs/results/mutants.json` and the section: what was found now, and of the other faults what was found before.
+    """The section: what was found now, and of the other faults what was found before.
 
     Args:
         docs: Folder of the pages.
         found: Results of the faults that were tried.
         names: All faults, in order.
     """
-    path = docs / "results" / "mutants.json"
-    before = json.loads(path.read_text("utf-8"))["mutants"] if path.exists() else []
+    before = (recorded(docs, "mutants") or {"mutants": []})["mutants"]
     by_name = {m["name"]: m for m in [*before, *found]}
-    write(docs, "mutants", {"mutants": [by_name[name] for name in names if name in by_name]}, section)
+    result = {"mutants": [by_name[name] for name in names if name in by_name]}
+    write(docs, "mutants", result, section, quoted)
+
+
+def quoted(result: dict[str, Any]) -> dict[str, Any]:
+    """What the page says of each fault."""
+    names = ("name", "file", "model", "seen_by", "survives")
+    return {
+        "mutants": [
+            {name: m[name] for name in names if name in m}
+            | {"told": _short(m["told"] or m.get("survives", ""))}
+            for m in result["mutants"]
+        ]
+    }

@@ -1,4 +1,4 @@
-"""The section `prove` of docs/results.md, from docs/results/prove.json."""
+"""The section `prove` of docs/results.md."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Results that test sessions leave behind: JSON in docs/results/, and a section of docs/results.md made from it.
+"""What campaigns leave: everything in build/results/, what pages quote in docs/results/summary.json, and the sections
+of docs/results.md that are made from it. Nobody edits them by hand.
 
-`pytest ... --results docs` writes them when every test passed; nobody edits them by hand.
+`pytest ... --results docs` writes them when every test passed.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Results", "filled", "machine", "table", "write"]
+from gyrotc.paper.summary import keep, recorded
+
+__all__ = ["Results", "filled", "machine", "recorded", "table", "write"]
 
 _HEAD = "# Results\n\nFigures that programs wrote; nobody edits them by hand.\n"
 
@@ -50,10 +53,26 @@ def filled(page: str | None, name: str, section: str) -> str:
     return marks.sub(lambda found: found[1] + section + found[2], text)
 
 
-def write(docs: Path, name: str, result: dict[str, Any], section: Callable[[dict[str, Any]], str]) -> None:
-    """`docs/results/<name>.json`, and its section of `docs/results.md`."""
-    (docs / "results").mkdir(parents=True, exist_ok=True)
-    (docs / "results" / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+def write(
+    docs: Path,
+    name: str,
+    result: Any,
+    section: Callable[[Any], str],
+    quoted: Callable[[Any], Any] = lambda result: result,
+) -> None:
+    """Keeps the result, and makes the section `name` of `docs/results.md` from what is quoted of it.
+
+    Args:
+        docs: The folder docs.
+        name: Of the campaign.
+        result: Everything that it found; goes to `build/results/<name>.json`, which is not tracked.
+        section: The text, from what `quoted` leaves.
+        quoted: What of the result stands in `docs/results/summary.json`.
+    """
+    whole = docs.parent / "build" / "results" / f"{name}.json"
+    whole.parent.mkdir(parents=True, exist_ok=True)
+    whole.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    keep(docs, name, quoted(result))
     page = docs / "results.md"
     before = page.read_text(encoding="utf-8") if page.exists() else None
-    page.write_text(filled(before, name, section(result)), encoding="utf-8")
+    page.write_text(filled(before, name, section(recorded(docs, name))), encoding="utf-8")

@@ -24,7 +24,7 @@ _FOUND = Results()
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        "--results", type=Path, help="folder whose results/targets.json and results.md are written"
+        "--results", type=Path, help="folder whose results/summary.json and results.md are written"
     )
 
 
@@ -49,4 +49,4 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
             **lists,
             "controls": sorted(CAUGHT, key=lambda c: (c["control"], c["name"], c["numeric"])),
         }
-        write(docs, "targets", result, targets_page.section)
+        write(docs, "targets", result, targets_page.section, targets_page.quoted)

@@ -1,4 +1,4 @@
-"""The section `self-test` of docs/results.md, from docs/results/self-test.json."""
+"""The section `self-test` of docs/results.md."""
 
 from __future__ import annotations
 

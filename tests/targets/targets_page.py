@@ -1,13 +1,14 @@
-"""The section `targets` of docs/results.md, from docs/results/targets.json."""
+"""The section `targets` of docs/results.md."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from results import table
 
-__all__ = ["section"]
+__all__ = ["quoted", "section"]
 
 _HEAD = """## Every target, bit for bit (`make targets`)
 
@@ -35,9 +36,8 @@ _NAV = """`examples/nav_loop`, firmware in the emulated board against the host: 
 def section(result: dict[str, Any]) -> str:
     """The section as text."""
     golden = result["models"][0]
-    names = {t["name"] for t in golden["targets"]}
     parts = [
-        _HEAD.format(combinations=len(names), entries=len(golden["targets"])),
+        _HEAD.format(combinations=golden["names"], entries=golden["targets"]),
         table(
             ["model", "networks ", "centers ", "terms", "targets × arithmetics ", "vectors each ", "mismatches ",
              "rows replayed ", "rows that differ "],
@@ -47,9 +47,9 @@ def section(result: dict[str, Any]) -> str:
         table(
             ["target", "arithmetic", "compiler", "vectors ", "mismatches ", "map ", "sample ", "code ", "stack ",
              "stack of sample "],
-            [_target_row(t) for t in golden["targets"]],
+            [_target_row(t) for t in result["targets"]],
         ),
-        *_function_tables(golden),
+        *_function_tables(result["targets"]),
         _CONTROLS,
         table(
             ["control", "target", "arithmetic", "results ", "mismatches "],
@@ -68,10 +68,10 @@ def section(result: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
-def _function_tables(golden: dict[str, Any]) -> list[str]:
+def _function_tables(targets: Sequence[dict[str, Any]]) -> list[str]:
     parts: list[str] = []
-    for t in golden["targets"]:
-        if t["name"] in ("cortex-m0", "cortex-m4f") and "functions" in t:
+    for t in targets:
+        if "functions" in t:
             head = {"target": t["name"], "arithmetic": t["numeric"], "read_only": t["read_only_bytes"]}
             rows = [
                 [
@@ -90,19 +90,51 @@ def _function_tables(golden: dict[str, Any]) -> list[str]:
     return parts
 
 
-def _model_row(m: dict[str, Any]) -> list[object]:
-    targets = m["targets"]
+def quoted(result: dict[str, Any]) -> dict[str, Any]:
+    """What the page says: of every model its totals, of the golden one each target."""
+    golden = [_quoted_target(t) for t in result["models"][0]["targets"]]
+    controls = [
+        {k: c[k] for k in ("control", "name", "numeric", "vectors", "mismatches")} for c in result["controls"]
+    ]
+    kept = {name: result[name] for name in ("schema", "machine", "nav_loop")}
+    return kept | {"models": [_totals(m) for m in result["models"]], "targets": golden, "controls": controls}
+
+
+_OF_A_TARGET = (
+    "name", "numeric", "status", "compiler", "vectors", "mismatches", "instructions", "cycles", "step_instructions",
+    "step_cycles", "code_bytes", "stack_bytes", "step_stack_bytes",
+)  # fmt: skip
+
+
+def _quoted_target(target: dict[str, Any]) -> dict[str, Any]:
+    kept = {name: target[name] for name in _OF_A_TARGET if name in target}
+    if target["name"] in ("cortex-m0", "cortex-m4f") and "functions" in target:
+        kept |= {name: target[name] for name in ("functions", "read_only_bytes")}
+    return kept
+
+
+def _totals(model: dict[str, Any]) -> dict[str, Any]:
+    targets = model["targets"]
     replayed = [t["replayed"] for t in targets if "replayed" in t]
+    return {name: model[name] for name in ("name", "networks", "centers", "terms", "failed")} | {
+        "names": len({t["name"] for t in targets}),
+        "targets": len(targets),
+        "passed": sum(t["status"] == "pass" for t in targets),
+        "smallest_vectors": min(t["vectors"] for t in targets),
+        "mismatches": sum(t["mismatches"] for t in targets),
+        "rows": sum(r["rows"] for r in replayed),
+        "rows_that_differ": sum(r["mismatches"] for r in replayed),
+    }
+
+
+def _model_row(m: dict[str, Any]) -> list[object]:
+    counts = ("targets", "smallest_vectors", "mismatches", "rows", "rows_that_differ")
     return [
         m["name"],
         m["networks"],
         m["centers"],
         ", ".join(m["terms"]) or "-",
-        len(targets),
-        min(t["vectors"] for t in targets),
-        sum(t["mismatches"] for t in targets),
-        sum(r["rows"] for r in replayed),
-        sum(r["mismatches"] for r in replayed),
+        *(m[name] for name in counts),
     ]
 
 

@@ -1,14 +1,12 @@
 """Every table and figure of docs/paper.md made again, or checked.
 
-python -m gyrotc.paper docs            docs/results/paper.json, the page, its figures, the run in simulation.md
+python -m gyrotc.paper docs            its part of docs/results/summary.json, page, figures, the run of simulation.md
 python -m gyrotc.paper docs --check    the same measured again and compared with what is there; changes nothing
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,22 +15,23 @@ from typing import Any
 from ..simulate.campaign import campaign, with_noise
 from ..simulate.scenario import read
 from ..store.files import write_atomically
-from .figures import FIGURES, checksum, draw, draw_run
+from .figures import FIGURES, draw, draw_run
 from .page import SEEDS, departures, filled, measured, parts
+from .summary import keep, recorded
 
 _RUN = "5 C/min"
 
 
 def record_of(docs: Path) -> dict[str, Any]:
-    """docs/results/paper.json."""
-    found: dict[str, Any] = json.loads((docs / "results" / "paper.json").read_text("utf-8"))
+    """What docs/results/summary.json has of the experiment."""
+    found: dict[str, Any] = recorded(docs, "paper")
     return found
 
 
 def page_of(docs: Path, record: Mapping[str, Any]) -> str:
     """docs/paper.md with its tables made from the record."""
-    bench = docs / "results" / "bench.json"  # of `make bench`
-    tables = json.loads(bench.read_text("utf-8"))["speed"]["learning"] if bench.exists() else []
+    bench = recorded(docs, "bench")
+    tables = bench["speed"]["learning"] if bench else []
     rows: list[dict[str, Any]] = next((table["rows"] for table in tables if table["scenario"] == "paper"), [])
     return filled((docs / "paper.md").read_text("utf-8"), parts(record, rows))
 
@@ -47,23 +46,19 @@ def stale(docs: Path) -> Iterator[str]:
     if there.count("\n") != made.count("\n"):
         yield f"{docs / 'paper.md'}: {there.count(chr(10))} lines; the record gives {made.count(chr(10))}"
     for number in FIGURES:
-        path = docs / "paper" / f"figure-{number:02d}.svg"
-        if not path.exists() or checksum(record["series"]) not in path.read_text("utf-8"):
-            yield f"{path}: does not show the series of the record"
+        path = docs / "paper" / f"figure-{number:02d}.png"
+        if not path.exists() or record["figures"].encode() not in path.read_bytes():
+            yield f"{path}: does not show the series that the record is of"
 
 
 def write(docs: Path) -> None:
     """Writes record, tables, `docs/paper/`, and one run into `docs/simulation/`."""
-    record = measured()
-    text = json.dumps(record, indent=1)
-    text = re.sub(
-        r"\[[^\[\]{}]*\]", lambda found: re.sub(r"\s+", " ", found[0]), text
-    )  # a series is one line
-    write_atomically(docs / "results" / "paper.json", text + "\n")
+    record, series = measured()
+    keep(docs, "paper", record)
     write_atomically(docs / "paper.md", page_of(docs, record))
-    draw(record["series"], docs / "paper")
+    draw(series, docs / "paper")
     plan = with_noise(read("paper-5C-min")[1], "paper")
-    draw_run(next(iter(campaign(plan, SEEDS[0]))), f"Chamber at {_RUN}", docs / "simulation" / "run.svg")
+    draw_run(next(iter(campaign(plan, SEEDS[0]))), f"Chamber at {_RUN}", docs / "simulation" / "run.png")
     print(f"{docs / 'paper.md'} and the figures beside it")
 
 
@@ -76,7 +71,7 @@ def main() -> int:
     if not arguments.check:
         write(arguments.docs)
         return 0
-    wrong = [*stale(arguments.docs), *departures(record_of(arguments.docs), measured())]
+    wrong = [*stale(arguments.docs), *departures(record_of(arguments.docs), measured()[0])]
     for line in wrong:
         print(line, file=sys.stderr)
     print(f"docs/paper.md: {len(wrong)} departures" if wrong else "docs/paper.md: as measured now")

@@ -91,21 +91,20 @@ class Experiment:
     cells: Mapping[str, Mapping[str, Cell]]
     floor_dph: float
 
-    def figures(self) -> dict[str, Any]:
-        """What docs/results/paper.json has of it: mean, σ and RMS before and after, in deg/h, and centers."""
+    def figures(self, *, whole: bool) -> dict[str, Any]:
+        """What docs/paper.md is made of, in deg/h: mean, σ and RMS before and after, and centers; else RMS after."""
         before = {name: _figures(cell.before) for name, cell in self.cells["constant"].items()}
         after = {
-            method: {
-                name: {
-                    **_figures(cell.after),
-                    "centers": cell.centers,
-                    "moved_rms_dph": _figures(cell.moved)["rms_dph"],
-                }
-                for name, cell in cells.items()
-            }
+            method: {name: _after(cell, whole) for name, cell in cells.items()}
             for method, cells in self.cells.items()
         }
-        return {"floor_dph": self.floor_dph, "before": before, "after": after}
+        kept = {"floor_dph": self.floor_dph, "after": after}
+        return kept | {"before": before} if whole else kept
+
+
+def _after(cell: Cell, whole: bool) -> dict[str, Any]:
+    rms = {"rms_dph": _figures(cell.after)["rms_dph"], "moved_rms_dph": _figures(cell.moved)["rms_dph"]}
+    return {**_figures(cell.after), "centers": cell.centers, **rms} if whole else rms
 
 
 def _figures(values: FloatArray) -> dict[str, Any]:

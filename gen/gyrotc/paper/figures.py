@@ -1,8 +1,9 @@
-"""Figures 5 to 11 of the paper again, and one simulated run as a chamber record: SVG files."""
+"""Figures 5 to 11 of the paper again, and one simulated run as a chamber record: PNG files, as web pages show them."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..pages.comparison import ENVIRONMENTS
-from ..pages.plots import AFTER, BEFORE, COVERED, STYLE, svg
+from ..pages.plots import AFTER, BEFORE, COVERED, STYLE
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
 from ..store.files import write_atomically
@@ -24,6 +25,7 @@ from .experiment import AVERAGE_S
 __all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run"]
 
 _ZOOM = slice(50, 101)
+_DPI = 90  # 900 pixels across, as wide as a page of text
 _CONSTANT, _VARIABLE = ENVIRONMENTS[:3], ENVIRONMENTS[3:]
 
 Series = Mapping[str, Mapping[str, Sequence[float]]]
@@ -64,14 +66,14 @@ FIGURES: dict[int, tuple[str, str, _Panel, bool]] = {
 
 
 def draw(series: Series, folder: Path, numbers: Iterable[int] = tuple(FIGURES)) -> list[Path]:
-    """Writes `figure-05.svg` to `figure-11.svg`, or those of `numbers`, into `folder`.
+    """Writes `figure-05.png` to `figure-11.png`, or those of `numbers`, into `folder`.
 
-    Each has the checksum of the series as its identifier.
+    Each has the checksum of the series as its description.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for number in numbers:
-        path = folder / f"figure-{number:02d}.svg"
+        path = folder / f"figure-{number:02d}.png"
         write_atomically(path, _figure(series, number))
         written.append(path)
     return written
@@ -82,7 +84,7 @@ def checksum(series: Series) -> str:
     return "sha256:" + hashlib.sha256(json.dumps(series, sort_keys=True).encode()).hexdigest()
 
 
-def _figure(series: Series, number: int) -> str:
+def _figure(series: Series, number: int) -> bytes:
     method, title, panel, enlarged = FIGURES[number]
     cells = {
         name: (np.array(measured), np.array(series[method][name]))
@@ -102,7 +104,13 @@ def _figure(series: Series, number: int) -> str:
         handles, labels = axes[0][0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=2)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        return svg(figure, identifier=checksum(series))
+        return _png(figure, checksum(series))
+
+
+def _png(figure: Figure, description: str = "") -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None, "Description": description})
+    return stream.getvalue()
 
 
 def _line(
@@ -138,4 +146,4 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         for ax in (above, below):
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        write_atomically(path, svg(figure))
+        write_atomically(path, _png(figure))

@@ -169,8 +169,8 @@ class Run:
 def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
     """Runs of one role with spans of one file that touch as one, in order of file and time; copies of a run once.
 
-    So neither the order of runs in a description, nor where a recording is cut, nor how often it was handed over changes
-    what is learnt.
+    So neither the order of runs in a description, nor where a recording is cut, nor how often it was handed over
+    changes what is learnt.
     """
     found: list[Run] = []
     known: set[tuple[object, ...]] = set()

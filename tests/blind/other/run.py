@@ -114,11 +114,16 @@ def _line(row: Row) -> str:
 
 
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
-    """docs/results/other-blind-SEED.json and the section of docs/results.md made of all of them."""
+    """The section of docs/results.md on the other world: every run that was started."""
     kept = ("kind", "k", "imitated", "verdict", "named")
     foreign = [{name: row[name] for name in kept} for row in rows if row["stratum"] == "foreign"]
     told = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
-    write_section(docs, ("other-blind", "blind-other"), head | {"done": len(rows)}, told, _HEAD, _section)
+    write_section(docs, "blind-other", head | {"done": len(rows)}, told, section)
+
+
+def section(record: dict[str, Any]) -> str:
+    """The section as text."""
+    return "\n".join([_HEAD, *map(_section, record["runs"])])
 
 
 def _section(run: dict[str, Any]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import re
 import shutil
 from pathlib import Path
@@ -15,8 +14,9 @@ from gyrotc.common.errors import InputError
 from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from gyrotc.paper.__main__ import page_of, record_of, stale
 from gyrotc.paper.experiment import METHODS
-from gyrotc.paper.figures import FIGURES, draw
+from gyrotc.paper.figures import FIGURES, Series, checksum, draw
 from gyrotc.paper.page import departures, filled, made_with, measured
+from gyrotc.paper.summary import keep
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "paper.md"
@@ -24,17 +24,14 @@ RECORD = record_of(DOCS)
 
 
 @pytest.fixture(scope="module")
-def now() -> dict[str, Any]:
-    """The first gyro, with both levels of noise."""
+def first() -> tuple[dict[str, Any], Series]:
+    """Record and series of the first gyro, with both levels of noise."""
     return measured([1])
 
 
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All figures of the record."""
-    folder = tmp_path_factory.mktemp("drawn") / "paper"
-    draw(RECORD["series"], folder)
-    return folder
+@pytest.fixture
+def now(first: tuple[dict[str, Any], Series]) -> dict[str, Any]:
+    return first[0]
 
 
 def test_the_published_figures_are_those_of_table_1() -> None:
@@ -65,19 +62,17 @@ def test_a_figure_that_moves_is_told_with_its_place(now: dict[str, Any]) -> None
         (line,) = departures(other, now)
         assert line.startswith("paper noise, gyro 1, after, mlr, 5 C/min, rms_dph: ")
     other = copy.deepcopy(RECORD)
-    other["series"]["mrbf_paper"]["20 C"][7] += 1e-5
-    assert any(line.startswith("series, mrbf_paper, 20 C: 1e-05 deg/h") for line in departures(other, now))
     del other["gyros"]["class"]
     assert sum("None recorded" in line for line in departures(other, now)) > 100
 
 
-def test_a_page_or_a_figure_of_another_record_is_told(drawn: Path, tmp_path: Path) -> None:
+def test_a_page_or_a_figure_of_another_record_is_told(tmp_path: Path) -> None:
     docs = tmp_path / "docs"
     (docs / "results").mkdir(parents=True)
-    for name in ("paper.md", "results/paper.json", "results/bench.json"):
+    for name in ("paper.md", "results/summary.json"):
         shutil.copy(DOCS / name, docs / name)
     assert all("figure" in line for line in stale(docs))
-    shutil.copytree(drawn, docs / "paper")
+    shutil.copytree(DOCS / "paper", docs / "paper")
     assert list(stale(docs)) == []
     text = PAGE.read_text("utf-8")
     row = next(line for line in text.splitlines() if line.startswith("| after, modified RBFNN |"))
@@ -85,9 +80,7 @@ def test_a_page_or_a_figure_of_another_record_is_told(drawn: Path, tmp_path: Pat
     (line,) = stale(docs)
     assert "after, modified RBFNN" in line
     shutil.copy(PAGE, docs / "paper.md")
-    record = copy.deepcopy(RECORD)
-    record["series"]["measured"]["20 C"][0] += 1e-6
-    (docs / "results" / "paper.json").write_text(json.dumps(record), "utf-8")
+    keep(docs, "paper", RECORD | {"figures": "sha256:another"})
     assert len(list(stale(docs))) == len(FIGURES)
 
 
@@ -108,16 +101,14 @@ def test_the_table_prints_what_the_record_has() -> None:
         assert rows["improvement, modified RBFNN"] == [f"{value:.1f}" for value in gain]
 
 
-def test_every_mean_of_eight_hours_is_there() -> None:
-    assert {len(values) for of in RECORD["series"].values() for values in of.values()} == {288}
-
-
-def test_series_and_figures_of_the_record_are_of_one_experiment() -> None:
-    figures = RECORD["gyros"]["paper"]["1"]
-    for name, before in RECORD["series"]["measured"].items():
+def test_series_and_figures_are_of_one_experiment(first: tuple[dict[str, Any], Series]) -> None:
+    record, series = first
+    assert {len(values) for of in series.values() for values in of.values()} == {RECORD["samples"]} == {288}
+    figures = record["gyros"]["paper"]["1"]
+    for name, before in series["measured"].items():
         assert np.std(before) == pytest.approx(figures["before"][name]["std_dph"], rel=1e-3)
         for method in ("mlr", "rbf_random", "mrbf_paper"):
-            after = np.subtract(before, RECORD["series"][method][name])
+            after = np.subtract(before, series[method][name])
             rms = np.sqrt(np.mean(after**2))
             assert rms == pytest.approx(figures["after"][method][name]["rms_dph"], rel=1e-3)
 
@@ -150,9 +141,9 @@ def test_every_table_has_cells_in_every_row() -> None:
             assert len({line.count("|") for line in part[1].splitlines()}) == 1, part[0]
 
 
-def test_every_figure_is_drawn_and_shown(drawn: Path, tmp_path: Path) -> None:
-    names = sorted(path.name for path in drawn.iterdir())
-    assert names == [f"figure-{number:02d}.svg" for number in FIGURES]
-    (again,) = draw(RECORD["series"], tmp_path, [11])
-    assert again.read_bytes() == (drawn / again.name).read_bytes()
-    assert re.findall(r"\(paper/(figure-\d+\.svg)\)", PAGE.read_text("utf-8")) == names
+def test_every_figure_is_drawn_and_shown(first: tuple[dict[str, Any], Series], tmp_path: Path) -> None:
+    written = draw(first[1], tmp_path)
+    names = sorted(path.name for path in written)
+    assert names == [f"figure-{number:02d}.png" for number in FIGURES]
+    assert all(checksum(first[1]).encode() in path.read_bytes() for path in written)
+    assert re.findall(r"\(paper/(figure-\d+\.png)\)", PAGE.read_text("utf-8")) == names

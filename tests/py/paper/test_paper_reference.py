@@ -6,7 +6,6 @@ rounding (2e-16) times what a step amplifies it by; each constant says by what.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import pytest
 from gyrotc import _core
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
+from gyrotc.paper.summary import recorded
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.data import average, scaling_of
 from gyrotc.train.methods import trained
@@ -172,8 +172,8 @@ def test_the_same_regression_stays(groups: list[PaperGroup]) -> None:
 def test_table_1_is_the_reference_s(
     gyro: tuple[int, Path], groups: list[PaperGroup], networks: dict[str, list[Both]]
 ) -> None:
-    """Every cell of a paper's method that docs/results/paper.json has of this gyro."""
-    record = json.loads((ROOT / "docs" / "results" / "paper.json").read_text("utf-8"))
+    """Every cell of a paper's method that the record of docs/paper.md has of this gyro."""
+    record = recorded(ROOT / "docs", "paper")
     after = record["gyros"]["paper"][str(gyro[0])]["after"]
     worst: dict[str, float] = {}
     for number, group in enumerate(groups):

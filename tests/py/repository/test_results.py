@@ -1,83 +1,287 @@
-"""docs/results.md says what the measurements beside it say: no figure is edited by hand."""
+"""docs/results.md is made of docs/results/summary.json, no figure by hand, and holds what the project promises."""
 
 from __future__ import annotations
 
 import copy
-import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from gyrotc.paper.summary import keep
+from results import filled, recorded, write
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
+DOCS = ROOT / "docs"
+sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / name) for name in ("targets", "prove"))]
 
+import prove_page  # noqa: E402
+import self_test_page  # noqa: E402
+import targets_page  # noqa: E402
+
+from bench import (  # noqa: E402
+    bounds_page,
+    budget,
+    catalogue,
+    fleet,
+    importing,
+    lot,
+    lot_prior_page,
+    runtime_page,
+    sigma_page,
+)
+from bench import page as bench_page  # noqa: E402
 from bench.aims import AIMS  # noqa: E402
-from bench.page import filled, section  # noqa: E402
+from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
+from tests.blind import page as blind  # noqa: E402
+from tests.blind.grade import shipped_worse  # noqa: E402
+from tests.blind.other import run as other  # noqa: E402
+from tests.blind.table import _gains  # noqa: E402
+from tests.kills import page as kills  # noqa: E402
+from tests.kills.driver import ACTIONS  # noqa: E402
+from tests.mutants import page as mutants  # noqa: E402
+
+SECTIONS: dict[str, Callable[[Any], str]] = {
+    "bench": bench_page.section,
+    "blind": blind.section,
+    "blind-other": other.section,
+    "bounds": bounds_page.section,
+    "budget": budget.section,
+    "catalogue": catalogue.section,
+    "fleet": fleet.section,
+    "import": importing.section,
+    "kills": kills.section,
+    "lot": lot.section,
+    "lot-prior": lot_prior_page.section,
+    "mutants": mutants.section,
+    "prove": prove_page.section,
+    "runtime": runtime_page.section,
+    "self-test": self_test_page.section,
+    "sigma": sigma_page.section,
+    "targets": targets_page.section,
+}
+WRITING = {
+    "build", "check", "compare", "diagnose", "emit", "evaluate", "fit", "fleet", "import", "plan", "report", "sign",
+    "simulate", "stamp", "verify",
+}  # fmt: skip
 
 
-@pytest.fixture
-def result() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((ROOT / "docs/results/bench.json").read_text("utf-8"))
-    return found
+@pytest.mark.parametrize("name", SECTIONS)
+def test_the_section_is_made_of_what_is_recorded(name: str) -> None:
+    page = (DOCS / "results.md").read_text("utf-8")
+    assert filled(page, name, SECTIONS[name](recorded(DOCS, name))) == page
 
 
-def test_the_section_is_made_from_the_json(result: dict[str, Any]) -> None:
-    page = (ROOT / "docs/results.md").read_text("utf-8")
-    assert filled(page, result) == page
-    assert section(result) in page
+def test_no_section_stands_without_a_record() -> None:
+    marks = {
+        line[5:-4] for line in (DOCS / "results.md").read_text("utf-8").splitlines() if line[:5] == "<!-- "
+    }
+    assert {mark for mark in marks if not mark.startswith("/")} == set(SECTIONS)
 
 
-def test_another_figure_gives_another_page(result: dict[str, Any]) -> None:
+def test_other_figures_give_another_section() -> None:
     """The comparison can fail."""
-    other = copy.deepcopy(result)
-    other["accuracy"]["default"][0]["ratio"]["worst"] += 0.01
-    assert section(other) != section(result)
+    for name, (*path, last) in {
+        "bench": ("accuracy", "default", 0, "ratio", "worst"),
+        "targets": ("models", 0, "mismatches"),
+        "prove": ("every_input", 0, "mismatches"),
+        "fleet": ("elapsed_s",),
+        "kills": ("ended",),
+    }.items():
+        changed = copy.deepcopy(recorded(DOCS, name))
+        place: Any = changed
+        for step in path:
+            place = place[step]
+        place[last] += 1.0
+        assert SECTIONS[name](changed) != SECTIONS[name](recorded(DOCS, name)), name
 
 
-def test_the_figures_are_what_the_project_promises(result: dict[str, Any]) -> None:
-    """Accuracy and bytes of the default method; times depend on the machine and are not held to anything here."""
-    smooth, *ripple = result["accuracy"]["default"]
+def test_a_campaign_leaves_everything_in_build_and_what_is_quoted_in_the_summary(tmp_path: Path) -> None:
+    docs = tmp_path / "docs"
+    keep(docs, "other", [1.5])
+    write(docs, "one", {"kept": 1, "left": 2}, str, lambda found: {"kept": found["kept"]})
+    assert (recorded(docs, "one"), recorded(docs, "other")) == ({"kept": 1}, [1.5])
+    assert '"left": 2' in (tmp_path / "build" / "results" / "one.json").read_text("utf-8")
+    page = (docs / "results.md").read_text("utf-8")
+    assert page.startswith("# Results") and "<!-- one -->\n{'kept': 1}<!-- /one -->" in page
+    assert "two" in filled(page, "one", "two\n") and "kept" not in filled(page, "one", "two\n")
+    assert "kept" in filled(page, "two", "two\n")
+
+
+def test_the_default_method_is_as_accurate_and_small_as_promised() -> None:
+    """Accuracy and bytes; times depend on the machine and are not held to anything here."""
+    accuracy = recorded(DOCS, "bench")["accuracy"]
+    smooth, *ripple = accuracy["default"]
     assert smooth["ratio"]["median"] <= 1.006
     assert smooth["ratio"]["worst"] <= 1.015
     assert smooth["bytes"]["worst"] <= 144
     for scenario in ripple:
         assert scenario["ratio"]["worst"] <= 1.02
         assert scenario["bytes"]["worst"] <= 264
-    for scenario in result["accuracy"]["default"]:
+    for scenario in accuracy["default"]:
         assert scenario["withheld"] > 0 or abs(scenario["found_minus_predicted"]) <= 0.002
-    for scenario in result["accuracy"]["more_centers"]:
+    for scenario in accuracy["more_centers"]:
         assert max(abs(change) for change in scenario["largest"].values()) <= 0.005
-    for scenario in result["accuracy"]["left_out"]:
+    for scenario in accuracy["left_out"]:
         assert scenario["median"] <= 1.03
 
 
-def test_the_selection_depends_neither_on_units_nor_on_order_nor_on_duplicates(
-    result: dict[str, Any],
-) -> None:
+def test_the_selection_depends_neither_on_units_nor_on_order_nor_on_duplicates() -> None:
     """Ours; scikit-learn's, with its absolute threshold, shows that the measure can fail."""
-    gyros = result["invariance"]["gyros"]
-    *ours, peer = result["invariance"]["rows"]
+    invariance = recorded(DOCS, "bench")["invariance"]
+    *ours, peer = invariance["rows"]
     for row in ours:
-        assert [change["same"] for change in row["changes"].values()] == [gyros] * 3, row["name"]
-    assert peer["changes"]["rad/s"]["same"] < gyros
+        assert [change["same"] for change in row["changes"].values()] == [invariance["gyros"]] * 3, row[
+            "name"
+        ]
+    assert peer["changes"]["rad/s"]["same"] < invariance["gyros"]
 
 
-def test_every_aim_has_its_figure(result: dict[str, Any]) -> None:
+def test_every_aim_has_its_figure() -> None:
     for what, _, _, figure in AIMS:
-        assert figure(result) > 0.0, what
+        assert figure(recorded(DOCS, "bench")) > 0.0, what
 
 
 @pytest.mark.parametrize(("worst", "told"), [(1.2, "**1.2000** (missed)"), (1.01, "1.0100")])
-def test_a_missed_aim_is_told(result: dict[str, Any], worst: float, told: str) -> None:
-    other = copy.deepcopy(result)
-    other["accuracy"]["default"][0]["ratio"]["worst"] = worst
-    assert f"| RMS ÷ floor, smooth maps: worst | 1.015 | {told} |" in section(other)
+def test_a_missed_aim_of_training_is_told(worst: float, told: str) -> None:
+    changed = recorded(DOCS, "bench")
+    changed["accuracy"]["default"][0]["ratio"]["worst"] = worst
+    assert f"| RMS ÷ floor, smooth maps: worst | 1.015 | {told} |" in bench_page.section(changed)
 
 
-def test_a_new_page_has_the_section_and_other_sections_stay(result: dict[str, Any]) -> None:
-    assert section(result) in filled(None, result)
-    page = "# Results\n\n<!-- bench -->\nold\n<!-- /bench -->\n\n<!-- targets -->\nkept\n<!-- /targets -->\n"
-    assert "kept" in filled(page, result)
-    assert "old" not in filled(page, result)
+def test_a_missed_aim_of_the_runtime_is_told() -> None:
+    changed = recorded(DOCS, "runtime")
+    for cost in changed["costs"]:
+        cost["map"]["mean"] += 1000.0
+    aim = runtime_page.AIMS[0]
+    assert f"| {aim.what} | {aim.limit:g} | **" in runtime_page.section(changed)
+
+
+def test_errors_of_the_runtime_keep_their_bounds() -> None:
+    for error in recorded(DOCS, "runtime")["errors"]:
+        assert error["worst_dph"] <= error["bound_dph"]
+        if error["numeric"] == "q31":
+            assert error["arithmetic_dph"] <= error["naive_float32_dph"]
+            assert error["inputs"] > 2**25
+
+
+def test_the_runtime_has_no_writable_data_anywhere() -> None:
+    costs = recorded(DOCS, "runtime")["costs"]
+    assert {cost["ram_bytes"] for cost in costs} == {0}
+    assert len(costs) == 3 * len(CORES) * len(LEVELS) * 2
+
+
+@pytest.mark.parametrize("n", GRIDS)
+def test_the_counted_models_have_individual_widths_in_both_inputs(n: int) -> None:
+    (network,) = grid_model(n).networks
+    widths = [w for pair in network.widths for w in pair]
+    assert len(network.centers) == n and len(set(widths)) == 2 * n
+
+
+def test_a_thousand_serials_without_a_failure() -> None:
+    figures = recorded(DOCS, "fleet")
+    assert (figures["serials"], figures["failed"], figures["exit_status"]) == (1000, 0, 0)
+    assert figures["rms_over_floor"]["median"] < 1.01
+
+
+def test_a_long_file_takes_less_than_a_gibibyte() -> None:
+    figures = recorded(DOCS, "import")
+    assert figures["readers"]["gyrotc import"]["peak_mib"] < 1024.0
+    assert figures["bytes"] > 1.9e9
+
+
+def test_every_command_that_writes_was_ended_in_every_way() -> None:
+    result = recorded(DOCS, "kills")
+    assert result["wrong"] == 0 and result["ended"] >= 300
+    assert set(result["counts"]["commands"]) >= WRITING
+    for counted in result["counts"].values():
+        assert set(ACTIONS) <= set(counted)
+
+
+def test_no_build_whose_results_differ_passes_the_self_test() -> None:
+    result = recorded(DOCS, "self-test")
+    differing = [b for b in result["builds"] if b["differ"]]
+    assert result["tables"] == 40 and len(differing) >= 30, "the flags break something"
+    assert all(b["refused"] == b["differ"] for b in differing)
+
+
+def test_every_target_agreed_in_every_bit() -> None:
+    result = recorded(DOCS, "targets")
+    for model in result["models"]:
+        assert (model["failed"], model["mismatches"], model["rows_that_differ"]) == (0, 0, 0)
+        assert (
+            model["names"] >= 12
+            and model["passed"] == model["targets"]
+            and model["smallest_vectors"] >= 20000
+        )
+    assert [n["differing_lines"] for n in result["nav_loop"]] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    "control",
+    [
+        "contracted_build", "fast_math", "natural_expressions_on_x87", "wrong_rounding_shift", "flipped_bit",
+        "m68k_software_float", "another_layout", "fault_in_a_term",
+    ],
+)  # fmt: skip
+def test_every_negative_control_was_caught(control: str) -> None:
+    caught = [c for c in recorded(DOCS, "targets")["controls"] if control in c["control"]]
+    assert caught and all(c["mismatches"] > 0 for c in caught)
+
+
+def test_every_input_agreed_and_kept_the_bound() -> None:
+    result = recorded(DOCS, "prove")
+    visits = result["every_input"]
+    assert max(v["inputs"] for v in visits) == 2**32
+    for visit in visits:
+        assert visit["mismatches"] == 0
+        assert visit["worst_dph"] <= visit["bound_dph"]
+    assert all(p["differ"] == 0 for p in result["primitives"])
+    fixed = {p["name"]: p["worst_error"] for p in result["primitives"] if p["name"].startswith("fixed")}
+    gauss = {name: worst for name, worst in fixed.items() if name.endswith(("gauss", "curve"))}
+    assert len(gauss) == 4 and max(gauss.values()) <= 3.5e-8
+
+
+def test_no_run_time_error_was_left_but_those_with_an_argument() -> None:
+    """docs/proof.md, section 2."""
+    left = {(e["part"], e["numeric"]) for e in recorded(DOCS, "prove")["run_time_errors"] if e["alarms"]}
+    assert left == {("map of a bank", "q31"), ("map of any bank", "q31"), ("memory", "q31")}
+
+
+@pytest.mark.parametrize(("world", "name"), [(blind, "blind"), (other, "blind-other")])
+def test_a_blind_run_written_again_takes_the_place_of_itself_alone(
+    world: Any, name: str, tmp_path: Path
+) -> None:
+    runs = recorded(DOCS, name)["runs"]
+    keep(tmp_path / "docs", name, {"runs": runs})
+    blind.write_section(tmp_path / "docs", name, runs[1], {"written": "in another year"}, world.section)
+    again = recorded(tmp_path / "docs", name)["runs"]
+    assert again[1].pop("written") == "in another year"
+    runs[1].pop("written")
+    assert again == runs
+
+
+def _row(named: list[str], before2: float, after2: float) -> dict[str, object]:
+    gain = {"before2": before2, "after2": after2, "noise2": 1.0, "shipped": 0.0}
+    return {"stratum": "one", "truth": ["hysteresis"], "k": [3.0], "named": named, "gain": gain}
+
+
+def test_what_is_gained_is_counted_over_all_that_was_hidden() -> None:
+    """Over what was named rightly alone a cause that is never named gains nothing, and costs nothing."""
+    told = {t["name"]: t for t in _gains([_row(["hysteresis"], 3.0, 1.0), _row([], 3.0, 3.0)])}
+    assert told["held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"]["value"] == pytest.approx(1.0)
+    of_all = told["... of all that hide hysteresis, named or not"]
+    assert of_all["value"] == pytest.approx(0.5) and of_all["of"] == 2 and not of_all["met"]
+
+
+@pytest.mark.parametrize(
+    ("after", "high", "worse", "surely"), [(0.9, 0.2, 0, 0), (1.1, 0.1, 1, 0), (1.1, -0.05, 1, 1)]
+)
+def test_what_is_worse_than_before_is_told_apart_from_what_is_worse_by_more_than_noise(
+    after: float, high: float, worse: int, surely: int
+) -> None:
+    gain = {"exam_rms_before_dph": 1.0, "exam_rms_after_dph": after, "rms_removed_dph": {"high": high}}
+    told = shipped_worse({"extended": {"gain": gain}})
+    assert told == {"shipped": 1.0, "worse": worse, "surely_worse": surely}
+    assert shipped_worse({"extended": None})["shipped"] == 0.0
