@@ -83,7 +83,7 @@ check:
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:
 	@tools/setup.sh test
-	@$(PYTHON) tools/coverage.py
+	@tools/coverage.sh
 
 ## fuzzers of each function family, SECONDS=20 each, kept in build/corpus; STORM=1000000 images with a right CRC; 20,000 damaged files; SEED=1
 fuzz:
