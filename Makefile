@@ -137,7 +137,7 @@ bench-import:
 
 ## faults planted in lots of 60 gyros, and which of them gyrotc fleet names: docs/results.md
 lot: setup
-	@$(PYTHON) -m bench.lot docs
+	@$(PYTHON) -m bench docs --only lot
 
 ## does the uncertainty that the page states hold, on 200 simulated units: docs/results.md
 uncertainty: setup
@@ -161,8 +161,7 @@ lot-prior: setup
 
 ## a thousand gyros through gyrotc fleet, a million calibrations in a catalogue: docs/results.md
 fleet: setup
-	@$(PYTHON) -m bench.fleet docs
-	@$(PYTHON) -m bench.catalogue docs
+	@$(PYTHON) -m bench docs --only fleet
 
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results.md
 kills: setup

@@ -23,8 +23,7 @@ def _say(text: str) -> None:
 
 def _training(docs: Path) -> None:
     """Training beside its peers, which the environment of `make bench` has."""
-    from .accuracy import accuracy
-    from .invariance import invariance
+    from .accuracy import accuracy, invariance
     from .page import section
     from .speed import speed
 
@@ -51,31 +50,64 @@ def _raw(docs: Path) -> None:
 
 def _runtime(docs: Path) -> None:
     """The C runtime, in emulators."""
-    from .runtime import runtime
-    from .runtime_page import section
+    from .runtime import runtime, section
 
     write(docs, "runtime", runtime(_say), section)
 
 
 def _sigma(docs: Path) -> None:
     """Whether the uncertainty of corrections holds, on simulated gyros."""
-    from .sigma import coverage
-    from .sigma_cost import cost
-    from .sigma_page import section
+    from .sigma import cost, coverage, section
 
     write(docs, "sigma", {"cost": cost(), **coverage(_say)}, section)
 
 
 def _bounds(docs: Path) -> None:
     """Static bounds on instructions, beside what an emulator counts."""
-    from .bounds import bounds
-    from .bounds_page import section
+    from .bounds import bounds, section
 
     write(docs, "bounds", {"rows": bounds()}, section)
 
 
+def _fleet(docs: Path) -> None:
+    """A thousand gyros through `gyrotc fleet`, and a million calibrations in a catalogue."""
+    from .fleet import write_catalogue, write_fleet
+
+    write_fleet(docs)
+    write_catalogue(docs)
+
+
+def _lot(docs: Path) -> None:
+    """Faults planted in lots of 60 gyros."""
+    from .fleet import write_lot
+
+    write_lot(docs)
+
+
+def _lot_speed(docs: Path) -> None:
+    """Learning from 50 to 400 units."""
+    from .lot_learning import write_speed
+
+    write_speed(docs)
+
+
+def _lot_strangers(docs: Path) -> None:
+    """What a run of 2.5 h can show of a stranger in a lot."""
+    from .lot_learning import write_strangers
+
+    write_strangers(docs)
+
+
 _PARTS = {"training": _training, "runtime": _runtime}
-_ALONE = {"raw": _raw, "sigma": _sigma, "bounds": _bounds}
+_ALONE = {
+    "raw": _raw,
+    "sigma": _sigma,
+    "bounds": _bounds,
+    "fleet": _fleet,
+    "lot": _lot,
+    "lot-speed": _lot_speed,
+    "lot-strangers": _lot_strangers,
+}
 
 
 def main() -> None:

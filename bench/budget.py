@@ -26,8 +26,7 @@ from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay
 from gyrotc.train.fitting import FitOptions
 
-from .sigma import CAMPAIGNS
-from .sigma_gyros import exam_of
+from .sigma import CAMPAIGNS, exam_of
 
 __all__ = ["Covered", "coverage_of", "section", "units_of"]
 

@@ -1,4 +1,4 @@
-"""`python -m bench.fleet docs [SERIALS]`: a fleet of paper size, read, fitted, emitted and checked by `gyrotc fleet`.
+"""A thousand gyros through `gyrotc fleet`, faults planted in lots, a million calibrations in a catalogue.
 
 Twenty gyros are simulated; their recordings stand for all serials in turn, each under a serial of its own, so that
 every serial is read, fitted, emitted and checked for itself.
@@ -6,21 +6,32 @@ every serial is read, fitted, emitted and checked for itself.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
 import resource
+import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from gyrotc.fleet.catalogue import SCHEMA, catalogued
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.page import summary_of
+from gyrotc.fleet.run import run_fleet
+from lot import FAULTS, Lot
 from results import machine, write
 
-__all__ = ["fleet_figures", "section"]
+__all__ = ["catalogue_section", "lot_section", "section", "write_catalogue", "write_fleet", "write_lot"]
 
 _GYROS = 20
 _SERIALS = 1000
@@ -107,14 +118,148 @@ def section(figures: dict[str, Any]) -> str:
     return _SECTION.format(**figures, row=row)
 
 
-def main(docs: Path, serials: int) -> None:
-    figures = fleet_figures(serials)
-    print(json.dumps(figures, indent=1), file=sys.stderr)
-    print(f"{1e3 * figures['cpu_s'] / serials:.0f} ms of processor time a serial", file=sys.stderr)
+def write_fleet(docs: Path) -> None:
+    """The section `fleet`; status 1, and nothing is written, where a serial failed."""
+    figures = fleet_figures(_SERIALS)
+    print(f"{1e3 * figures['cpu_s'] / _SERIALS:.0f} ms of processor time a serial", file=sys.stderr)
     if figures["exit_status"]:
         sys.exit("a serial failed: nothing written")
     write(docs, "fleet", figures, section)
 
 
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else _SERIALS)
+_UNITS, _DRAWS, _SEED, _LOT_JOBS = 20, 8, 1, 2  # three axes each
+_MANIFEST = 'schema = 1\ndatasets = ["IMU-*"]\naxis = "all"\nnumeric = ["f32"]\n'
+_LOT = """## Faults planted in a lot (`make lot`)
+
+{draws} lots of {gyros} small simulated gyros ({units} units of three axes, six runs of two hours) with one unit of
+each fault, from seed {seed}, through `gyrotc fleet` with {jobs} processes ({elapsed_s:.0f} s in all). Named: every axis
+that the fault concerns has its reason. Healthy gyros accused: {accused} of {healthy}.
+
+| fault | named |
+| --- | --- |
+{rows}
+"""
+
+
+def planted_lots(draws: int, seed: int) -> dict[str, Any]:
+    """How often each fault was named, and how many healthy gyros were accused."""
+    named, accused, healthy, start = dict.fromkeys(FAULTS, 0), [], 0, time.monotonic()
+    for draw in range(draws):
+        lot = Lot(seed + draw, _UNITS)
+        for fault, unit in zip(FAULTS, lot.draw.permutation(lot.units), strict=False):
+            lot.plant(fault, str(unit))
+        with tempfile.TemporaryDirectory(prefix="gyrotc-lot-") as work:
+            folder = Path(work)
+            lot.write(folder / "data")
+            (folder / "data" / "fleet.toml").write_text(_MANIFEST)
+            entries = run_fleet(load_manifest(folder / "data" / "fleet.toml"), folder / "out", jobs=_LOT_JOBS)
+            found = {reason.name: reason for reason in summary_of(entries).apart}
+        concerned = set().union(*lot.planted.values())
+        for fault, names in lot.planted.items():
+            missed = {
+                name: reason.text if (reason := found.get(name)) else None
+                for name in names
+                if name not in found or found[name].id != fault
+            }
+            named[fault] += not missed
+            if missed:
+                print(f"draw {draw}: {fault} not named: {missed}", flush=True)
+        accused += [f"draw {draw}: {found[name].text} ({name})" for name in found if name not in concerned]
+        healthy += 3 * _UNITS - len(concerned)
+    for text in accused:
+        print("accused:", text)
+    elapsed = time.monotonic() - start
+    return {
+        "named": named,
+        "accused": len(accused),
+        "healthy": healthy,
+        "elapsed_s": elapsed,
+        "draws": draws,
+        "seed": seed,
+    }
+
+
+def lot_section(figures: dict[str, Any]) -> str:
+    """The lot_section of docs/results.md."""
+    rows = "\n".join(
+        f"| {fault.replace('_', ' ')} | {n} of {figures['draws']} |" for fault, n in figures["named"].items()
+    )
+    return _LOT.format(rows=rows, units=_UNITS, gyros=3 * _UNITS, jobs=_LOT_JOBS, **figures)
+
+
+def write_lot(docs: Path) -> None:
+    """The section `lot`; status 1 where a fault was named in under seven of eight draws, or two gyros were accused."""
+    figures = planted_lots(_DRAWS, _SEED)
+    write(docs, "lot", figures, lot_section)
+    if min(figures["named"].values()) < 7 * _DRAWS / 8 or figures["accused"] > 1:
+        sys.exit(1)
+
+
+_ROWS, _EACH, _ASKED = 1_000_000, 5, 200  # calibrations; of each gyro; gyros that are asked for
+_FIRST = date(2020, 1, 1)
+_CATALOGUE = """## The catalogue (`make fleet`)
+
+"Which table may this gyro carry on this day, and from which data", asked for {asked} random gyros of a catalogue of
+{rows} calibrations with two recordings each ({megabytes:.0f} MB), the file opened anew each time, as `gyrotc catalogue`
+does it. The aim is 50 ms.
+
+| median | 95 % | longest |
+| --- | --- | --- |
+| {median_ms:.2f} ms | {most_ms:.2f} ms | {longest_ms:.2f} ms |
+"""
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _rows(rows: int) -> Iterator[tuple[Any, ...]]:
+    for k in range(rows):
+        day = _FIRST + timedelta(days=365 * (k % _EACH))
+        known = _hash(str(k))
+        yield (
+            f"RLG-{k // _EACH:06d}", "", day.isoformat(), (day + timedelta(days=400)).isoformat(), "lot", "done",
+            "PASS", known, known, known, known, 7e-4, 1e-4, "RLG",
+        )  # fmt: skip
+
+
+def times(rows: int) -> dict[str, Any]:
+    """Times of the question, s, in a catalogue of so many calibrations."""
+    draw = np.random.default_rng(1)
+    with tempfile.TemporaryDirectory(prefix="gyrotc-catalogue-") as work:
+        path = Path(work) / "catalogue.sqlite"
+        with closing(sqlite3.connect(path)) as base, base:
+            base.executescript(SCHEMA)
+            columns = base.execute(
+                "SELECT group_concat(name) FROM pragma_table_info('calibration')"
+            ).fetchone()[0]
+            names = columns.removeprefix("id,")
+            base.executemany(f"INSERT INTO calibration ({names}) VALUES ({', '.join('?' * 14)})", _rows(rows))
+            files = (
+                (k + 1, f"run-{n}.csv", "train", _hash(f"{k} {n}")) for k in range(rows) for n in range(2)
+            )
+            base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", files)
+        took = []
+        for k in draw.integers(0, rows // _EACH, _ASKED):
+            begun = time.perf_counter()
+            answer = catalogued(path, f"RLG-{k:06d}", "2022-06-01")
+            took.append(1e3 * (time.perf_counter() - begun))
+            assert [len(one.recordings) for one in answer.found] == [2]
+        size = path.stat().st_size / 1e6
+    return {
+        "rows": rows, "asked": _ASKED, "megabytes": size, "median_ms": float(np.median(took)),
+        "most_ms": float(np.quantile(took, 0.95)), "longest_ms": max(took),
+    }  # fmt: skip
+
+
+def catalogue_section(result: dict[str, Any]) -> str:
+    """The catalogue_section of docs/results.md."""
+    return _CATALOGUE.format(**result)
+
+
+def write_catalogue(docs: Path) -> None:
+    """The section `catalogue`; status 1 where one question in twenty takes longer than 50 ms."""
+    result = times(_ROWS)
+    write(docs, "catalogue", result, catalogue_section)
+    if result["most_ms"] > 50.0:
+        sys.exit(1)

@@ -32,7 +32,7 @@ from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
 from numpy.typing import NDArray
 
-from .gaussian_part import gaussian_instructions
+from .bounds import gaussian_instructions
 
 __all__ = ["rms_of", "scenario_of", "section", "without", "world"]
 

@@ -20,19 +20,9 @@ import prove_page  # noqa: E402
 import self_test_page  # noqa: E402
 import targets_page  # noqa: E402
 
-from bench import (  # noqa: E402
-    bounds_page,
-    budget,
-    catalogue,
-    fleet,
-    importing,
-    lot,
-    lot_prior_page,
-    runtime_page,
-    sigma_page,
-)
+from bench import bounds, budget, fleet, importing, lot_prior, runtime, sigma  # noqa: E402
 from bench import page as bench_page  # noqa: E402
-from bench.aims import AIMS  # noqa: E402
+from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
@@ -46,19 +36,19 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "bench": bench_page.section,
     "blind": blind.section,
     "blind-other": other.section,
-    "bounds": bounds_page.section,
+    "bounds": bounds.section,
     "budget": budget.section,
-    "catalogue": catalogue.section,
+    "catalogue": fleet.catalogue_section,
     "fleet": fleet.section,
     "import": importing.section,
     "kills": kills.section,
-    "lot": lot.section,
-    "lot-prior": lot_prior_page.section,
+    "lot": fleet.lot_section,
+    "lot-prior": lot_prior.section,
     "mutants": mutants.section,
     "prove": prove_page.section,
-    "runtime": runtime_page.section,
+    "runtime": runtime.section,
     "self-test": self_test_page.section,
-    "sigma": sigma_page.section,
+    "sigma": sigma.section,
     "targets": targets_page.section,
 }
 WRITING = {
@@ -154,8 +144,8 @@ def test_a_missed_aim_of_the_runtime_is_told() -> None:
     changed = recorded(DOCS, "runtime")
     for cost in changed["costs"]:
         cost["map"]["mean"] += 1000.0
-    aim = runtime_page.AIMS[0]
-    assert f"| {aim.what} | {aim.limit:g} | **" in runtime_page.section(changed)
+    aim = runtime.AIMS[0]
+    assert f"| {aim.what} | {aim.limit:g} | **" in runtime.section(changed)
 
 
 def test_errors_of_the_runtime_keep_their_bounds() -> None:

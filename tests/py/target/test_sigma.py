@@ -17,8 +17,7 @@ from models import random_model, random_uncertainty
 
 sys.path.insert(0, str(ROOT))
 
-from bench.sigma import departures, pooled
-from bench.sigma_gyros import gyro
+from bench.sigma import departures, gyro, pooled
 
 
 @pytest.fixture(scope="module")

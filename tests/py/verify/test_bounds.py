@@ -19,9 +19,7 @@ from gyrotc.verify.toolchain import Object, all_targets
 
 sys.path.insert(0, str(ROOT))
 
-from bench.bounds import bounds_of, model_of
-from bench.bounds_page import section
-from bench.gaussian_part import gaussian_instructions
+from bench.bounds import bounds_of, gaussian_instructions, model_of, section
 
 COUNTS = Counts({"n_terms": 3, "slope_blocks": 10}, 4, False, 5, 100, ())
 TEXT = [

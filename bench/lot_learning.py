@@ -1,18 +1,22 @@
-"""`python -m bench.lot_strangers docs [SEED ...]`: strangers in a lot, and what the best test there can be sees.
+"""What a short run can show of a stranger in a lot, and what a lot costs to learn: parts of `python -m bench docs`.
 
-Lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 strangers: gyros
+Strangers: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
 lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
 knows from what distribution strangers are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the strangers of all other draws), and one that knows each stranger's map.
-Without seeds four new ones are drawn.
+
+Cost: the units are simulated from physics, each for itself: copies of a few with noise of their own would be as many
+clusters, and what was measured were the search for these. Each number of units has a process of its own, so that its
+memory is what it needs.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import resource
 import secrets
-import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,18 +25,17 @@ import numpy as np
 from gyrotc.lot.learn import FALSE_ALARM, UnitSums, sums_of
 from gyrotc.lot.use import LotPrior
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
-from gyrotc.simulate.lot import draw_lot
+from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.means import UnitMeans, unit_means
 from numpy.typing import NDArray
 
-from .lot_checks import best_power, seen
-from .lot_prior import CASES, learnt, ordered, programmes, recorded
+from .lot_peers import best_power, seen
+from .lot_prior import CASES, learnt, ordered, programmes, recordings_of, write_page
 
-__all__ = ["ratio_test"]
+__all__ = ["ratio_test", "write_speed", "write_strangers"]
 
-ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 
 _DRAWS = 4
@@ -57,14 +60,16 @@ def drawn(seed: int) -> Draw:
     units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
     own = [u for u in units if u.lot and not u.lot.stranger]
     strange = [u for u in units if u.lot and u.lot.stranger]
-    taught = [unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recorded(own[:_TAUGHT], exam=False)]
+    taught = [
+        unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(own[:_TAUGHT], exam=False)
+    ]
     found = Draw(seed, learnt(taught), _held(own[_TAUGHT:]), _held(strange))
     print(f"seed {seed}: drawn", flush=True)
     return found
 
 
 def _held(units: list[SimulatedGyro]) -> list[tuple[UnitMeans, UnitMeans]]:
-    return [(seen(programmes(data)[0][1]), seen(data)) for data, _ in recorded(units, exam=False)]
+    return [(seen(programmes(data)[0][1]), seen(data)) for data, _ in recordings_of(units, exam=False)]
 
 
 def ratio_test(
@@ -134,19 +139,39 @@ def figures(draw: Draw, others: list[Draw]) -> dict[str, Any]:
     }
 
 
-def main(arguments: list[str]) -> int:
-    from .lot_prior_page import write_page
-
-    docs = ROOT / arguments[0]
-    seeds = [int(a) for a in arguments[1:]] or [secrets.randbelow(9000) + 1000 for _ in range(_DRAWS)]
+def write_strangers(docs: Path) -> None:
+    """Of lots that are drawn now."""
+    seeds = [secrets.randbelow(9000) + 1000 for _ in range(_DRAWS)]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         draws = pool.map(drawn, seeds, chunksize=1)
-    found = [figures(draw, draws) for draw in draws]
-    for row in found:
-        print(row)
-    write_page(docs, {"strangers": found})
-    return 0
+    write_page(docs, {"strangers": [figures(draw, draws) for draw in draws]})
 
 
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+_UNITS = (50, 100, 200, 400)
+_SEED, _FAMILY = 4711, 0.73
+
+
+def _measured(units: list[UnitMeans]) -> dict[str, float]:
+    before, began = time.process_time(), time.perf_counter()
+    prior = learnt(units)
+    return {
+        "units": len(units),
+        "cpu_s": time.process_time() - before,
+        "wall_s": time.perf_counter() - began,
+        "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        "clusters": len(prior.means),
+        "directions": len(prior.lot.directions),
+    }
+
+
+def write_speed(docs: Path) -> None:
+    """Learning from 50 to 400 units."""
+    order = LotOrder(max(_UNITS), _FAMILY, 1, 0)
+    gyros = draw_lot(with_noise(read("paper")[1], "paper"), order, _SEED)
+    units = [unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(gyros, exam=False)]
+    found = []
+    for n in _UNITS:
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            found.append(pool.map(_measured, [units[:n]])[0])
+        print(found[-1], flush=True)
+    write_page(docs, {"speed": found})
