@@ -21,6 +21,7 @@ import pyarrow.csv as pacsv
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.metrics import average
 from gyrotc.pages.plots import AFTER, BEFORE
+from gyrotc.paper.figures import png
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.tables.emit import emit
@@ -261,7 +262,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
         for r in of_case:
             print(f"{_named(r)}: {r.rms:.4g}, best trivial {r.best_trivial:.4g}", flush=True)
         if case.pictured:
-            picture(of_case).savefig(docs / "real" / f"{case.name}.png", dpi=125, metadata={"Software": None})
+            (docs / "real" / f"{case.name}.png").write_bytes(png(picture(of_case), dpi=125))
         results += of_case
     if results:
         (work / "real.json").write_text(json.dumps([_entry(r) for r in results], indent=1) + "\n", "utf-8")

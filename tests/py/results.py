@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from gyrotc.paper.summary import keep, recorded
+from gyrotc.paper.summary import keep, recorded, shortened
 
 __all__ = ["Results", "filled", "machine", "recorded", "table", "write"]
 
@@ -67,12 +67,13 @@ def write(
         name: Of the campaign.
         result: Everything that it found; goes to `build/results/<name>.json`, which is not tracked.
         section: The text, from what `quoted` leaves.
-        quoted: What of the result stands in `docs/results/summary.json`.
+        quoted: What of the result stands in `docs/results/summary.json`, in as many digits as the section needs.
     """
     whole = docs.parent / "build" / "results" / f"{name}.json"
     whole.parent.mkdir(parents=True, exist_ok=True)
     whole.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    keep(docs, name, quoted(result))
+    told = json.loads(json.dumps(quoted(result)))
+    keep(docs, name, shortened(told, section))
     page = docs / "results.md"
     before = page.read_text(encoding="utf-8") if page.exists() else None
     page.write_text(filled(before, name, section(recorded(docs, name))), encoding="utf-8")

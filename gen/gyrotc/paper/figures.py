@@ -14,6 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from ..pages.comparison import ENVIRONMENTS
 from ..pages.plots import AFTER, BEFORE, COVERED, STYLE
@@ -22,10 +24,11 @@ from ..simulate.noise import CELL_S
 from ..store.files import write_atomically
 from .experiment import AVERAGE_S
 
-__all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run"]
+__all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run", "png"]
 
 _ZOOM = slice(50, 101)
 _DPI = 90  # 900 pixels across, as wide as a page of text
+_COLOURS = 32  # of a picture with two kinds of lines; none is larger than 60 kB
 _CONSTANT, _VARIABLE = ENVIRONMENTS[:3], ENVIRONMENTS[3:]
 
 Series = Mapping[str, Mapping[str, Sequence[float]]]
@@ -104,13 +107,17 @@ def _figure(series: Series, number: int) -> bytes:
         handles, labels = axes[0][0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=2)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        return _png(figure, checksum(series))
+        return png(figure, checksum(series))
 
 
-def _png(figure: Figure, description: str = "") -> bytes:
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None, "Description": description})
-    return stream.getvalue()
+def png(figure: Figure, description: str = "", dpi: int = _DPI, colours: int = _COLOURS) -> bytes:
+    """A picture with a palette, less than half the bytes of one without."""
+    drawn, small, about = io.BytesIO(), io.BytesIO(), PngInfo()
+    figure.savefig(drawn, format="png", dpi=dpi)
+    about.add_text("Description", description)
+    picture = Image.open(drawn).convert("RGB").quantize(colours)
+    picture.save(small, "png", optimize=True, pnginfo=about)
+    return small.getvalue()
 
 
 def _line(
@@ -146,4 +153,4 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         for ax in (above, below):
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        write_atomically(path, _png(figure))
+        write_atomically(path, png(figure, colours=4 * _COLOURS))

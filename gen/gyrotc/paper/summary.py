@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from ..store.files import write_atomically
 
-__all__ = ["keep", "recorded"]
+__all__ = ["keep", "recorded", "shortened"]
 
-_WIDTH = 800  # a record is one line where it has room on it, so that a change of figures reads well
+_WIDTH = 500  # of a line: most records are shorter
 
 
 def _path(docs: Path) -> Path:
@@ -28,15 +29,51 @@ def keep(docs: Path, name: str, record: Any) -> None:
     path = _path(docs)
     before = json.loads(path.read_text("utf-8")) if path.exists() else {}
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, _text(dict(sorted({**before, name: record}.items()))) + "\n")
+    whole = dict(sorted({**before, name: record}.items()))
+    write_atomically(path, "{\n" + ",\n".join(_campaign(*one) for one in whole.items()) + "\n}\n")
 
 
-def _text(value: Any, indent: int = 0) -> str:
-    line = json.dumps(value, ensure_ascii=False)
-    if not value or not isinstance(value, (dict, list)) or (indent and len(line) + indent <= _WIDTH):
-        return line
-    pad = " " * (indent + 1)
+def _campaign(name: str, record: Any) -> str:
+    return "\n".join(_lines(record, " ", f"{json.dumps(name)}: "))
+
+
+def shortened(record: Any, section: Callable[[Any], str]) -> Any:
+    """A record whose numbers have as few significant digits, three at least, as give the same section."""
+    text = section(record)
+    return next(
+        short for n in range(3, 18) if section(short := _rounded(record, n)) == text
+    )  # 17: a float64 is itself
+
+
+def _rounded(value: Any, digits: int) -> Any:
     if isinstance(value, dict):
-        parts = (f"{json.dumps(k, ensure_ascii=False)}: {_text(v, indent + 1)}" for k, v in value.items())
-        return "{\n" + ",\n".join(pad + part for part in parts) + "\n" + pad[1:] + "}"
-    return "[\n" + ",\n".join(pad + _text(v, indent + 1) for v in value) + "\n" + pad[1:] + "]"
+        return {key: _rounded(inner, digits) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_rounded(inner, digits) for inner in value]
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+
+
+def _lines(value: Any, indent: str, before: str = "", after: str = "") -> Iterator[str]:
+    """JSON, each line of which holds as many entries as fit."""
+    flat = json.dumps(value, ensure_ascii=False)
+    if len(indent + before + flat + after) <= _WIDTH or not value or not isinstance(value, (dict, list)):
+        yield indent + before + flat + after
+        return
+    brackets = "{}" if isinstance(value, dict) else "[]"
+    yield indent + before + brackets[0]
+    entries = list(value.items()) if isinstance(value, dict) else [(None, inner) for inner in value]
+    line = ""
+    for k, (key, inner) in enumerate(entries):
+        head = "" if key is None else f"{json.dumps(key, ensure_ascii=False)}: "
+        comma = "," if k + 1 < len(entries) else ""
+        text = head + json.dumps(inner, ensure_ascii=False) + comma
+        if line and len(indent) + len(line) + len(text) + 2 > _WIDTH:
+            yield f"{indent} {line}"
+            line = ""
+        if len(indent) + len(text) + 1 > _WIDTH:
+            yield from _lines(inner, indent + " ", head, comma)
+        else:
+            line = f"{line} {text}" if line else text
+    if line:
+        yield f"{indent} {line}"
+    yield indent + brackets[1] + after

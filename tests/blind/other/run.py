@@ -115,8 +115,9 @@ def _line(row: Row) -> str:
 
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
     """The section of docs/results.md on the other world: every run that was started."""
-    kept = ("kind", "k", "imitated", "verdict", "named")
-    foreign = [{name: row[name] for name in kept} for row in rows if row["stratum"] == "foreign"]
+    kept = ("kind", "k", "named")
+    mistaken = [row for row in rows if row["stratum"] == "foreign" and row["named"]]
+    foreign = [{name: row[name] for name in kept} for row in mistaken]
     told = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
     write_section(docs, "blind-other", head | {"done": len(rows)}, told, section)
 
@@ -128,8 +129,7 @@ def section(record: dict[str, Any]) -> str:
 
 def _section(run: dict[str, Any]) -> str:
     lines = [*run_lines(run, "Other world"), *answer_lines(run["answers"], "answers")]
-    named = [one for one in run["foreign"] if one["named"]]
-    if named:
+    if named := run["foreign"]:
         lines += [
             "",
             "Foreign kinds that were given a name:",
