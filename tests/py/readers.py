@@ -20,6 +20,7 @@ from gyrotc.common.metrics import average
 from gyrotc.diagnose import signature_bank
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.series import series_of
 from gyrotc.diagnose.signature_bank import build
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
@@ -146,14 +147,17 @@ def make_seeds(folder: Path) -> None:
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))
     (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min").content()))
-    found = diagnose(dataset).result.content() | {"pictures": ["pictures/a.svg"]}
-    (folder / "diagnose.json").write_text(json.dumps(found))
+    found = diagnose(dataset)
+    series = series_of(found)
+    assert series is not None
+    (folder / "diagnose.json").write_text(json.dumps(found.result.content()))
+    (folder / "series.json").write_text(json.dumps(series.content()))
 
 
 READERS = (
     "csv", "parquet", "dataset.toml", "model.json", "limits.toml", "fleet.toml", "scenario.toml", "evaluate.json",
     "training.json", "verify.json", "manifest.json", "limits.json", "changes.json", "budget.json",
-    "plan.json", "diagnose.json",
+    "plan.json", "diagnose.json", "series.json",
     "truth.json", "noise.npy", "trace.csv", "board.log", "bank", "record",
 )  # fmt: skip
 
@@ -178,6 +182,7 @@ def seeds_in(seeds: Path, folder: Path) -> dict[str, Reader]:
         "diagnose.json": Reader(
             _page(folder, "diagnose.json", write_diagnosis_page), "json", [(seeds / "diagnose.json").read_bytes()]
         ),
+        "series.json": Reader(_series(seeds, folder), "json", [(seeds / "series.json").read_bytes()]),
         "truth.json": _truth(seeds, folder, "truth.json", "json"),
         "noise.npy": _truth(seeds, folder, _noise_name(seeds), "bytes"),
         "trace.csv": Reader(_trace(result, folder), "text", [(result / "trace" / "run-01.csv").read_bytes()]),
@@ -328,6 +333,13 @@ def _report(result: Path, folder: Path, name: str) -> Callable[[bytes], None]:
         Earlier(work)
 
     return read
+
+
+def _series(seeds: Path, folder: Path) -> Callable[[bytes], None]:
+    """The page of a diagnosis whose series are damaged."""
+    (folder / "drawn").mkdir(exist_ok=True)
+    shutil.copy(seeds / "diagnose.json", folder / "drawn" / "diagnose.json")
+    return _page(folder / "drawn", "series.json", write_diagnosis_page)
 
 
 def _page(folder: Path, name: str, write: Callable[[Path], Any]) -> Callable[[bytes], None]:

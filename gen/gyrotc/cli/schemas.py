@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import BaseModel
 
 from ..model import Model
-from ..results.diagnosed import Diagnosed
+from ..results.diagnosed import Diagnosed, DiagnosisSeries
 from ..results.evaluation import Changes, Comparison, Evaluation
 from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
 from ..results.folder import MapOnGrid, Marker
@@ -26,6 +26,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "check": Checked,
     "compare": Comparison,
     "diagnose": Diagnosed,
+    "diagnosis-series": DiagnosisSeries,
     "emission": EmissionRecord,
     "emit": Emitted,
     "entry": FleetEntry,

@@ -18,6 +18,7 @@ __all__ = [
     "main_directions",
     "noise_of",
     "orthonormal",
+    "running_mean",
 ]
 
 
@@ -83,3 +84,13 @@ CHI2_95_TWO = float(chdtri(2, 0.05))
 
 NORMAL_95 = float(ndtri(0.975))
 """Half width of a 95 % interval in standard deviations: 1.96."""
+
+
+def running_mean(values: FloatArray, width: int) -> FloatArray:
+    """Means over `width` neighbours, fewer at the ends, of values, shape (n,) or (n, k)."""
+    total = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
+    n = len(values)
+    low = np.maximum(np.arange(n) - width // 2, 0)
+    high = np.minimum(low + width, n)
+    count = (high - low).reshape(-1, *([1] * (values.ndim - 1)))
+    return np.asarray((total[high] - total[low]) / count)

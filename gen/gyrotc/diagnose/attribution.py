@@ -25,9 +25,9 @@ from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranke
 from .search import Search
 from .wide_memory import WideMemory, outlasts, rate_independent
 
-__all__ = ["Attribution", "attribute", "choose", "overlap"]
+__all__ = ["LEVEL", "Attribution", "attribute", "choose", "overlap"]
 
-_LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
+LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
 _WELL = 0.08  # p-value of what is left that a pair must reach,
 _NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
 _MISFIT = 0.01  # p-value of what is left below which further causes are looked for: as for the first one
@@ -68,7 +68,7 @@ class Attribution:
 
     @property
     def detected(self) -> bool:
-        return bool(self.first) and self.first[0].p_value <= _LEVEL
+        return bool(self.first) and self.first[0].p_value <= LEVEL
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class _Stage:
 
     @property
     def remains(self) -> bool:
-        return self.left.p_value < _MISFIT or self.found[0].p_value <= _LEVEL
+        return self.left.p_value < _MISFIT or self.found[0].p_value <= LEVEL
 
     @property
     def well(self) -> bool:
@@ -95,7 +95,7 @@ class _Stage:
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = detect(search, "map and beside")
-    if first[0].p_value > _LEVEL:
+    if first[0].p_value > LEVEL:
         return Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
     gains = Gains(search)
     singles = list(gains.single())
@@ -254,7 +254,7 @@ def choose(search: Search, count: int) -> tuple[Refined, ...]:
 def _third(found: list[Found], chosen: tuple[Candidate, ...]) -> Candidate | None:
     top = found[0]
     present = {c.id for c in chosen}
-    if top.p_value > _LEVEL or top.candidate.role == "structure" or top.candidate.id in present:
+    if top.p_value > LEVEL or top.candidate.role == "structure" or top.candidate.id in present:
         return None
     if top.candidate.role == "input":
         return None

@@ -67,7 +67,8 @@ def diagnose_into(
 
 def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
-    from ..pages.diagnosis import PICTURES, draw, write_diagnosis_page
+    from ..diagnose.series import series_of
+    from ..pages.diagnosis import PICTURES, SERIES, draw, write_diagnosis_page
 
     if progress:
         progress("drawing")
@@ -79,10 +80,14 @@ def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagn
     if scenario is not None:
         write_atomically(out / _SCENARIO, scenario)
         result = result.model_copy(update={"scenario": _SCENARIO})
-    drawn = draw(found)
+    series = series_of(found)
+    drawn = {} if series is None else draw(result, series)
     for name, svg in drawn.items():
         write_atomically(out / PICTURES / f"{name}.svg", svg)
     result = result.model_copy(update={"pictures": tuple(f"{PICTURES}/{name}.svg" for name in drawn)})
+    if series is not None:
+        write_atomically(out / SERIES, json_text(series.content()))
+        result = result.model_copy(update={"series": SERIES})
     write_atomically(out / "diagnose.json", json_text(result.content()))
     write_diagnosis_page(out)
     return replace(found, result=result)
@@ -210,7 +215,7 @@ def _write(out: Path, dataset: Dataset, files: dict[str, str]) -> None:
 def _written(result: Diagnosed) -> Sequence[str]:
     """Paths of the files that a diagnosis wrote, as its result names them."""
     extended = result.extended.model if result.extended is not None else None
-    more = (*(result.pictures or ()), extended, result.scenario)
+    more = (*(result.pictures or ()), result.series, extended, result.scenario)
     return (_RESULT, _REPORT, *(path for path in more if path is not None))
 
 

@@ -1,4 +1,5 @@
-"""`diagnose.json`: what the simulation gets wrong about recordings, the named causes, and what an extension gains."""
+"""`diagnose.json`: what the simulation gets wrong about recordings, the named causes, and what an extension gains;
+`series.json`: what its pictures show."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ __all__ = [
     "ConsideredCause",
     "CycleResult",
     "Diagnosed",
+    "DiagnosisSeries",
     "DiagnosisVerdict",
     "Estimate",
     "EventSize",
@@ -22,6 +24,10 @@ __all__ = [
     "FoundEvent",
     "GainOnUnseen",
     "NamedCause",
+    "ParameterLikelihood",
+    "RunSeries",
+    "ScoredRun",
+    "SearchScores",
     "ShippingTrial",
     "StaticRate",
     "Statistic",
@@ -256,6 +262,7 @@ class Diagnosed(Result):
     events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")
     scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
+    series: str | None = Field(default=None, description="file of what the pictures show")
     lot: str | None = Field(default=None, description="with `--lot`: what was done with it; null without")
 
     @property
@@ -267,3 +274,79 @@ class Diagnosed(Result):
     def noise(self) -> tuple[NamedCause, ...]:
         """Kinds of noise that were found."""
         return tuple(cause for cause in self.causes if cause.family == "noise")
+
+
+Values = tuple[float, ...]
+
+
+class RunSeries(Part):
+    """Means over blocks of a training run."""
+
+    name: str = Field(description="of the run")
+    file: str = Field(description="of the run")
+    environment: str = Field(description="as the data set names it")
+    first_s: float = Field(description="time of its first row on the file's clock, s")
+    hours: Values = Field(description="middles of the blocks since that row, h")
+    temperature_c: Values = Field(description="temperature, C")
+    slope_c_per_min: Values = Field(description="dT/dt, C/min")
+    rate_dph: Values = Field(description="rate less its mean over all training runs, deg/h")
+    residual_dph: Values = Field(
+        description="what the static map leaves (of a single cycle: a map of T), deg/h"
+    )
+    simulated_low_dph: Values = Field(
+        description="lower end of the middle 95 % of simulated residuals, means over half an hour, deg/h; empty of a "
+        "single cycle"
+    )
+    simulated_high_dph: Values = Field(description="upper end, deg/h")
+    named_dph: Values | None = Field(
+        description="what the named causes add that no map holds, deg/h; null where none is named"
+    )
+    on_h: Values | None = Field(description="time since power-on, h; null where it is not known")
+    day: Figure = Field(description="start since that of the first run, days; null where it is not stated")
+
+
+class ScoredRun(Part):
+    """Means over `average_s` of a run that the extension was not fitted to."""
+
+    hours: Values = Field(description="since the first, h")
+    before_dph: Values = Field(description="what the model without the causes leaves, deg/h")
+    after_dph: Values = Field(description="what the model with them leaves, deg/h")
+
+
+class ParameterLikelihood(Part):
+    """Profile likelihood of a parameter of a named cause."""
+
+    cause: str = Field(description="name of the cause, in words")
+    parameter: str = Field(description="name of the parameter")
+    values: Values = Field(description="of the parameter, ascending")
+    gain: Values = Field(description="twice the log-likelihood less its largest")
+    low: Figure = Field(description="lower end of the 95 % interval")
+    high: Figure = Field(description="upper end")
+
+
+class SearchScores(Part):
+    """How telling the best candidate of every cause is."""
+
+    alone: dict[str, float] = Field(description="-ln p before any cause was taken, by id")
+    beside: dict[str, float] | None = Field(
+        description="-ln p beside the named causes, by id; null where none is named"
+    )
+    limit: float = Field(description="-ln p that has 1 % for the whole search")
+
+
+class DiagnosisSeries(Result):
+    """What the pictures of a diagnosis show: they are drawn from this and `diagnose.json` alone."""
+
+    schema_: Annotated[Literal["gyrotc.diagnosis-series/1"], Field(alias="schema")] = (
+        "gyrotc.diagnosis-series/1"
+    )
+    block_s: float = Field(description="length of a block, s")
+    average_s: float = Field(description="averaging of the scored runs, s")
+    runs: tuple[RunSeries, ...] = Field(description="training runs")
+    scored: tuple[ScoredRun, ...] = Field(
+        description="runs that were judged; none where nothing was to be judged"
+    )
+    likelihoods: tuple[ParameterLikelihood | None, ...] = Field(
+        description="of each physical cause of `diagnose.json`; null for one without a parameter"
+    )
+    scores: SearchScores = Field(description="of the search")
