@@ -39,7 +39,7 @@ from ..results.planned import (
     TriedRun,
 )
 from ..simulate.campaign import Noise
-from .programme import Programme, node_temperatures, programme_of
+from .programme import node_temperatures, programme_of
 from .sensitivity import Row, Sensitivity, additions, separability
 
 __all__ = ["FoundProfile", "Place", "places", "plan", "shortest"]
@@ -199,14 +199,14 @@ def plan(
     sensitivity = Sensitivity(programme)
     say("comparing causes")
     rows = separability(sensitivity)
-    shown = [Separability(id=r.id, parameter=r.parameter, value=r.value, d=r.d) for r in rows]
+    shown = [Separability.of_object(r) for r in rows]
     result = Plan(
         gyrotc_version=__version__,
         serial=None,
         axis=None,
         scenario=programme.name,
         hours=sum(programme.hours),
-        noise=_noise(programme),
+        noise=AssumedNoise.of_object(programme.declared),
         bias_range_dph=programme.bias_range_dph,
         runs=tuple(
             PlannedRun(profile=run.name, hours=h, temperature=_temperature(run))
@@ -248,16 +248,6 @@ def _additions(
     say("trying further runs")
     ranked = additions(scenario, pair, noise=noise, seed=seed)
     return Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=hours, d=d) for n, hours, d in ranked))
-
-
-def _noise(programme: Programme) -> AssumedNoise:
-    noise = programme.declared
-    return AssumedNoise(
-        arw_deg_per_sqrt_h=noise.arw_deg_per_sqrt_h,
-        bias_instability_dph=noise.bias_instability_dph,
-        rate_random_walk_dph_per_sqrt_h=noise.rate_random_walk_dph_per_sqrt_h,
-        quantum_arcsec=noise.quantum_arcsec,
-    )
 
 
 def _temperature(run: Record) -> Temperature:

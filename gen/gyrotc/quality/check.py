@@ -195,25 +195,8 @@ def _run_line(axis: str | None, f: RunFacts) -> str:
 
 
 def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
-    return CheckedRun(
-        axis=axis,
-        file=f.file,
-        from_s=f.from_s,
-        role=f.role,
-        environment=f.environment,
-        rows=f.rows,
-        first_s=f.first_s,
-        last_s=f.last_s,
-        row_period_s=f.row_period_s,
-        gaps=f.gaps,
-        missing_rows=f.missing_rows,
-        temperature_c=f.temperature_c,
-        mean_dph=f.mean_dph,
-        noise_dph=f.noise_dph,
-        hold_share=f.hold_share,
-        earth_rate_dph=f.earth.rate_dph if f.earth else None,
-        earth_rate_sigma_dph=f.earth.sigma_dph if f.earth else None,
-    )
+    earth = (f.earth.rate_dph, f.earth.sigma_dph) if f.earth else (None, None)
+    return CheckedRun.of_object(f, axis=axis, earth_rate_dph=earth[0], earth_rate_sigma_dph=earth[1])
 
 
 def _counted(things: Sequence[object], word: str) -> str:

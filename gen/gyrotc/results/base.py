@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..common.errors import InputError
 from ..common.inputs import checked, read_json
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 __all__ = [
     "Amount", "Arithmetic", "Axis", "Count", "Figure", "Numbered", "Part", "Positive", "Result", "checked_result",
@@ -41,6 +44,11 @@ class Part(BaseModel):
         populate_by_name=True,
         protected_namespaces=(),
     )
+
+    @classmethod
+    def of_object(cls, found: object, **others: Any) -> Self:
+        """From what a computation found: its attributes that have the names of fields, and the other fields."""
+        return cls(**{n: getattr(found, n) for n in cls.model_fields if n not in others}, **others)
 
     def content(self) -> dict[str, Any]:
         """The JSON object: the fields in their order, without those that were not given."""

@@ -136,9 +136,7 @@ class Span:
 
     def result(self) -> SpanLeftOut:
         """The span as `training.json` has it."""
-        return SpanLeftOut(
-            file=self.file, from_s=self.from_s, to_s=self.to_s, kind=self.kind, guard_s=self.guard_s
-        )
+        return SpanLeftOut.of_object(self)
 
     def __str__(self) -> str:
         return f"{self.file} {self.from_s:g} ... {self.to_s:g} s ({self.kind})"

@@ -9,54 +9,41 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from ...common.errors import InputError
+from ..parquet_file import ParquetBatches
 from .csv_dialect import kind_of_cells
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
 __all__ = ["open_parquet"]
 
-_DAMAGE = (pa.ArrowException, OSError, ValueError)
+_SAMPLE_ROWS = 20
 
 
 def open_parquet(path: Path) -> LoggerFile:
     """A Parquet file.
 
     Raises:
-        InputError: It is damaged.
+        InputError: It is damaged, or larger than is allowed.
     """
-    try:
-        with pq.ParquetFile(path) as file:
-            schema, rows = file.schema_arrow, file.metadata.num_rows
-            sample = next(file.iter_batches(20, use_threads=False), None)
-    except _DAMAGE as error:
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as Parquet ({what})", "a whole Parquet file") from error
-    columns = tuple(column for field in schema if (column := _column(field, sample)) is not None)
-    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, path=path, rows=rows),))
+    file = ParquetBatches(path.name, path)
+    sample = next(file.batches(file.schema.names, _SAMPLE_ROWS), None)
+    columns = tuple(column for field in file.schema if (column := _column(field, sample)) is not None)
+    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file),))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ParquetTable(LoggerTable):
     """The rows of a Parquet file."""
 
-    path: Path = Path()
-    rows: int = 0
+    file: ParquetBatches
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`."""
         at = 0
-        try:
-            with pq.ParquetFile(self.path, pre_buffer=False) as file:
-                wanted = list(names) or [self.columns[0].name]
-                for batch in file.iter_batches(CHUNK_ROWS, columns=wanted, use_threads=False):
-                    values = {n: _values(batch.column(k)) for k, n in enumerate(batch.schema.names)}
-                    yield Chunk(values, at, (at + len(batch)) / max(self.rows, 1))
-                    at += len(batch)
-        except _DAMAGE as error:
-            what = " ".join(str(error).split())[:100]
-            raise InputError(self.path.name, f"is damaged ({what})", "a whole Parquet file") from error
+        for batch in self.file.batches(list(names) or [self.columns[0].name], CHUNK_ROWS):
+            values = {n: _values(batch.column(k)) for k, n in enumerate(batch.schema.names)}
+            yield Chunk(values, at, (at + len(batch)) / max(self.file.rows, 1))
+            at += len(batch)
 
 
 def _column(field: Any, sample: Any) -> Column | None:
