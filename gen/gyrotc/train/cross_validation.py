@@ -27,6 +27,7 @@ from ..results.training import SpanLeftOut
 __all__ = [
     "Fold",
     "Span",
+    "edges_of",
     "history_folds",
     "more_than_error_of_pieces",
     "more_than_its_error",
@@ -157,15 +158,20 @@ class Fold:
         kind: What is left out.
         run: The run that it belongs to, −1 where it is a range of temperatures or rates of all runs.
         power_on: The power-on that it belongs to, −1 likewise.
-        held: Samples that are left out, shape (n,).
-        near: These and the samples within the guard gap of them: none of them is trained on.
+        held: Indices of the samples that are left out, ascending.
+        near: Of these and of the samples within the guard gap of them: none of them is trained on.
     """
 
     kind: Literal["run", "power_on", "branch", "part", "hottest", "coldest", "fastest"]
     run: int
     power_on: int
-    held: NDArray[np.bool_]
-    near: NDArray[np.bool_]
+    held: NDArray[np.intp]
+    near: NDArray[np.intp]
+
+
+def edges_of(run: NDArray[np.int64]) -> NDArray[np.intp]:
+    """First sample of every run, and the number of samples."""
+    return np.concatenate([[0], np.flatnonzero(np.diff(run)) + 1, [len(run)]])
 
 
 def history_folds(samples: Rated, power_on: NDArray[np.int64]) -> tuple[Fold, ...]:
@@ -175,60 +181,61 @@ def history_folds(samples: Rated, power_on: NDArray[np.int64]) -> tuple[Fold, ..
         samples: In order of time within each run.
         power_on: Number of the power-on of every sample, shape (n,).
     """
-    runs, power_ons = np.unique(samples.run), np.unique(power_on)
+    edges = edges_of(samples.run)
+    alone = len(edges) == 2
     found: list[Fold] = []
 
-    def add(kind: Any, held: NDArray[np.bool_], run: int = -1, of: int = -1) -> None:
-        near = _with_guard(samples, held)
-        if held.any() and np.count_nonzero(~near) >= _LEAST_REST:
+    def add(kind: Any, held: NDArray[np.intp], run: int = -1, of: int = -1) -> None:
+        near = _with_guard(samples.time_s, edges, held)
+        if len(held) and len(power_on) - len(near) >= _LEAST_REST:
             found.append(Fold(kind, run, of, held, near))
 
-    for run in runs:
-        mine = samples.run == run
-        of = int(power_on[mine][0])
-        if len(runs) > 1:
-            add("run", mine, int(run), of)
-        for span in _branches(samples, int(run), alone=len(runs) == 1):
-            add(span.kind, span.contains(samples.run, samples.time_s), int(run), of)
-    if 1 < len(power_ons) < len(runs):
-        for one in power_ons:
-            add("power_on", np.asarray(power_on == one), of=int(one))
+    for begin, end in pairwise(edges.tolist()):
+        run, of = int(samples.run[begin]), int(power_on[begin])
+        time, t = samples.time_s[begin:end], samples.temperature_c[begin:end]
+        if not alone:
+            add("run", np.arange(begin, end), run, of)
+        for span in _branches(run, time, t, alone=alone):
+            add(span.kind, begin + np.flatnonzero(span.contains(samples.run[begin:end], time)), run, of)
+    power_ons, number = np.unique(power_on, return_inverse=True)
+    if 1 < len(power_ons) < len(edges) - 1:
+        together = np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
+        for one, held in zip(power_ons, together, strict=True):
+            add("power_on", held, of=int(one))
     t, rate = samples.temperature_c, np.abs(samples.slope_c_per_min)
     low, high = float(t.min()), float(t.max())
     if high - low >= _LEAST_SPAN_C:
-        add("hottest", t > high - _TAIL_SHARE * (high - low))
-        add("coldest", t < low + _TAIL_SHARE * (high - low))
+        add("hottest", np.flatnonzero(t > high - _TAIL_SHARE * (high - low)))
+        add("coldest", np.flatnonzero(t < low + _TAIL_SHARE * (high - low)))
     if rate.max() > 0.0:
-        add("fastest", rate > _FAST_SHARE * float(rate.max()))
+        add("fastest", np.flatnonzero(rate > _FAST_SHARE * float(rate.max())))
     return tuple(found)
 
 
-def _branches(samples: Rated, run: int, *, alone: bool) -> list[Span]:
+def _branches(run: int, time_s: FloatArray, temperature_c: FloatArray, *, alone: bool) -> list[Span]:
     """Branches of a run; of the only run parts of equal length where it has none."""
-    mine = samples.run == run
-    t = samples.temperature_c[mine]
-    if np.ptp(t) < _LEAST_SPAN_C and not alone:
+    if np.ptp(temperature_c) < _LEAST_SPAN_C and not alone:
         return []
-    spans = _cut(run, "", samples.time_s[mine], t)
+    spans = _cut(run, "", time_s, temperature_c)
     return spans if alone or spans[0].kind == "branch" else []
 
 
-def _with_guard(samples: Rated, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """`held` and what lies within the guard gap of it in the same run."""
-    near = held.copy()
-    starts = np.flatnonzero(np.r_[True, np.diff(samples.run) != 0])
-    for begin, end in pairwise([*starts, len(held)]):
-        inside = held[begin:end]
-        if not inside.any() or inside.all():
-            continue
-        time = samples.time_s[begin:end]
-        of = time[inside]
-        after = np.searchsorted(of, time)
-        gap = np.minimum(
-            np.abs(time - of[np.minimum(after, len(of) - 1)]), np.abs(time - of[np.maximum(after - 1, 0)])
-        )
-        near[begin:end] |= gap < _GUARD_S
-    return np.asarray(near)
+def _with_guard(time_s: FloatArray, edges: NDArray[np.intp], held: NDArray[np.intp]) -> NDArray[np.intp]:
+    """`held` and what lies within the guard gap of it in the same run; runs without any of it cost no time."""
+    of_run = np.searchsorted(held, edges)
+    near = [held[:0]]
+    for k in np.flatnonzero(np.diff(of_run)):
+        begin, end = edges[k], edges[k + 1]
+        inside = held[of_run[k] : of_run[k + 1]]
+        if len(inside) < end - begin:
+            time, of = time_s[begin:end], time_s[inside]
+            after = np.searchsorted(of, time)
+            gap = np.minimum(
+                np.abs(time - of[np.minimum(after, len(of) - 1)]), np.abs(time - of[np.maximum(after - 1, 0)])
+            )
+            inside = begin + np.flatnonzero(gap < _GUARD_S)
+        near.append(inside)
+    return np.concatenate(near)
 
 
 def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:

@@ -18,6 +18,7 @@ __all__ = [
     "Scaling",
     "TrainingData",
     "average",
+    "bin_of",
     "cells_of",
     "cleaned",
     "gather",
@@ -223,8 +224,10 @@ def weighted_mean(values: FloatArray, weight: FloatArray) -> float:
     return float((values * weight).sum() / weight.sum())
 
 
-def _numbered(cell_t: NDArray[np.int64], cell_r: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cells that hold samples, numbered in order of T, then of dT/dt."""
+def bin_of(t: FloatArray, r: FloatArray) -> NDArray[np.int64]:
+    """Cells of 1/50 of each half range that hold samples, numbered in order of T, then of dT/dt: that of each."""
+    cell_t = np.floor(t * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
+    cell_r = np.floor(r * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
     first_t, first_r = int(cell_t.min()), int(cell_r.min())
     width = int(cell_r.max()) - first_r + 1
     places = (int(cell_t.max()) - first_t + 1) * width
@@ -241,9 +244,7 @@ def gather(t: FloatArray, r: FloatArray, y: FloatArray, weight: FloatArray) -> B
 
     `weight` is in units of one sample: the noise variance of a sample of weight w is σ²/w.
     """
-    cell_t = np.floor(t * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
-    cell_r = np.floor(r * _BINS_PER_HALF_RANGE + 0.5).astype(np.int64)
-    index = _numbered(cell_t, cell_r)
+    index = bin_of(t, r)
     count = np.asarray(np.bincount(index, weight), dtype=np.float64)
     mean = np.bincount(index, weight * y) / count
     return Bins(

@@ -23,7 +23,16 @@ from ..common.metrics import MAD_TO_SIGMA, median
 from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
 from .noise import difference_sigma
 
-__all__ = ["MEAN_S", "Asked", "MapModel", "Process", "TrainingFailed", "conditioned", "fit_process"]
+__all__ = [
+    "MEAN_S",
+    "Asked",
+    "MapModel",
+    "Process",
+    "TrainingFailed",
+    "conditioned",
+    "conditioned_on",
+    "fit_process",
+]
 
 
 MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
@@ -190,8 +199,15 @@ def conditioned(
         TrainingFailed: The equations cannot be solved.
     """
     center = weighted_mean(bias_dph, weight)
-    y = (bias_dph - center) / process.spread
-    bins = gather(t, r, y, weight / median(weight))
+    return conditioned_on(
+        process, gather(t, r, (bias_dph - center) / process.spread, weight / median(weight)), center
+    )
+
+
+def conditioned_on(
+    process: Process, bins: Bins, center: float
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """The same for means that are gathered: `bins.mean` is their bias less `center` (deg/h), over the spread."""
     model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
     try:
         model.condition(process.model.log_parameters)

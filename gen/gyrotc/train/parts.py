@@ -203,7 +203,8 @@ class _Course:
 
     def fold(self, process: Process, fold: Fold) -> _Fold:
         """Normal equations without a stretch, and what is left on it."""
-        rest, held = ~fold.near, fold.held
+        rest, held = np.ones(len(self.means), dtype=bool), np.zeros(len(self.means), dtype=bool)
+        rest[fold.near], held[fold.held] = False, True
         inside, left = self._less_map(process, rest, held)
         weight = self.means.weight[rest] / np.median(self.means.weight)
         normal = (self.table[rest] * weight[:, None]).T @ inside

@@ -24,8 +24,9 @@ without each stretch; the network that is emitted follows it to within a tenth o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from ..common.arrays import FloatArray
 from ..common.metrics import LEAST_SPAN_C
 from .cross_validation import (
     Fold,
+    edges_of,
     history_folds,
     more_than_error_of_pieces,
     more_than_its_error,
@@ -42,16 +44,27 @@ from .cross_validation import (
     surely_above_0,
     t_statistic,
 )
-from .data import Scaling, TrainingData, average, cells_of, weighted_mean
-from .evidence import MEAN_S, Process, TrainingFailed, conditioned, fit_process
+from .data import Bins, Scaling, TrainingData, average, bin_of, cells_of, weighted_mean
+from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, fit_process
 from .guards import objection
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .noise import difference_sigma
 from .options import SIMPLE
 from .result import Outcome
-from .simple import all_solved, fit_simple, powers_of
+from .simple import all_solved, fit_simple, powers_of, triangle_of
 
-__all__ = ["MAPS", "RUNGS", "YARDSTICKS", "Chosen", "Ladder", "chosen_by_ladder", "climb", "pieces_of"]
+__all__ = [
+    "MAPS",
+    "RUNGS",
+    "YARDSTICKS",
+    "Chosen",
+    "Ladder",
+    "Remaining",
+    "RunSums",
+    "chosen_by_ladder",
+    "climb",
+    "pieces_of",
+]
 
 MAPS = ("mrbf_t", "mrbf")
 RUNGS = ("nothing", *SIMPLE, *MAPS)
@@ -220,7 +233,8 @@ def climb(
     judged = average(means, average_s)
     noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
     noise = max(noise, _LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
-    square = np.array([_squares(fold, means, kept, scaling, process, average_s) for fold in folds])
+    sums = RunSums(means, kept, scaling, process)
+    square = np.array([_squares(fold, sums, average_s) for fold in folds])
     square = square.reshape(len(folds), len(RUNGS))
     return Ladder(folds, np.sqrt(square), 0.5 * np.log(square + noise**2), noise, pieces_of(folds))
 
@@ -231,10 +245,9 @@ def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData
     kept = np.ones(len(means), dtype=bool) if process is None else process.kept
     seen: set[bytes] = set()
     first = np.ones(len(means), dtype=bool)
-    for run in np.unique(means.run):
-        mine = means.run == run
-        content = means.temperature_c[mine].tobytes() + means.bias_dph[mine].tobytes()
-        first[mine] = content not in seen
+    for begin, end in pairwise(edges_of(means.run).tolist()):
+        content = means.temperature_c[begin:end].tobytes() + means.bias_dph[begin:end].tobytes()
+        first[begin:end] = content not in seen
         seen.add(content)
     return means.select(first), kept[first]
 
@@ -251,26 +264,18 @@ def pieces_of(folds: Sequence[Fold]) -> NDArray[np.int64]:
     return np.arange(len(folds))
 
 
-def _squares(
-    fold: Fold,
-    means: TrainingData,
-    kept: NDArray[np.bool_],
-    scaling: Scaling,
-    process: Process | None,
-    average_s: float,
-) -> list[float]:
+def _squares(fold: Fold, sums: RunSums, average_s: float) -> list[float]:
     """Mean square on a stretch under each rung that has not seen it, (deg/h)²."""
-    rest, held = means.select(~fold.near), means.select(fold.held)
-    limits = [(float(x.min()), float(x.max())) for x in (rest.temperature_c, rest.slope_c_per_min)]
-    at = scaling.normalise(np.clip(held.temperature_c, *limits[0]), np.clip(held.slope_c_per_min, *limits[1]))
-    flat = limits[0][1] - limits[0][0] < LEAST_SPAN_C
-    cells, asked = cells_of(held, average_s), _Places.of(*at)
-    places = _Places.of(*scaling.normalise(rest.temperature_c, rest.slope_c_per_min))
-    taught = _Taught(rest, places, kept[~fold.near], process)
+    held, rest = sums.means.select(fold.held), Remaining(sums, fold.near)
+    t, r = sums.scaling.normalise(
+        np.clip(held.temperature_c, *rest.temperature_c), np.clip(held.slope_c_per_min, *rest.slope_c_per_min)
+    )
+    flat = rest.temperature_c[1] - rest.temperature_c[0] < LEAST_SPAN_C
+    cells = cells_of(held, average_s)
     squares = []
     for name in RUNGS:
         try:
-            correction = taught.correction("constant" if flat and name != "nothing" else name, asked)
+            correction = rest.correction("constant" if flat and name != "nothing" else name, t, r)
         except TrainingFailed:
             squares.append(np.nan)
             continue
@@ -278,52 +283,151 @@ def _squares(
     return squares
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """Normalised inputs, and their powers: of these are the columns of all simple rungs."""
+class _SumOfRest:
+    """A sum over samples that remain, for the price of those in the runs that a stretch touches.
 
-    t: FloatArray
-    r: FloatArray
-    powers: FloatArray
-
-    @classmethod
-    def of(cls, t: FloatArray, r: FloatArray) -> _Places:
-        return cls(t, r, powers_of(t, r))
-
-
-class _Taught:
-    """Every rung fitted to what remains.
+    Sums are kept from the first run on and from the last run back. What remains is the sum before the touched runs, the
+    one behind them, and what is left of them: nothing is subtracted, so no digits are lost however much is left out.
 
     Args:
-        rest: Means that are not left out.
-        at: Their places.
-        known: Which of them the process has kept.
+        edges: First sample of every run, and the number of samples.
+        of: The sum over some samples.
+        both: The sum over two sets of them.
+        none: The sum over none.
+    """
+
+    def __init__(
+        self,
+        edges: NDArray[np.intp],
+        of: Callable[[slice | NDArray[np.intp]], FloatArray],
+        both: Callable[[FloatArray, FloatArray], FloatArray],
+        none: FloatArray,
+    ) -> None:
+        runs = [of(slice(begin, end)) for begin, end in pairwise(edges.tolist())]
+        self._of, self._both = of, both
+        self._before = list(accumulate(runs, both, initial=none))
+        self._from = list(accumulate(reversed(runs), both, initial=none))[::-1]
+
+    def __call__(self, first: int, after: int, own: NDArray[np.intp]) -> FloatArray:
+        """Over the runs before `first`, the runs from `after` on, and the samples `own` of those between."""
+        outside = self._both(self._before[first], self._from[after])
+        return self._both(outside, self._of(own)) if len(own) else outside
+
+
+class RunSums:
+    """Means of all runs, and what remains of them without a stretch.
+
+    Args:
+        means: Means of all runs.
+        kept: Which of them the process has kept.
+        scaling: Normalisation of the inputs.
         process: Of the whole record; None: there is none.
     """
 
     def __init__(
-        self, rest: TrainingData, at: _Places, known: NDArray[np.bool_], process: Process | None
+        self, means: TrainingData, kept: NDArray[np.bool_], scaling: Scaling, process: Process | None
     ) -> None:
-        self._rest, self._at, self._known, self._process = rest, at, known, process
-        self._center = weighted_mean(rest.bias_dph, rest.weight)
-        self._simple = all_solved(at.powers, rest.bias_dph - self._center, rest.weight)
+        self.means, self.scaling, self.process = means, scaling, process
+        self.edges = edges_of(means.run)
+        self.center = weighted_mean(means.bias_dph, means.weight)
+        t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
+        bias, root = means.bias_dph - self.center, np.sqrt(means.weight / means.weight.max())
+        rows = np.column_stack([powers_of(t, r), bias]) * root[:, None]
+        ranges = np.stack(
+            [x * sign for x in (means.temperature_c, means.slope_c_per_min) for sign in (-1.0, 1.0)]
+        )
+        self.triangle = _SumOfRest(
+            self.edges,
+            lambda at: triangle_of(rows[at]),
+            lambda one, other: triangle_of(np.concatenate([one, other])),
+            np.zeros((0, rows.shape[1])),
+        )
+        self.ends = _SumOfRest(
+            self.edges, lambda at: ranges[:, at].max(axis=1), np.maximum, np.full(4, -np.inf)
+        )
+        known = np.where(kept, means.weight, 0.0)
+        of_rate = {"mrbf_t": 0.0, "mrbf": 1.0} if process is not None else {}
+        self.cells = {
+            name: _cell_sums(self.edges, t, factor * r, bias, known) for name, factor in of_rate.items()
+        }
+        order = np.flatnonzero(kept)[np.argsort(means.weight[kept], kind="stable")]
+        self._weights = means.weight[order]
+        self._place = np.full(len(means), -1)
+        self._place[order] = np.arange(len(order))
 
-    def correction(self, name: str, asked: _Places) -> FloatArray:
-        """What a rung says at places, deg/h.
+    def median_weight(self, near: NDArray[np.intp]) -> float:
+        """Median weight of what the process has kept and is not left out; 0 where there is none of it.
+
+        The k-th that remains is the k-th of all with as many further as are left out before it.
+        """
+        out = np.sort(self._place[near])
+        out = out[out >= 0]
+        left, ahead = len(self._weights) - len(out), out - np.arange(len(out))
+        if left == 0:
+            return 0.0
+        middle = [(left - 1) // 2, left // 2]
+        return float(self._weights[middle + np.searchsorted(ahead, middle, side="right")].sum() / 2)
+
+
+class Remaining:
+    """Every rung fitted to what remains without a stretch.
+
+    Attributes:
+        temperature_c, slope_c_per_min: Ranges of what remains.
+    """
+
+    def __init__(self, sums: RunSums, near: NDArray[np.intp]) -> None:
+        edges = sums.edges
+        self._sums, self._near = sums, near
+        first = int(np.searchsorted(edges, near[0], side="right")) - 1
+        after = int(np.searchsorted(edges, near[-1], side="right"))
+        own = np.ones(edges[after] - edges[first], dtype=bool)
+        own[near - edges[first]] = False
+        self._where = first, after, edges[first] + np.flatnonzero(own)
+        t0, t1, r0, r1 = sums.ends(*self._where)
+        self.temperature_c, self.slope_c_per_min = (float(-t0), float(t1)), (float(-r0), float(r1))
+        triangle = sums.triangle(*self._where)
+        # The first column is that of the constant, so what it explains of the bias alone is the mean that remains:
+        # taken off, corrections whose columns depend on one another are the smallest about it.
+        self._center = sums.center + float(triangle[0, -1] / triangle[0, 0])
+        triangle[0, -1] = 0.0
+        self._simple = all_solved(triangle, len(sums.means) - len(near))
+
+    def correction(self, name: str, t: FloatArray, r: FloatArray) -> FloatArray:
+        """What a rung says at normalised inputs, deg/h.
 
         Raises:
             TrainingFailed: The map cannot be fitted.
         """
         if name == "nothing":
-            return np.zeros(len(asked.t))
+            return np.zeros(len(t))
         if name in SIMPLE:
-            return np.asarray(self._center + asked.powers @ self._simple[name])
-        if self._process is None:
-            raise TrainingFailed("there is no evidence process")
-        known, of_rate = self._known, 1.0 if name == "mrbf" else 0.0
-        t, r = self._at.t[known], of_rate * self._at.r[known]
-        mean = conditioned(self._process, t, r, self._rest.bias_dph[known], self._rest.weight[known])
-        return mean(asked.t, of_rate * asked.r)
+            return np.asarray(self._center + powers_of(t, r) @ self._simple[name])
+        process = self._sums.process
+        typical = self._sums.median_weight(self._near)
+        if process is None or typical == 0.0:
+            raise TrainingFailed("there is no evidence process, or it has kept nothing of what remains")
+        cells = self._sums.cells[name](*self._where)
+        count, of_t, of_r, of_bias = cells[:, cells[0] > 0.0]
+        center = float(of_bias.sum() / count.sum())
+        mean = (of_bias / count - center) / process.spread
+        bins = Bins(of_t / count, of_r / count, count / typical, mean, 0.0, float(len(count)))
+        asked = conditioned_on(process, bins, self._sums.center + center)
+        return asked(t, r if name == "mrbf" else 0.0 * r)
+
+
+def _cell_sums(
+    edges: NDArray[np.intp], t: FloatArray, r: FloatArray, bias: FloatArray, weight: FloatArray
+) -> _SumOfRest:
+    """Sums of weight, inputs and bias in the cells that a map is conditioned on, shape (4, cells)."""
+    index = bin_of(t, r)
+    columns, count = np.stack([weight, weight * t, weight * r, weight * bias]), int(index.max()) + 1
+    return _SumOfRest(
+        edges,
+        lambda at: np.stack([np.bincount(index[at], column, count) for column in columns[:, at]]),
+        np.add,
+        np.zeros((4, count)),
+    )
 
 
 _STRUCTURE = 1.5  # a constant that leaves no more than this many times the noise has nothing to miss

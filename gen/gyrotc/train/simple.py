@@ -17,7 +17,7 @@ from .noise import floor_dph
 from .options import SIMPLE
 from .result import Network, Outcome, network
 
-__all__ = ["all_solved", "design", "fit_simple", "powers_of", "solve", "without_rate"]
+__all__ = ["all_solved", "design", "fit_simple", "powers_of", "solve", "triangle_of", "without_rate"]
 
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
@@ -58,22 +58,32 @@ def powers_of(t: FloatArray, r: FloatArray) -> FloatArray:
     return columns
 
 
-def all_solved(powers: FloatArray, y: FloatArray, weight: FloatArray) -> dict[str, FloatArray]:
+def triangle_of(rows: FloatArray) -> FloatArray:
+    """Triangle of an orthogonal factorisation, shape (columns, columns) or with fewer rows; that of triangles of parts
+    one below the other is that of the whole."""
+    factor: Any = np.linalg.qr(rows, mode="r")
+    return np.asarray(factor, dtype=np.float64)
+
+
+def all_solved(triangle: FloatArray, samples: int) -> dict[str, FloatArray]:
     """Weights of `powers_of`, 0 for those that a correction does without, of each of `SIMPLE`: as `solve` finds them.
 
     One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
+
+    Args:
+        triangle: `triangle_of` the powers and the bias behind them, each row times the root of its weight.
+        samples: Number of rows.
     """
-    root = np.sqrt(weight / weight.max())
-    factors: Any = np.linalg.qr(np.column_stack([powers * root[:, None], y * root]), mode="r")
-    triangle = np.asarray(factors, dtype=np.float64)  # without the orthogonal one
     size = np.abs(np.diagonal(triangle)[:-1])
     found = {}
     for name, columns in _FIRST.items():
-        weights = np.zeros(powers.shape[1])
+        weights = np.zeros(triangle.shape[1] - 1)
+        of, by = triangle[:columns, :columns], triangle[:columns, -1]
         if size[:columns].min() > _DEPENDENT * size[:columns].max():
-            weights[:columns] = np.linalg.solve(triangle[:columns, :columns], triangle[:columns, -1])
+            weights[:columns] = np.linalg.solve(of, by)
         else:
-            weights[:columns] = solve(powers[:, :columns], y, weight)
+            cut = max(samples, columns) * np.finfo(np.float64).eps  # as for the rows themselves
+            weights[:columns] = np.linalg.lstsq(of, by, rcond=cut)[0]
         found[name] = weights
     return found
 

@@ -23,6 +23,7 @@ against it (likelihood ratio, 5 %); of few runs it is what the next one may diff
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,9 @@ from scipy.special import chdtri, stdtrit
 
 from ..common.arrays import FloatArray
 from ..target.recursions import play
-from .data import TrainingData, cleaned
-from .evidence import Process, fit_process
+from .cross_validation import edges_of
+from .data import TrainingData, average, cleaned
+from .evidence import MEAN_S, Process, fit_process
 from .result import Fit, predict
 
 __all__ = ["Known", "coverage", "of_few", "rezero_dph", "rules_of", "start_sigma", "uncertainty"]
@@ -237,6 +239,9 @@ def _correlation_s(known: Known, block_s: float) -> float:
 
 _POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
 _SPANS = 5  # a single run is cut into so many
+_MOST_LEFT_OUT = (
+    24  # fits without some runs: of more runs neighbours are left out together, at most a 24th and one
+)
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
 _SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))  # of κ², which its prior keeps within
 _NOISES = np.exp(
@@ -368,25 +373,28 @@ def _index(x: FloatArray, span: tuple[float, float], n: int) -> NDArray[np.int64
     return np.clip(np.floor((x - span[0]) * n / width), 0, n - 1).astype(np.int64)
 
 
-def _parts(samples: TrainingData) -> NDArray[np.int64]:
-    """What is left out together: runs, or five spans of a single run."""
-    runs, index = np.unique(samples.run, return_inverse=True)
-    if len(runs) > 1:
-        return np.asarray(index, dtype=np.int64)
-    return np.arange(len(samples)) * _SPANS // len(samples)
-
-
 def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float, float]:
     """(κ², τ² in (deg/h)²) from parts left out in turn; (1, 0) where that cannot be done. A lot brings its own."""
     if whole.asked is not None:
         return 1.0, whole.asked.between_dph**2
-    parts = _parts(samples)
+    edges, means = edges_of(samples.run), samples
+    if len(edges) > 2:
+        means = average(samples, MEAN_S)  # each is of one run, and the process is learnt from them anyway
+        edges_of_means = edges_of(means.run)
+    else:
+        edges = edges_of_means = -(-np.arange(_SPANS + 1) * len(samples) // _SPANS)
+    pieces = len(edges) - 1
+    groups = min(pieces, _MOST_LEFT_OUT)
     rows = []
-    for k in range(int(parts.max()) + 1):
-        rest = samples.select(parts != k)
-        if len(rest) > len(samples) // 10:
-            process = fit_process(rest, fit.scaling, like=whole)
-            rows.append(_surprises(process, samples.select(parts == k), fit))
+    for first, after in pairwise((np.arange(groups + 1) * pieces // groups).tolist()):
+        if len(samples) - (edges[after] - edges[first]) <= len(samples) // 10:
+            continue
+        rest = means.select(np.r_[: edges_of_means[first], edges_of_means[after] : len(means)])
+        process = fit_process(rest, fit.scaling, like=whole)
+        rows += [
+            _surprises(process, samples.select(np.arange(edges[k], edges[k + 1])), fit)
+            for k in range(first, after)
+        ]
     if not rows:
         return 1.0, 0.0
     squares, variance, noise = np.concatenate(rows, axis=1)
