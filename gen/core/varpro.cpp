@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace gyrotc {
 namespace {
@@ -127,6 +129,13 @@ MatrixXd VariableProjection::columns(const Shapes &shapes) const {
     return x;
 }
 
+double VariableProjection::walls(const Shapes &shapes) const {
+    double sum = 0.0;
+    for (Eigen::Index j = 0; j < shapes.cols(); ++j)
+        for (int k = 0; k < kNonlinear; ++k) sum += wall_ * std::pow(beyond(shapes(k, j), k), 2);
+    return sum;
+}
+
 Network VariableProjection::project(const Shapes &shapes) const {
     const MatrixXd x = columns(shapes);
     Network n;
@@ -134,8 +143,7 @@ Network VariableProjection::project(const Shapes &shapes) const {
     n.weights = factorise(normal_matrix(x, ridge_)).solve(x.transpose() * target_);
     n.misfit = (target_ - x * n.weights).squaredNorm();
     n.cost = n.misfit + ridge_ * n.weights.tail(shapes.cols()).squaredNorm();
-    for (Eigen::Index j = 0; j < shapes.cols(); ++j)
-        for (int k = 0; k < kNonlinear; ++k) n.cost += wall_ * std::pow(beyond(shapes(k, j), k), 2);
+    n.cost += walls(shapes);
     if (!std::isfinite(n.cost)) n.cost = std::numeric_limits<double>::infinity();
     return n;
 }
@@ -212,40 +220,153 @@ Network VariableProjection::refine(const Network &start, double tolerance, int m
     return best;
 }
 
-// Gain in the objective that one more Gaussian brings at first order (error reduction of orthogonal least squares).
-// Only the candidates that promise most without orthogonalisation are computed exactly; the others have gain 0.
-VectorXd VariableProjection::gains(const Network &network, const Dictionary &candidates) const {
-    const MatrixXd x = columns(network.shapes);
-    const VectorXd moment = candidates.columns.transpose() * (target_ - x * network.weights);
-    const VectorXd promise = moment.cwiseAbs2().cwiseQuotient(candidates.norms.cwiseMax(1e-300));
+namespace {
+
+// Candidates that promise most without orthogonalisation: only of these the gain is computed.
+std::vector<Eigen::Index> promising(const VectorXd &moment, const VectorXd &norms) {
+    const VectorXd promise = moment.cwiseAbs2().cwiseQuotient(norms.cwiseMax(1e-300));
     std::vector<Eigen::Index> order(static_cast<std::size_t>(promise.size()));
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return promise[a] > promise[b]; });
     order.resize(std::min<std::size_t>(order.size(), kExactGains));
+    return order;
+}
+
+// By a candidate's squared norm: what of it must be orthogonal to the chosen columns, or nothing can be told of it.
+constexpr double kDependent = 1e-10;
+
+double gain_of(double moment, double rest, double norm, double ridge) {
+    return rest > kDependent * norm ? moment * moment / (rest + ridge) : 0.0;
+}
+
+// The candidate with the largest gain, and the best one far from it (-1: there is none).
+std::pair<Eigen::Index, Eigen::Index> best_two(const VectorXd &gain, const Shapes &candidates) {
+    Eigen::Index first = 0, second = -1;
+    gain.maxCoeff(&first);
+    for (Eigen::Index j = 0; j < gain.size(); ++j)
+        if ((second < 0 || gain[j] > gain[second]) && distant(candidates, first, j)) second = j;
+    return {first, second};
+}
+
+}  // namespace
+
+// Gain in the objective that one more Gaussian brings at first order (error reduction of orthogonal least squares), 0 for
+// those that promise little.
+VectorXd VariableProjection::gains(const Network &network, const Dictionary &candidates) const {
+    const MatrixXd x = columns(network.shapes);
+    const VectorXd moment = candidates.columns.transpose() * (target_ - x * network.weights);
+    const std::vector<Eigen::Index> order = promising(moment, candidates.norms);
     const Eigen::LLT<MatrixXd> llt = factorise(normal_matrix(x, ridge_));
     const MatrixXd orthogonal = llt.matrixL().solve(x.transpose() * candidates.columns(Eigen::all, order));
-    VectorXd gain = VectorXd::Zero(promise.size());
+    VectorXd gain = VectorXd::Zero(moment.size());
     for (std::size_t k = 0; k < order.size(); ++k) {
         const Eigen::Index j = order[k];
         const double rest = candidates.norms[j] - orthogonal.col(static_cast<Eigen::Index>(k)).squaredNorm();
-        if (rest > 1e-10 * candidates.norms[j]) gain[j] = moment[j] * moment[j] / (rest + ridge_);
+        gain[j] = gain_of(moment[j], rest, candidates.norms[j], ridge_);
     }
     return gain;
 }
 
+// A network that only grows, none of its shapes being moved: the triangle of its normal equations, and what of every
+// candidate is orthogonal to it, go on from one size to the next.
+class VariableProjection::Appended {
+  public:
+    Appended(const VariableProjection &solver, const Network &start, const Dictionary &candidates, int max_size)
+        : solver_(solver), candidates_(candidates), size_(kLinear + start.shapes.cols()) {
+        const Eigen::Index most = std::max<Eigen::Index>(size_, kLinear + max_size);
+        x_.resize(solver.t_.size(), most);
+        x_.leftCols(size_) = solver.columns(start.shapes);
+        const MatrixXd normal = normal_matrix(x_.leftCols(size_), solver.ridge_);
+        floor_ = normal(0, 0) - x_.col(0).squaredNorm();
+        lower_ = MatrixXd::Zero(most, most);
+        lower_.topLeftCorner(size_, size_) = factorise(normal).matrixL();
+        target_.resize(most);
+        target_.head(size_) = x_.leftCols(size_).transpose() * solver.target_;
+        triangle().solveInPlace(target_.head(size_));
+        held_.resize(most, candidates.columns.cols());
+        held_.topRows(size_) = x_.leftCols(size_).transpose() * candidates.columns;
+        triangle().solveInPlace(held_.topRows(size_));
+        rest_ = candidates.norms - held_.topRows(size_).colwise().squaredNorm().transpose();
+    }
+
+    // The better of the two trials of `grow`, appended; it is `network` with one Gaussian more.
+    Network next(const Network &network) {
+        const VectorXd moment =
+            candidates_.columns.transpose() * (solver_.target_ - x_.leftCols(size_) * network.weights);
+        VectorXd gain = VectorXd::Zero(moment.size());
+        for (const Eigen::Index j : promising(moment, candidates_.norms))
+            gain[j] = gain_of(moment[j], rest_[j], candidates_.norms[j], solver_.ridge_);
+        const auto [first, second] = best_two(gain, candidates_.shapes);
+        Eigen::Index taken = first;
+        Network best = appended(network, first);
+        if (second >= 0) {
+            Network other = appended(network, second);
+            if (other.cost < best.cost) {
+                best = std::move(other);
+                taken = second;
+            }
+        }
+        append(taken);
+        return best;
+    }
+
+  private:
+    const VariableProjection &solver_;
+    const Dictionary &candidates_;
+    Eigen::Index size_;
+    double floor_ = 0.0;            // what `normal_matrix` adds to its diagonal
+    MatrixXd x_, lower_;            // columns, and the triangle of their normal matrix
+    VectorXd target_;               // lower^-1 x' target
+    MatrixXd held_;                 // lower^-1 x' candidates
+    VectorXd rest_;                 // squared norms of the candidates without that
+
+    Eigen::TriangularView<const Eigen::Block<const MatrixXd>, Eigen::Lower> triangle() const {
+        return static_cast<const MatrixXd &>(lower_).topLeftCorner(size_, size_).triangularView<Eigen::Lower>();
+    }
+
+    // Column, row of the triangle, and entry of the target that a candidate brings.
+    void enter(Eigen::Index j) {
+        const Eigen::Index k = size_;
+        x_.col(k) = solver_.gaussians(candidates_.shapes.col(j));
+        VectorXd row = x_.leftCols(k).transpose() * x_.col(k);
+        triangle().solveInPlace(row);
+        const double norm = x_.col(k).squaredNorm() + floor_ + solver_.ridge_;
+        lower_.row(k).head(k) = row;
+        lower_(k, k) = std::sqrt(std::max(norm - row.squaredNorm(), kDependent * norm));
+        target_[k] = (x_.col(k).dot(solver_.target_) - row.dot(target_.head(k))) / lower_(k, k);
+    }
+
+    Network appended(const Network &network, Eigen::Index j) {
+        enter(j);
+        ++size_;
+        Network more;
+        more.shapes = with(network.shapes, candidates_.shapes.col(j));
+        more.weights = lower_.topLeftCorner(size_, size_).transpose().triangularView<Eigen::Upper>().solve(target_.head(size_));
+        more.misfit = (solver_.target_ - x_.leftCols(size_) * more.weights).squaredNorm();
+        more.cost = more.misfit + solver_.ridge_ * more.weights.tail(more.shapes.cols()).squaredNorm() +
+                    solver_.walls(more.shapes);
+        if (!std::isfinite(more.cost)) more.cost = std::numeric_limits<double>::infinity();
+        --size_;
+        return more;
+    }
+
+    void append(Eigen::Index j) {
+        enter(j);
+        const Eigen::Index k = size_++;
+        Eigen::RowVectorXd held = x_.col(k).transpose() * candidates_.columns;
+        held -= lower_.row(k).head(k) * held_.topRows(k);
+        held_.row(k) = held / lower_(k, k);
+        rest_ -= held_.row(k).cwiseAbs2().transpose();
+    }
+};
+
 // The better of two trials: the candidate with the largest gain, and the best one far from it.
-Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance,
-                                 int steps) const {
-    const VectorXd gain = gains(network, candidates);
-    Eigen::Index first = 0;
-    gain.maxCoeff(&first);
-    Eigen::Index second = -1;
-    for (Eigen::Index j = 0; j < gain.size(); ++j)
-        if ((second < 0 || gain[j] > gain[second]) && distant(candidates.shapes, first, j)) second = j;
-    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, steps);
+Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance) const {
+    const auto [first, second] = best_two(gains(network, candidates), candidates.shapes);
+    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, kMaxRefineSteps);
     if (second >= 0) {
         const Shapes shapes = with(network.shapes, candidates.shapes.col(second));
-        Network other = refine(project(shapes), tolerance, steps);
+        Network other = refine(project(shapes), tolerance, kMaxRefineSteps);
         if (other.cost < best.cost) best = std::move(other);
     }
     return best;
@@ -271,14 +392,23 @@ std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_s
     candidates.columns = dictionary_columns(centers);
     candidates.norms = candidates.columns.colwise().squaredNorm();
     std::vector<Network> sizes{project(Shapes(kNonlinear, 0))};
+    std::optional<Appended> appended;  // while nothing is left to move Gaussians for
     while (static_cast<int>(sizes.size()) <= max_size && centers.rows() > 0) {
         const bool reached = sizes.back().misfit <= enough;
-        const int steps = sizes.back().misfit > settled ? kMaxRefineSteps : 0;
-        Network next = grow(sizes.back(), candidates, tolerance, steps);
+        if (sizes.back().misfit <= settled) {
+            if (!appended) appended.emplace(*this, sizes.back(), candidates, max_size);
+            Network next = appended->next(sizes.back());
+            if (!(next.cost < sizes.back().cost)) break;
+            sizes.push_back(std::move(next));
+            if (reached) break;
+            continue;
+        }
+        appended.reset();
+        Network next = grow(sizes.back(), candidates, tolerance);
         if (!(next.cost < sizes.back().cost)) break;
         sizes.push_back(std::move(next));
         std::size_t m = sizes.size() - 1;
-        for (; m > 1 && steps > 0; --m) {
+        for (; m > 1; --m) {
             Network fewer = prune(sizes[m], tolerance);
             if (!(fewer.cost < sizes[m - 1].cost)) break;
             sizes[m - 1] = std::move(fewer);
@@ -286,11 +416,12 @@ std::vector<Network> VariableProjection::path(const MatrixXd &centers, int max_s
         // A deletion may beat even the larger network that it came from: that one is grown anew.
         for (; m < sizes.size(); ++m) {
             if (m == 0 || sizes[m].cost < sizes[m - 1].cost) continue;
-            sizes[m] = grow(sizes[m - 1], candidates, tolerance, steps);
+            sizes[m] = grow(sizes[m - 1], candidates, tolerance);
             if (!(sizes[m].cost < sizes[m - 1].cost)) sizes.resize(m);
         }
         if (reached) break;
     }
+    if (appended) sizes.back() = project(sizes.back().shapes);
     return sizes;
 }
 

@@ -48,7 +48,8 @@ class VariableProjection {
     // Networks of 0, 1, ... Gaussians: forward selection among `centers` (rows: t, r) x a ladder of widths, two
     // trials for each size; deletions from the larger size replace a smaller one that they beat. The cost never rises
     // along the path. Ends one size after the misfit is <= enough, at max_size, or where a further Gaussian gains nothing.
-    // Below a misfit of `settled` further Gaussians are only selected: there is nothing left to move them for.
+    // Below a misfit of `settled` further Gaussians are only selected: there is nothing left to move them for. Each is
+    // appended to the Cholesky factor of those before it, O(points x candidates) a Gaussian however many there are.
     std::vector<Network> path(const Eigen::MatrixXd &centers, int max_size, double enough, double settled,
                               double tolerance) const;
 
@@ -62,8 +63,11 @@ class VariableProjection {
     Eigen::MatrixXd gaussians(const Shapes &shapes) const;
     Eigen::MatrixXd dictionary_columns(const Eigen::MatrixXd &centers) const;
     Eigen::MatrixXd columns(const Shapes &shapes) const;
+    class Appended;
+
+    double walls(const Shapes &shapes) const;
     Eigen::VectorXd gains(const Network &network, const Dictionary &candidates) const;
-    Network grow(const Network &network, const Dictionary &candidates, double tolerance, int steps) const;
+    Network grow(const Network &network, const Dictionary &candidates, double tolerance) const;
     Network prune(const Network &network, double tolerance) const;
 
     Eigen::VectorXd t_, r_, root_, target_;  // target_ is already multiplied by root_ = sqrt(weight)

@@ -25,7 +25,7 @@ import numpy as np
 from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
-from .data import Scaling, TrainingData, scaling_of
+from .data import Bins, Scaling, TrainingData, scaling_of
 from .evidence import Process, fit_process
 from .noise import not_white
 from .result import Outcome, network
@@ -344,8 +344,9 @@ def _compress(
     limit, stop = (MAX_CENTERS, enough) if centers is None else (centers, 0.0)
     sizes = solver.path(nodes, limit, stop, _SETTLED * enough, 0.01 * enough)
     target = model.mean(bins.t, bins.r)
+    columns: dict[bytes, FloatArray] = {}  # networks that only grew have most of their Gaussians in common
     departures = [
-        float(np.average((target - evaluate(n, bins.t, bins.r)) ** 2, weights=bins.count)) for n in sizes
+        float(np.average((target - _evaluated(n, bins, columns)) ** 2, weights=bins.count)) for n in sizes
     ]
     if centers is not None:
         return sizes, len(sizes) - 1, departures
@@ -361,12 +362,16 @@ def _envelope_grid(scaling: Scaling) -> tuple[FloatArray, FloatArray]:
     return scaling.normalise(t.ravel(), r.ravel())
 
 
-def evaluate(network: _core.Network, t: FloatArray, r: FloatArray) -> FloatArray:
-    """A standardised network at normalised inputs."""
-    w = network.weights
+def _evaluated(network: _core.Network, bins: Bins, columns: dict[bytes, FloatArray]) -> FloatArray:
+    """A standardised network at bins; `columns` keeps its Gaussians by their shape."""
+    w, t, r = network.weights, bins.t, bins.r
     value = w[0] + w[1] * t + w[2] * r
-    for (c, d, s, q), weight in zip(network.shapes.T, w[3:], strict=True):
-        value = value + weight * np.exp(-(((t - c) / np.exp(s)) ** 2) - ((r - d) / np.exp(q)) ** 2)
+    for shape, weight in zip(network.shapes.T, w[3:], strict=True):
+        key = shape.tobytes()
+        if key not in columns:
+            c, d, s, q = shape
+            columns[key] = np.exp(-(((t - c) / np.exp(s)) ** 2) - ((r - d) / np.exp(q)) ** 2)
+        value = value + weight * columns[key]
     return np.asarray(value)
 
 

@@ -112,3 +112,24 @@ def test_the_path_ends_one_size_after_enough() -> None:
     sizes = solver.path(grid, 20, 1e-3 * weight.sum(), 0.0, 1e-9)
     reached = next(m for m, n in enumerate(sizes) if n.misfit <= 1e-3 * weight.sum())
     assert len(sizes) <= reached + 2
+
+
+@pytest.mark.parametrize("ridge", [1e-1, 1e-6])
+def test_a_network_that_only_grows_is_projected_as_if_from_scratch(ridge: float) -> None:
+    """Also with candidates that are there twice, and with far more Gaussians than the target has structure.
+
+    1e-6 of the cost: the normal matrix has a condition of up to 1e9, so weights are known to 1e-7; the cost is
+    stationary in them and errs by far less, beside the sums of rounding errors over the points.
+    """
+    seed = int(np.random.default_rng().integers(2**31))
+    print(f"seed {seed}")
+    t, r, weight = points(seed, 300)
+    centers = np.random.default_rng(seed).uniform(-1.0, 1.0, (10, 2))[[*range(10), 0, 1, 2]]
+    solver = _core.VariableProjection(t, r, weight, np.sin(3.0 * t) + r * t, ridge)
+    sizes = solver.path(centers, 60, 0.0, np.inf, 0.0)
+    assert len(sizes) > 20
+    for network in sizes:
+        again = solver.project(network.shapes)
+        assert network.cost == pytest.approx(again.cost, rel=1e-6)
+    last = solver.project(sizes[-1].shapes)
+    assert np.array_equal(sizes[-1].weights, last.weights), "what is emitted comes from the columns themselves"
