@@ -132,4 +132,6 @@ def test_a_network_that_only_grows_is_projected_as_if_from_scratch(ridge: float)
         again = solver.project(network.shapes)
         assert network.cost == pytest.approx(again.cost, rel=1e-6)
     last = solver.project(sizes[-1].shapes)
-    assert np.array_equal(sizes[-1].weights, last.weights), "what is emitted comes from the columns themselves"
+    assert np.array_equal(sizes[-1].weights, last.weights), (
+        "what is emitted comes from the columns themselves"
+    )
