@@ -98,7 +98,14 @@ def _lot_strangers(docs: Path) -> None:
     write_strangers(docs)
 
 
-_PARTS = {"training": _training, "runtime": _runtime}
+def _growth(docs: Path) -> None:
+    """How the cost of commands grows with rows, runs, centers and units."""
+    from .growth import growth, section
+
+    write(docs, "growth", growth(_say), section)
+
+
+_PARTS = {"training": _training, "runtime": _runtime, "growth": _growth}
 _ALONE = {
     "raw": _raw,
     "sigma": _sigma,

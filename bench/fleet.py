@@ -31,7 +31,15 @@ from gyrotc.fleet.run import run_fleet
 from lot import FAULTS, Lot
 from results import machine, write
 
-__all__ = ["catalogue_section", "lot_section", "section", "write_catalogue", "write_fleet", "write_lot"]
+__all__ = [
+    "catalogue_section",
+    "lot_section",
+    "section",
+    "under_serial",
+    "write_catalogue",
+    "write_fleet",
+    "write_lot",
+]
 
 _GYROS = 20
 _SERIALS = 1000
@@ -62,7 +70,7 @@ def fleet_figures(serials: int) -> dict[str, Any]:
             list(pool.map(lambda gyro: _simulated(program, folder, gyro), range(_GYROS)))
         print(f"{serials} serials, {_JOBS} processes", file=sys.stderr)
         for k in range(serials):
-            _under_serial(folder / "gyros" / str(k % _GYROS), folder / "data" / f"RLG-{k:04d}")
+            under_serial(folder / "gyros" / str(k % _GYROS), folder / "data" / f"RLG-{k:04d}")
         load = os.getloadavg()[0]
         begun, used = time.monotonic(), _cpu_s()
         command = [program, "fleet", folder / "data", "--out", folder / "out", "--jobs", str(_JOBS)]
@@ -90,7 +98,7 @@ def _simulated(program: Path, folder: Path, gyro: int) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-def _under_serial(source: Path, folder: Path) -> None:
+def under_serial(source: Path, folder: Path) -> None:
     """The same recordings (links), under a serial of their own."""
     folder.mkdir(parents=True)
     for path in source.glob("*.csv"):

@@ -1,124 +1,148 @@
-"""`python -m bench.growth [--out FILE]`: CPU time and memory of `gyrotc fit` over runs and centers, a lot over units.
-
-Each size is a process of its own with one thread, so that its memory is what it needs. The slope is that of a
-line through the logarithms of size and processor time; the start of the program counts, too.
-Units of the lot are drawn from the model of a lot itself, at the places of one simulated gyro: what learning costs
-depends on their number and on the functions that count, not on how they were simulated.
-"""
+"""How the cost of whole commands grows with rows, runs, centers and units: CPU seconds, peak memory, slopes."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import os
+import math
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from results import machine, table
 
-RUNS, CENTERS, UNITS = (12, 25, 51, 102), (16, 64, 256), (50, 200, 1000)
-_SEED, _NOISE_DPH = 4711, 0.3
-_PROFILES = ("20 C", "-40 C", "60 C", "1 C/min", "3 C/min", "5 C/min")
-_CAMPAIGN = """extends = "paper"
-title = "{0} runs"
-[[set]]
-role = "train"
-started = 2026-03-02T08:00:00Z
-every_h = 24.0
-profiles = {1}
+from .fleet import under_serial
+
+__all__ = ["growth", "section"]
+
+_RAW_HZ = (1, 10, 100)  # rows a second of the paper's twelve runs of 8 h
+_SETS = (1, 4, 16)  # of the six runs of the paper, and one set to be judged by
+_CENTERS = (4, 16, 64)
+_SERIALS = (4, 16, 64)
+_GYROS = 4  # whose recordings stand for all serials in turn
+_HEAD = """## How cost grows (`make bench`)
+
+{machine}. Whole commands, interpreter and imports included. Rows: twelve runs of 8 h (Parquet), of which a `fit` takes
+every row through the front end. Runs: of 8 h, rows of 10 s. Centers: as many as are asked for, twelve runs. Units:
+serials of the paper's size through one process. Slope: of the logarithm of the cost over that of the size, between the
+two largest sizes; 1 is in proportion.
 """
+_STARTER = """import os, sys
+null = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, os.O_WRONLY, 0) for fd in (1, 2)]
+_, status, used = os.wait4(os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=null), 0)
+if status:
+    sys.exit(f"{' '.join(sys.argv[1:])} ended with status {status}")
+print([used.ru_utime + used.ru_stime, used.ru_maxrss])
+"""
+_COLUMNS = ("what grows", "command", "sizes ", "CPU s ", "peak MiB ", "slope of CPU ", "slope of memory ")
+
+Say = Callable[[str], None]
+_Job = tuple[int, list[str]]  # size; words behind `gyrotc`
 
 
-def measured(command: list[str]) -> dict[str, float]:
-    """CPU seconds and peak memory of a command."""
-    one = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    process = subprocess.Popen(command, env=one, stdout=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if status != 0:
-        raise RuntimeError(f"{' '.join(command)} ended with status {process.returncode}")
-    return {"cpu_s": used.ru_utime + used.ru_stime, "memory_mib": used.ru_maxrss / 1024.0}
+def growth(say: Say) -> dict[str, Any]:
+    """Every command at every size."""
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="gyrotc-growth-") as place:
+        for what, jobs in _PARTS.items():
+            for command, found in _measured(jobs(Path(place) / what), what, say).items():
+                rows.append({"what": what, "command": command, "sizes": found})
+    return {"machine": machine(), "rows": rows}
 
 
-def slope(rows: list[dict[str, float]]) -> float:
-    """Of processor time over size, on a log-log line."""
-    size, cost = (np.log([row[key] for row in rows]) for key in ("size", "cpu_s"))
-    return float(np.polyfit(size, cost, 1)[0])
+def _measured(jobs: Iterator[_Job], what: str, say: Say) -> dict[str, list[dict[str, float]]]:
+    """By command, the cost at each size."""
+    found: dict[str, list[dict[str, float]]] = {}
+    for size, words in jobs:
+        say(f"{what}: {size}, gyrotc {words[0]}")
+        cost = _gyrotc(words)
+        found.setdefault(words[0], []).append({"size": size, **cost})
+    return found
 
 
-def learn_lot(units: int, training: Path) -> None:
-    """Learns a lot of so many drawn units, at the places of the means in a `training.json`."""
-    from gyrotc.lot.basis import PRIOR_LOG, LotBasis
-    from gyrotc.lot.learn import learn
-    from gyrotc.train.means import UnitMeans
+def _gyrotc(words: Sequence[str]) -> dict[str, float]:
+    """CPU seconds and peak memory of a command, started by a process that has next to none itself.
 
-    means = json.loads(training.read_text("utf-8"))["means"]
-    t, r, count = (np.array(means[key]) for key in ("temperature_c", "slope_c_per_min", "count"))
-    rng = np.random.default_rng(_SEED)
-    envelope = (float(t.min()) - 1.0, float(t.max()) + 1.0), (float(r.min()) - 0.1, float(r.max()) + 0.1)
-    basis = LotBasis.over(*envelope)
-    spread = np.sqrt(basis.variance(PRIOR_LOG))
-    mean, directions = spread * rng.normal(size=len(spread)), spread * rng.normal(size=(2, len(spread)))
-
-    def drawn() -> UnitMeans:
-        at = t + rng.normal(0.0, 0.05, len(t)), r + rng.normal(0.0, 0.005, len(r))
-        own = mean + rng.normal(size=2) @ directions + 0.2 * spread * rng.normal(size=len(spread))
-        noise = rng.normal(size=len(t)) * _NOISE_DPH / np.sqrt(count)
-        return UnitMeans(*at, basis.values(*at) @ own + noise, count, _NOISE_DPH)
-
-    learn([drawn() for _ in range(units)], envelope, lambda _: None)
+    A process begins with the peak of the one that started it.
+    """
+    command = [sys.executable, "-S", "-c", _STARTER, str(Path(sys.executable).with_name("gyrotc")), *words]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+    seconds, kib = json.loads(done.stdout)
+    return {"seconds": seconds, "peak_mib": kib / 1024.0}
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m bench.growth")
-    parser.add_argument("--out", type=Path, help="JSON file for the figures")
-    parser.add_argument("--only", choices=["runs", "centers", "units"])
-    parser.add_argument("--learn", nargs=2, help=argparse.SUPPRESS)  # a lot in a process of its own
-    asked = parser.parse_args()
-    if asked.learn:
-        learn_lot(int(asked.learn[0]), Path(asked.learn[1]))
-        return 0
-    program = str(Path(sys.executable).with_name("gyrotc"))
-    found: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-
-        def recorded(runs: int) -> str:
-            campaign, data = folder / f"{runs}.toml", folder / f"{runs}"
-            profiles = [_PROFILES[k % len(_PROFILES)] for k in range(runs)]
-            campaign.write_text(_CAMPAIGN.format(runs, json.dumps(profiles)), "utf-8")
-            measured([program, "simulate", str(campaign), "--seed", "1", "--out", str(data)])
-            return str(data)
-
-        def row(part: str, size: int, command: list[str]) -> None:
-            found.setdefault(part, []).append({"size": size, **measured(command)})
-            print(part, found[part][-1], flush=True)
-
-        few, out = recorded(RUNS[0]), str(folder / "out")
-        fit = [program, "fit", few, "--out", out]
-        if asked.only in (None, "runs"):
-            for n in RUNS:
-                row("runs", n, [program, "fit", recorded(n), "--out", out])
-        if asked.only in (None, "centers"):
-            for n in CENTERS:
-                row("centers", n, [*fit, "--centers", str(n)])
-        if asked.only in (None, "units"):
-            measured(fit)
-            for n in UNITS:
-                row(
-                    "units",
-                    n,
-                    [sys.executable, "-m", "bench.growth", "--learn", str(n), f"{out}/training.json"],
-                )
-    for part, rows in found.items():
-        print(f"{part}: slope {slope(rows):.2f}")
-    if asked.out:
-        asked.out.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
-    return 0
+def _rows(folder: Path) -> Iterator[_Job]:
+    for hz in _RAW_HZ:
+        data = folder / str(hz)
+        raw = ["--raw-hz", str(hz), "--format", "parquet"]
+        _gyrotc(["simulate", "paper", *raw, "--out", str(data)])
+        size = 12 * 8 * 3600 * hz
+        yield size, ["check", str(data)]
+        yield size, ["fit", str(data), "--out", f"{data}-out"]
 
 
-if __name__ == "__main__":
-    raise SystemExit(main())
+def _runs(folder: Path) -> Iterator[_Job]:
+    text = (files("gyrotc.simulate") / "scenarios" / "paper.toml").read_text("utf-8")
+    profiles, train, judged = re.split(r"^(?=\[\[set\]\])", text, flags=re.MULTILINE)
+    folder.mkdir()
+    for sets in _SETS:
+        scenario, data = folder / f"{sets}.toml", folder / str(sets)
+        again = [train.replace("2026-03-02", f"{2000 + k}-03-02") for k in range(sets)]
+        scenario.write_text("".join([profiles, *again, judged]), "utf-8")
+        _gyrotc(["simulate", str(scenario), "--out", str(data)])
+        yield 6 * sets, ["fit", str(data), "--out", f"{data}-out"]
+
+
+def _centers(folder: Path) -> Iterator[_Job]:
+    _gyrotc(["simulate", "paper-ripple-strong", "--out", str(folder)])
+    for n in _CENTERS:
+        chosen = ["--method", "mrbf", "--centers", str(n)]
+        yield n, ["fit", str(folder), *chosen, "--out", f"{folder}-{n}"]
+
+
+def _units(folder: Path) -> Iterator[_Job]:
+    for k in range(_GYROS):
+        _gyrotc(["simulate", "paper", "--seed", str(k + 1), "--out", str(folder / "gyros" / str(k))])
+    for serials in _SERIALS:
+        data = folder / str(serials)
+        for k in range(serials):
+            under_serial(folder / "gyros" / str(k % _GYROS), data / f"RLG-{k:04d}")
+        yield serials, ["fleet", str(data), "--jobs", "1", "--out", f"{data}-out"]
+
+
+_PARTS: dict[str, Callable[[Path], Iterator[_Job]]] = {
+    "rows": _rows,
+    "runs": _runs,
+    "centers": _centers,
+    "units": _units,
+}
+
+
+def section(result: dict[str, Any]) -> str:
+    """The section of docs/results.md."""
+    return "\n".join([_HEAD.format(**result), table(_COLUMNS, [_row(row) for row in result["rows"]])])
+
+
+def _row(row: dict[str, Any]) -> list[str]:
+    sizes = row["sizes"]
+    cells = [" / ".join(format(one[key], form) for one in sizes) for key, form in _FORMS.items()]
+    return [
+        row["what"],
+        f"`gyrotc {row['command']}`",
+        *cells,
+        _slope(sizes, "seconds"),
+        _slope(sizes, "peak_mib"),
+    ]
+
+
+_FORMS = {"size": ",", "seconds": ".2f", "peak_mib": ".0f"}
+
+
+def _slope(sizes: Sequence[dict[str, float]], key: str) -> str:
+    """Between the two largest sizes."""
+    small, large = sizes[-2:]
+    return f"{math.log(large[key] / small[key]) / math.log(large['size'] / small['size']):.2f}"
