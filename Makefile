@@ -185,7 +185,7 @@ odd: setup
 
 ## memory named from 100 clean single cycles at four levels of noise (CYCLES=100): at most 2 %
 cycles: setup
-	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/diagnose/test_diagnose_cycle.py -k clean_cycles
+	@GYROTC_CYCLES=$(or $(CYCLES),100) $(PYTHON) -m pytest -q -s tests/py/diagnose/test_diagnose_replay.py -k clean_cycles
 
 ## archives to install from, without sources: sdist, wheel, bills of materials, checksums in build/dist
 dist: setup

@@ -251,7 +251,8 @@ def test_the_cache_is_told_cleared_and_kept_to_a_limit(
     assert cache.held() == (2, 2000) and cache.limit() == 2500
     told = subprocess.run([PROGRAM, "cache", "--clear"], capture_output=True, text=True, check=True)
     assert (
-        "0 banks of signatures, 0 diagnoses, 0 objects of compilers, 0.000 GB of at most 2.5e-06 GB" in told.stdout
+        "0 banks of signatures, 0 diagnoses, 0 objects of compilers, 0.000 GB of at most 2.5e-06 GB"
+        in told.stdout
         and cache.held() == (0, 0)
     )
     (cache.folder() / "limit_bytes").write_text("much")

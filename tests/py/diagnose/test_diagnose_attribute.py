@@ -1,20 +1,59 @@
-"""Stage 5 of diagnosis: gains against dense least squares, refinement, rivals, lack of fit, other shapes."""
+"""Stages 3 and 5 of diagnosis: signatures and overtones, gains, refinement, rivals, lack of fit, verdicts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from gyrotc.causes import CATALOGUE
+from gyrotc.causes.base import History
+from gyrotc.cli.jobs import diagnosis_lines
 from gyrotc.diagnose.attribution import Attribution, attribute, choose, overlap
-from gyrotc.diagnose.candidates import Candidate, columns_of
+from gyrotc.diagnose.blocks import Records, centred_slope, records_of
+from gyrotc.diagnose.candidates import (
+    Candidate,
+    _switch,
+    _two_sided_lag,
+    columns_of,
+    diagnosed,
+    reach_of,
+    searched,
+    shapes_of,
+)
+from gyrotc.diagnose.candidates import testable as reason_against
+from gyrotc.diagnose.diagnosis import _entries
+from gyrotc.diagnose.discrepancy import NoiseFinding
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.gains import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
-from gyrotc.diagnose.misfit import contest, misfit
+from gyrotc.diagnose.misfit import Misfit, contest, misfit
+from gyrotc.diagnose.noise import COLOURS, Colour, Whitener
 from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
+from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
 from gyrotc.diagnose.rivals import EQUIVALENT, Rival, near_of, probabilities_of, ranked_rivals
 from gyrotc.diagnose.search import Search
+from gyrotc.diagnose.signature_bank import direction_of
 from gyrotc.diagnose.single_cycle import CycleFits
+from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis, proportional_map, replaced_map
+from gyrotc.diagnose.summary import VERDICTS, holds, looks_like, next_steps, verdict_of
+from gyrotc.recordings.load import load
+from gyrotc.results.diagnosed import (
+    ConsideredCause,
+    Diagnosed,
+    DiagnosisVerdict,
+    Estimate,
+    NamedCause,
+    Unexplained,
+)
+from gyrotc.results.planned import DetectionLimit
+from gyrotc.target.recursions import first_order
+from gyrotc.train.data import TrainingData, cleaned
+from gyrotc.train.fitting import FitOptions
 from numpy.typing import NDArray
+from recordings import toml, write_csv
 from scipy import stats
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
 
@@ -336,3 +375,401 @@ def test_all_combinations_of_states_explain_what_least_squares_say(case: Case) -
 def test_nothing_is_taken_from_an_empty_model() -> None:
     none = Refined(Candidate("x", {}, "columns"), np.ones((3, 1)), None, {}, np.ones(3), None, None)
     assert model_columns([none, none]).shape == (3, 2)
+
+
+@pytest.fixture(scope="module")
+def campaign() -> Campaign:
+    return small_campaign()
+
+
+def test_the_map_is_orthonormal_over_blocks_and_holds_what_a_finer_one_starts_from(
+    campaign: Campaign,
+) -> None:
+    for level in range(2):
+        basis, means = make_basis(campaign.records, level)
+        assert np.abs(means.T @ means - np.eye(means.shape[1])).max() < 1e-9
+        rows = [basis(r.history.temperature_c, centred_slope(r.history)) for r in campaign.records.runs]
+        assert np.abs(campaign.records.average(rows) - means).max() < 1e-7
+        line = campaign.temperature - campaign.temperature.mean()
+        rest = line - means @ (means.T @ line)
+        assert np.linalg.norm(rest) < 1e-2 * np.linalg.norm(line)
+    assert len(LEVELS) == 4
+
+
+def test_local_functions_over_the_temperature_add_up_to_one(campaign: Campaign) -> None:
+    assert fine_columns(campaign.records).sum(axis=1) == pytest.approx(np.ones(campaign.records.size))
+
+
+def test_a_cause_is_testable_only_where_the_recordings_say_enough(campaign: Campaign) -> None:
+    records = campaign.records
+    assert not any(reason_against(records, cause) for cause in diagnosed())
+    off = replace(records.runs[0], history=replace(records.runs[0].history, on_s=None))
+    assert "power-on" in reason_against(Records((off, *records.runs[1:]), 100.0), "warm_up")
+    assert "runs" in reason_against(Records(records.runs[:1], 100.0), "turn_on_offset")
+    reach = reach_of(records)
+    assert reach.span_c == pytest.approx(75.0) and reach.longest_s == pytest.approx(4 * 3600.0 - 20.0)
+
+
+def test_signatures_are_columns_less_what_the_map_explains(campaign: Campaign) -> None:
+    bank = campaign.bank
+    for signature in bank.groups:
+        candidate = signature.candidate
+        if candidate.role != "columns":
+            continue
+        raw = columns_of(campaign.records, candidate.id, candidate.values)
+        again = (bank.signatures + bank.map @ bank.on_map)[:, signature.columns] * bank.scale[
+            signature.columns
+        ]
+        assert again == pytest.approx(raw, abs=1e-9 * np.abs(raw).max())
+    assert np.abs(bank.map.T @ bank.signatures).max() < 1e-6
+
+
+def test_the_direction_is_that_of_the_last_change(campaign: Campaign) -> None:
+    """A play of 3 C stands 3 C behind: below T after warming, above it after cooling."""
+    direction = direction_of(campaign.records, 3.0)[:, 0]
+    slope = campaign.records.average([centred_slope(r.history) for r in campaign.records.runs])
+    start = campaign.records.spans()[0].start
+    for k in range(start + 12, start + 140):
+        steady = slope[k - 10 : k + 2]
+        if steady.min() > 0.5:
+            assert direction[k] == pytest.approx(-3.0, abs=1e-9)
+        elif steady.max() < -0.5:
+            assert direction[k] == pytest.approx(3.0, abs=1e-9)
+
+
+def test_the_banks_inner_products_are_those_of_whitened_columns(campaign: Campaign) -> None:
+    bank, records = campaign.bank, campaign.records
+    number = 7
+    whiten = Whitener(COLOURS[number], records.kept, records.block_s)
+    white = whiten(np.column_stack([bank.map, bank.signatures]))
+    assert np.allclose(bank.grams[number], white.T @ white, rtol=1e-9, atol=1e-12)
+    sigma = np.linspace(0.5, 2.0, records.size)
+    uneven = bank.weighted(records, sigma)
+    even = uneven.log_dets[number] - 2.0 * np.log(sigma).sum()
+    assert even == pytest.approx(bank.log_dets[number])
+
+
+def test_a_grid_leaves_less_than_a_hundredth_of_a_signature_between_its_points(campaign: Campaign) -> None:
+    grid = searched("thermal_gradient").grid(reach_of(campaign.records))
+    for here, there in itertools.pairwise(grid):
+        middle = float(np.sqrt(here["tau_s"] * there["tau_s"]))
+        column = columns_of(campaign.records, "thermal_gradient", {"tau_s": middle})[:, 0]
+        near = np.column_stack(
+            [columns_of(campaign.records, "thermal_gradient", v)[:, 0] for v in (here, there)]
+        )
+        cosine = near.T @ column / np.linalg.norm(near, axis=0) / np.linalg.norm(column)
+        assert 1.0 - cosine.max() ** 2 < 0.01
+
+
+def test_a_map_of_hardly_changed_inputs_is_the_map(campaign: Campaign) -> None:
+    basis, means = make_basis(campaign.records, 0)
+    quick = Candidate("cavity_lag", {"tau_s": 1e-3}, "input")
+    block, known = replaced_map(campaign.records, basis, quick)
+    assert known.all()
+    assert np.median(np.abs(block - means)) < 1e-6, "they part at corners only, where a slope has a window"
+    slow = Candidate("cavity_lag", {"tau_s": 1500.0}, "input")
+    assert np.abs(replaced_map(campaign.records, basis, slow)[0] - means).max() > 0.3 * np.abs(means).max()
+    plain = proportional_map(campaign.records, basis, None)
+    late = [first_order(1500.0, r.history.time_s, r.history.temperature_c) for r in campaign.records.runs]
+    moved = proportional_map(campaign.records, basis, slow)
+    assert plain.shape == moved.shape and np.ptp(moved[:, 1]) == pytest.approx(
+        np.ptp(np.concatenate(late)) / basis.half[0], rel=0.05
+    )
+
+
+def test_a_one_sided_lag_with_equal_times_is_a_first_order_one(campaign: Campaign) -> None:
+    history = campaign.records.runs[0].history
+    both = _two_sided_lag(history, 500.0, 500.0)[:, 0]
+    plain = first_order(500.0, history.time_s, history.temperature_c) - history.temperature_c
+    assert np.abs(both - plain).max() < 0.02 * np.abs(plain).max(), "the two hold T over a row or draw a line"
+
+
+def test_a_switch_remembers_the_last_threshold() -> None:
+    t = np.array([0.0, 6.0, 11.0, 7.0, 3.0, 7.0, 12.0])
+    assert _switch(t, 10.0, 5.0).tolist() == [0, 0, 1, 1, 0, 0, 1]
+
+
+def test_alternatives_are_finite_and_zero_where_the_temperature_stands(campaign: Campaign) -> None:
+    names = set()
+    for shape in shapes_of(campaign.records):
+        assert np.isfinite(shape.columns).all() and len(shape.columns) == campaign.records.size
+        names.add(shape.name)
+    assert len(names) == 6
+    time = np.arange(0.0, 7200.0, 20.0)
+    still = replace(
+        campaign.records.runs[0], history=History(time_s=time, temperature_c=np.full(time.size, 20.0))
+    )
+    assert not _two_sided_lag(still.history, 100.0, 900.0).any()
+
+
+NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]
+
+
+def attribution(**changes: Any) -> Any:
+    """What `verdict_of` reads: one cause that explains everything, without rivals."""
+    plain: dict[str, Any] = {
+        "detected": True,
+        "causes": (SimpleNamespace(plausible=True),),
+        "p_values": (1e-3,),
+        "rivals": ((),),
+        "left": Misfit(0.5, 0.5, 1.0),
+    }
+    plain["other"] = SimpleNamespace(lead=-np.inf)
+    return SimpleNamespace(**{**plain, **changes})
+
+
+@pytest.mark.parametrize(
+    ("verdict", "found", "noise"),
+    [
+        ("explained", attribution(), []),
+        ("explained", attribution(), NOISE),
+        ("ambiguous", attribution(rivals=(("hysteresis",),)), []),
+        ("partial", attribution(left=Misfit(1e-4, 1e-4, 0.95)), []),
+        ("partial", attribution(left=Misfit(1e-9, 1e-9, 0.85)), []),
+        ("unexplained", attribution(left=Misfit(1e-9, 1e-9, 0.75)), []),
+        ("unexplained", attribution(left=Misfit(1e-9, 1e-9, 0.3)), []),
+        ("explained", attribution(left=Misfit(0.2, 1e-9, 0.95)), NOISE),
+        ("unexplained", attribution(left=Misfit(0.2, 1e-9, 0.75)), NOISE),
+        ("unexplained", attribution(causes=(SimpleNamespace(plausible=False),)), []),
+        ("unexplained", attribution(p_values=(0.98,), left=Misfit(0.06, 0.06, 0.12)), []),
+        ("unexplained", attribution(causes=(), rivals=()), []),
+        ("unexplained", attribution(other=SimpleNamespace(lead=1e6)), []),
+        ("noise_differs", attribution(detected=False, causes=(), rivals=()), NOISE),
+        ("consistent", attribution(detected=False, causes=(), rivals=()), []),
+    ],
+)
+def test_the_verdict_follows_from_what_was_found(verdict: str, found: Any, noise: list[NoiseFinding]) -> None:
+    assert verdict_of(found, noise) == verdict
+
+
+def result(verdict: DiagnosisVerdict) -> Diagnosed:
+    cause = NamedCause(
+        id="hysteresis", family="hysteresis", name="A loop", p_value=0.001, gain=None, signature="a loop",
+        parameters={"width_c": Estimate(value=4.0, low=3.0, high=5.0)}, remedy="one play operator",
+        equivalent=("turn_on_offset",) if verdict == "ambiguous" else (),
+        separate_by="holds from both sides" if verdict == "ambiguous" else None,
+    )  # fmt: skip
+    causes = (cause,) if verdict in ("explained", "ambiguous", "partial") else ()
+    considered = tuple(
+        ConsideredCause(
+            id=id, family="lag", p_value=0.5,
+            detection_limit=DetectionLimit(value=value, unit=unit, parameter="tau_s", over=()),
+        )
+        for id, value, unit in (("warm_up", 1e-3, "deg/h"), ("cavity_lag", None, "s"))
+    )  # fmt: skip
+    return Diagnosed(
+        gyrotc_version="0.1.0", serial="G1", axis=None, verdict=verdict, block_s=10.0, average_s=100.0,
+        noise_floor_dph=1e-3, discrepancies=(), causes=causes, baseline=None, extended=None, considered=considered,
+        missing=(), estimated_noise=None, measured_on="exam", single_cycle=None, shipping=None, unexplained=None,
+        text="Finding.", meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], shipped=False)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> None:
+    text = "\n".join(diagnosis_lines(result(verdict)))
+    assert text.startswith(f"G1: {verdict.replace('_', ' ')}. Finding.")
+    assert VERDICTS[verdict] in text and "next: " in text
+    assert "warm_up: 0.001 deg/h" in text and "cavity_lag: not visible" in text, "the detection limits"
+
+
+def test_an_ambiguous_verdict_names_the_experiment() -> None:
+    steps = next_steps("ambiguous", result("ambiguous").causes, [], shipped=True)
+    assert steps == ["To tell them apart: holds from both sides."]
+
+
+def test_what_no_table_holds_has_its_own_remedy() -> None:
+    causes = result("explained").causes
+    assert next_steps("explained", causes, [], shipped=False) == ["Against it: one play operator."]
+    assert "build --extend" in next_steps("explained", causes, [], shipped=True)[0]
+
+
+def test_structure_without_a_name_is_described() -> None:
+    left = Unexplained(
+        p_value=1e-6, share_explained=0.4, best_partial_match=("hysteresis",), looks_like="a switch"
+    )
+    text = "\n".join(diagnosis_lines(result("unexplained").model_copy(update={"unexplained": left})))
+    assert "40%" in text and "it looks more like a switch" in text
+
+
+def test_causes_without_an_extension_are_told_so() -> None:
+    assert "no extension is shipped" in "\n".join(diagnosis_lines(result("explained")))
+
+
+WARM_UP = Candidate("warm_up", {"tau_s": 1500.0}, "columns")
+SIZE_DPH = 1.2e-2
+WHITE = Colour(white=LEVEL_DPH**2)
+FLICKER = Colour(slow=0.5, tau_s=0.0)  # on top of white noise of 1
+
+
+def measured(
+    campaign: Campaign,
+    colour: Colour,
+    seed: int,
+    declared: Colour | None,
+    tau_s: float = 1500.0,
+    size_dph: float = SIZE_DPH,
+) -> Search:
+    """A warm-up in noise of a colour."""
+    records = campaign.records
+    effect = size_dph * columns_of(records, "warm_up", {"tau_s": tau_s})[:, 0]
+    draws = np.random.default_rng(seed).standard_normal((records.size, 1))
+    noise = LEVEL_DPH * Whitener(colour, records.kept, records.block_s).colour(draws)[:, 0]
+    return campaign.search(1e-4 * campaign.temperature + effect + noise, declared=declared)
+
+
+def left_by_true_cause(search: Search) -> Misfit:
+    """What the true cause leaves."""
+    causes = refine(search, Gains(search), (WARM_UP,))
+    return misfit(search.extended(model_columns(causes)), "map and beside", causes)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5, 7])
+def test_noise_that_the_declaration_lacks_is_no_structure(campaign: Campaign, seed: int) -> None:
+    """The declared white noise, contradicted by the data, made 1e-11 to 1e-47 of what a true cause left."""
+    search = measured(campaign, FLICKER, seed, WHITE)
+    assert search.contradicts(search.view_of(WHITE))
+    found = attribute(search)
+    assert [cause.candidate.id for cause in found.causes] == ["warm_up"]
+    assert found.left.p_value > 0.01 and found.left.worst < 1e-6
+    assert holds(found) == (found.left.share >= 0.8), (
+        "beside a contradicted declaration a cause is most or nothing"
+    )
+
+
+def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> None:
+    search = measured(campaign, Colour(), 1, WHITE)
+    assert not search.contradicts(search.view_of(WHITE))
+    quieter = replace(search, declared=Colour(white=(0.5 * LEVEL_DPH) ** 2))
+    louder = replace(search, declared=Colour(white=(2.0 * LEVEL_DPH) ** 2))
+    assert (
+        left_by_true_cause(search).worst
+        == left_by_true_cause(search).p_value
+        == left_by_true_cause(quieter).p_value
+    ), "its level is that of the data"
+    assert left_by_true_cause(louder).p_value >= left_by_true_cause(search).p_value
+
+
+@pytest.mark.slow
+def test_a_likeliest_colour_that_is_too_fast_is_not_believed_alone(campaign: Campaign) -> None:
+    """Of twelve recordings of a true cause in a random walk, 5 left less than 1 % by the likeliest colour."""
+    p_values = [
+        left_by_true_cause(measured(campaign, Colour(walk=0.3), seed, None)).p_value for seed in range(12)
+    ]
+    assert sum(p < 0.01 for p in p_values) <= 1, p_values
+
+
+def test_what_never_settles_is_no_warm_up(campaign: Campaign) -> None:
+    """The best time constant is several times what gyros have: a drift, which no entry of the catalogue is."""
+    search = measured(campaign, Colour(), 1, None, tau_s=60000.0, size_dph=0.1)
+    found = attribute(search)
+    [cause] = found.causes
+    assert cause.candidate.id == "warm_up" and cause.parameters["tau_s"].low > 1.5 * 8000.0
+    assert found.left.p_value > 0.05 and not cause.plausible and not holds(found)
+    assert (looks_like(found) or "").endswith("where 200 to 8000 s are known")
+    [settles] = attribute(measured(campaign, Colour(), 1, None)).causes
+    assert settles.plausible
+
+
+SEED_OF_OVERTONES = 20261124
+PERIOD_C, WAVE_DPH, NOISE_DPH = 14.0, 4e-3, 2e-3
+WAVE = CATALOGUE["path_length_periodicity"]
+OPTIONS = FitOptions(method="mrbf")
+
+
+def airy(t: np.ndarray, finesse: float = 4.0) -> np.ndarray:
+    """What a plate reflects that reflects more than once (Airy 1833): each overtone is 0.38 of the one before."""
+    return np.asarray(1.0 / (1.0 + finesse * np.sin(np.pi * t / PERIOD_C + 0.4) ** 2))
+
+
+def overtone(number: int) -> complex:
+    """Amplitude and phase of a part of `WAVE_DPH` · `airy`."""
+    t = np.linspace(0.0, PERIOD_C, 4000, endpoint=False)
+    return complex(2.0 * np.mean(WAVE_DPH * airy(t) * np.exp(-2j * np.pi * number * t / PERIOD_C)))
+
+
+def sine(t: np.ndarray) -> np.ndarray:
+    return np.asarray(0.3 * np.cos(2.0 * np.pi * t / PERIOD_C + 1.0))
+
+
+def course(run: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times, s, and temperatures, C, of a run of eight hours between −30 and 60 C."""
+    time = 10.0 * np.arange(2880)
+    phase = (1.0 + 0.7 * run) * time / 60.0 % 180.0
+    return time, -30.0 + np.where(phase < 90.0, phase, 180.0 - phase)
+
+
+def recorded(rng: np.random.Generator, wave: object) -> TrainingData:
+    """Four runs with a smooth map, a wave and white noise."""
+    parts = []
+    for run in range(4):
+        time, t = course(run)
+        r = np.gradient(t, time) * 60.0
+        y = 0.01 + 1e-4 * t + 2e-4 * r + WAVE_DPH * wave(t) + NOISE_DPH * rng.standard_normal(t.size)  # type: ignore[operator]
+        one = np.ones(t.size)
+        parts.append(TrainingData(t, r, y, one, np.full(t.size, run), time, 10.0 * one))
+    names = TrainingData.__slots__
+    return cleaned(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
+
+
+def test_overtones_have_the_size_and_phase_that_the_wave_has() -> None:
+    print("seed", SEED_OF_OVERTONES)
+    found = overtones_of(
+        recorded(np.random.default_rng(SEED_OF_OVERTONES), airy), WAVE, {"period_c": PERIOD_C}
+    )
+    assert [one["period_c"] for one in found] == [PERIOD_C / 2.0, PERIOD_C / 3.0]
+    for number, one in zip((2, 3), found, strict=True):
+        got = one["amplitude_dph"] * np.exp(1j * one["phase_rad"])
+        assert abs(got - overtone(number)) < 6.0 * NOISE_DPH * np.sqrt(2.0 / 11520.0), (number, got)
+
+
+def test_a_sine_gets_no_overtone_and_what_is_no_wave_is_not_asked() -> None:
+    print("seed", SEED_OF_OVERTONES + 1)
+    rng = np.random.default_rng(SEED_OF_OVERTONES + 1)
+    found = [overtones_of(recorded(rng, sine), WAVE, {"period_c": PERIOD_C}) for _ in range(8)]
+    assert sum(map(len, found)) <= 1, "BIC lets one in a thousand pass"
+    assert overtones_of(recorded(rng, sine), CATALOGUE["hysteresis"], {"width_c": 3.0}) == ()
+
+
+@pytest.fixture(scope="module")
+def refitting(tmp_path_factory: pytest.TempPathFactory) -> Refitting:
+    """Three runs of three hours with a wave that is no sine."""
+    print("seed", SEED_OF_OVERTONES + 2)
+    rng, folder = np.random.default_rng(SEED_OF_OVERTONES + 2), tmp_path_factory.mktemp("overtones")
+    for run in range(3):
+        time, t = (x[:1080] for x in course(run))
+        rate = 0.01 + 1e-4 * t + WAVE_DPH * airy(t) + 0.25 * NOISE_DPH * rng.standard_normal(t.size)
+        write_csv(folder / f"{run}.csv", {"time_s": time, "temperature_c": t, "rate_dph": rate})
+    (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(3))), "utf-8")
+    dataset = load(folder)
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    return Refitting(dataset, records, OPTIONS, single_cycle=False)
+
+
+def wave() -> Effect:
+    """The wave without its overtones."""
+    part = overtone(1)
+    values = {"period_c": PERIOD_C, "amplitude_dph": abs(part), "phase_rad": float(np.angle(part))}
+    return Effect(WAVE.id, values)
+
+
+def test_a_wave_and_its_overtones_are_taken_off_and_stand_in_the_model(refitting: Refitting) -> None:
+    [whole] = completed(refitting.train, [wave()])
+    assert len(whole.overtones) == 2
+    run = refitting.train[0]
+    plain, left = samples(run, []), samples(run, [whole])
+    parts = [plain.bias_dph - samples(run, [one]).bias_dph for one in (wave(), *whole.overtones)]
+    assert np.allclose(plain.bias_dph - left.bias_dph, sum(parts), atol=1e-12)
+    t = plain.temperature_c
+    rest = [WAVE_DPH * airy(t) - taken for taken in (parts[0], sum(parts))]
+    assert np.std(rest[1]) < 0.5 * np.std(rest[0]), "they are the wave's own"
+    entries = _entries([whole], {})
+    assert [e["id"] for e in entries] == [WAVE.id] * 3
+    assert [e["parameters"]["period_c"] for e in entries] == [PERIOD_C, PERIOD_C / 2.0, PERIOD_C / 3.0]
+    assert {p.name for p in WAVE.parameters} == set(entries[1]["parameters"])
+
+
+def test_overtones_take_no_place_in_a_table_from_another_cause(refitting: Refitting) -> None:
+    others = [Effect("hysteresis", {"width_c": w, "amplitude_dph_per_c": 1e-9}) for w in (2.0, 6.0)]
+    whole = completed(refitting.train, [wave(), *others])
+    assert len(terms_of(whole)) == MOST_TERMS and len(whole[0].overtones) == 1

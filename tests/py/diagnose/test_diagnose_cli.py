@@ -1,16 +1,39 @@
-"""A diagnosis through the installed command: named, extended, emitted, verified, shown on a page."""
+"""A diagnosis through the installed command: named, extended, emitted, verified, shown, told in words, cached."""
 
 from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+import numpy as np
 import pytest
 from campaigns import GRADIENT, simulated
 from conftest import HOST, Command
+from gyrotc.causes import CATALOGUE
+from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
+from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
+from gyrotc.diagnose.gain import gain_of
+from gyrotc.diagnose.refit import Effect, known, samples
+from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
+from gyrotc.jobs import diagnosis
+from gyrotc.jobs.build import build
+from gyrotc.model import Model
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
+from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
 from gyrotc.simulate.scenario import read
+from gyrotc.store import cache
+from gyrotc.target.recursions import first_order
+from gyrotc.train.data import joined
+from gyrotc.train.fitting import FitOptions
+from recordings import ACCEPTED, toml, write_csv
 
 
 @pytest.fixture(scope="module")
@@ -155,3 +178,334 @@ def test_a_broken_result_is_told(tmp_path: Path, gyrotc: Command) -> None:
     (tmp_path / "diagnose.json").write_text('{"schema": "gyrotc.diagnose/1"}')
     done = gyrotc("report", tmp_path)
     assert done.returncode == 2 and "diagnose.json" in done.stderr
+
+
+_LOADED = """
+import json, sys
+from gyrotc.cli.commands import app
+try:
+    app(sys.argv[1:], standalone_mode=False)
+finally:
+    print(json.dumps(sorted(sys.modules)), file=sys.stderr)
+"""
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return simulated(tmp_path_factory.mktemp("kept"), GRADIENT)
+
+
+@pytest.fixture
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def _typed(*arguments: object) -> tuple[str, set[str]]:
+    """What the command prints, and the modules that it has loaded."""
+    command = [sys.executable, "-c", _LOADED, "diagnose", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, set(json.loads(done.stderr.splitlines()[-1]))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_own_cache")
+def test_the_second_call_writes_the_same_and_loads_nothing_that_computes_or_draws(
+    data: Path, tmp_path: Path
+) -> None:
+    first, needed = _typed(data, "--out", tmp_path / "out")
+    assert {"matplotlib", "scipy.optimize", "gyrotc.diagnose"} <= needed, "the check itself can fail"
+    one = _contents(tmp_path / "out")
+    assert {"report.html", "diagnose.json", "model-extended.json", ".gyrotc-result.json"} <= set(one)
+    second, loaded = _typed(data, "--out", tmp_path / "out")
+    assert not {"matplotlib", "scipy.optimize", "gyrotc.diagnose"} & loaded
+    assert second == first and _contents(tmp_path / "out") == one
+    elsewhere = shutil.copytree(data, tmp_path / "copy")
+    _, loaded = _typed(elsewhere, "--out", tmp_path / "new")
+    assert "matplotlib" not in loaded, "the same bytes in another folder are the same recordings"
+    assert _contents(tmp_path / "new") == one
+
+
+class _Counted:
+    """Stands for the search: gives one result, and counts how often it is asked."""
+
+    def __init__(self, found: Diagnosis) -> None:
+        self.found, self.count = found, 0
+
+    def __call__(self, *_: object, **__: object) -> Diagnosis:
+        self.count += 1
+        return self.found
+
+
+@pytest.fixture
+def counted(data: Path, monkeypatch: pytest.MonkeyPatch) -> _Counted:
+    still = load(_still(data.parent / "still"))
+    counted = _Counted(diagnose(still))
+    monkeypatch.setattr("gyrotc.diagnose.diagnosis.diagnose", counted)
+    return counted
+
+
+def _still(folder: Path) -> Path:
+    """Three runs at one temperature, of which nothing can be said: it takes no time."""
+    folder.mkdir(exist_ok=True)
+    for number in range(3):
+        rows = [f"{10 * k},{25 + 0.01 * (k % 3)},{7e-3 + 1e-4 * ((7 * k) % 5)}" for k in range(400)]
+        (folder / f"{number}.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
+    return folder
+
+
+@pytest.mark.usefixtures("_own_cache")
+def test_whatever_a_diagnosis_depends_on_makes_another_one(
+    data: Path,
+    tmp_path: Path,
+    counted: _Counted,
+    model_dict: dict[str, object],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder = shutil.copytree(data, tmp_path / "data")
+    file = folder / "run-01.csv"
+    description, rows = (folder / "dataset.toml").read_text(), file.read_text()
+    options = FitOptions()
+
+    def ask(**more: object) -> None:
+        diagnosis.diagnosed(load(folder), **({"options": options} | more))  # type: ignore[arg-type]
+
+    def asked_anew(what: str, call: Callable[[], None]) -> None:
+        before = counted.count
+        call()
+        assert counted.count == before + 1, f"{what} is not told apart"
+        call()
+        assert counted.count == before + 1, f"{what} is not kept"
+
+    asked_anew("the first call", ask)
+    for other in (
+        replace(options, seed=1), replace(options, method="cubic"), replace(options, centers=3),
+        replace(options, rho=0.5), replace(options, block_s=20.0), replace(options, average_s=50.0),
+    ):  # fmt: skip
+        asked_anew(repr(other), lambda other=other: ask(options=other))
+    asked_anew("events", lambda: ask(accept_events=True))
+    asked_anew("a model", lambda: ask(options=None, model=Model.from_dict(model_dict)))
+    file.write_text(rows.replace("0.0", "0.1", 1))
+    asked_anew("a digit of a recording", ask)
+    file.write_text(rows)
+    (folder / "dataset.toml").write_text(description.replace("[meta]\n", "[meta]\noperator = 'M. Curie'\n"))
+    asked_anew("the description", ask)
+    (folder / "dataset.toml").write_text(description)
+    monkeypatch.setattr(diagnosis, "_code", lambda: "another version of gyrotc")
+    asked_anew("another gyrotc", ask)
+    before = counted.count
+    ask(fresh=True)
+    assert counted.count == before + 1
+
+
+@pytest.mark.usefixtures("_own_cache")
+def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, counted: _Counted) -> None:
+    recordings = load(data)
+    diagnosis.diagnosed(recordings)
+    [path] = cache.folder().glob("*.diagnosis")
+    whole = path.read_bytes()
+    content = json.loads(whole[len(cache._packed("", b"")) :])
+    for damaged in (
+        b"",
+        whole[:-1],
+        whole[:100] + b"0" + whole[101:],
+        cache._packed("0" * 64 + ".diagnosis", whole[len(cache._packed("", b"")) :]),  # of another name
+        cache._packed(path.name, b"[]"),
+        cache._packed(path.name, json.dumps(content | {"files": {"../report.html": ""}}).encode()),
+        cache._packed(
+            path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()
+        ),
+        cache._packed(path.name, json.dumps(content | {"result": {}}).encode()),
+    ):
+        path.write_bytes(damaged)
+        before = counted.count
+        assert diagnosis.diagnosed(recordings).result == counted.found.result
+        assert counted.count == before + 1
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_own_cache")
+def test_a_build_takes_the_diagnosis_that_was_made_before(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The extended model and what training says of it come with it: the result is the same to the byte."""
+
+    def built(out: Path) -> dict[str, bytes]:
+        build(data, out, FitOptions(), numerics=["f32"], targets=["host-gcc-O2"], extend=True)
+        names = ("model.json", "training.json", "diagnosis/report.html", "diagnosis/model-extended.json")
+        return {name: (out / name).read_bytes() for name in names}
+
+    first = built(tmp_path / "first")
+    assert json.loads(first["model.json"])["terms"]
+
+    def again(*_: object, **__: object) -> Diagnosis:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("gyrotc.diagnose.diagnosis.diagnose", again)
+    assert built(tmp_path / "second") == first
+
+
+SEED = 20260405
+SIZE_DPH_PER_C, TAU_S = 5e-4, 600.0
+GRADIENT_TO_REMOVE = Effect("thermal_gradient", {"tau_s": TAU_S, "amplitude_dph_per_c": SIZE_DPH_PER_C})
+OPTIONS = FitOptions(method="mrbf", centers=4)
+
+
+@dataclass(frozen=True)
+class Case:
+    dataset: Dataset
+    refitting: Refitting
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """Three training runs and an exam run of an hour each, with a thermal gradient."""
+    print("seed", SEED)
+    folder, rng = tmp_path_factory.mktemp("extend"), np.random.default_rng(SEED)
+    time = 10.0 * np.arange(360)
+    for k in range(4):
+        temperature = 20.0 + 15.0 * np.sin(2.0 * np.pi * time / (1500.0 + 400.0 * k) + k)
+        lag = first_order(TAU_S, time, temperature) - temperature
+        rate = 0.01 + 1e-4 * temperature + SIZE_DPH_PER_C * lag + 1e-3 * rng.standard_normal(time.size)
+        write_csv(folder / f"{k}.csv", {"time_s": time, "temperature_c": temperature, "rate_dph": rate})
+    runs = [f'file = "{k}.csv"\nrole = "{"exam" if k == 3 else "train"}"' for k in range(4)]
+    (folder / "dataset.toml").write_text(toml(*runs), "utf-8")
+    dataset = load(folder)
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    return Case(dataset, Refitting(dataset, records, OPTIONS, single_cycle=False))
+
+
+def test_an_effect_is_taken_off_the_samples_as_its_equation_says(case: Case) -> None:
+    run = case.refitting.train[0]
+    plain, less = samples(run, []), samples(run, [GRADIENT_TO_REMOVE])
+    taken_off = plain.bias_dph - less.bias_dph
+    time, temperature = plain.time_s, plain.temperature_c
+    expected = SIZE_DPH_PER_C * (first_order(TAU_S, time, temperature) - temperature)
+    late = time > time[0] + 120.0
+    assert np.abs(taken_off - expected)[late].max() < 0.15 * np.abs(expected).max()
+    assert np.array_equal(plain.temperature_c, less.temperature_c), "a term that adds leaves the map's input"
+    both = joined([plain, less])
+    assert both.bias_dph.size == 2 * plain.bias_dph.size
+
+
+def test_every_training_sample_is_left_out_once(case: Case) -> None:
+    folds = folds_of(case.refitting)
+    for k, run in enumerate(case.refitting.train):
+        count = np.sum([fold[k] for fold in folds], axis=0)
+        assert (count == 1).all() and count.size == run.data.bias_dph.size
+    assert all(any(not m.any() for m in fold) for fold in folds), "each fold leaves something to learn from"
+
+
+def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:
+    assert case.refitting.fit([]) is case.refitting.fit([], case.refitting.everything())
+    assert case.refitting.fit([GRADIENT_TO_REMOVE]) is not case.refitting.fit([])
+
+
+def test_an_exam_run_measures_what_the_true_effect_gains(case: Case) -> None:
+    before, after = case.refitting.on_exam([[], [GRADIENT_TO_REMOVE]])
+    gain = gain_of(before, after, LEVEL, 100.0)
+    assert gain.positive and gain.rms_after == pytest.approx(LEVEL, rel=0.5)
+
+
+LEVEL = 1e-3 / np.sqrt(10.0)  # of 100-s means of the noise
+
+
+def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
+    """An effect that is there is shipped, a wrong one and one that no table holds are not; the exam is not asked."""
+    blind = Refitting(case.dataset, case.refitting.records, OPTIONS, single_cycle=False)
+    blind.exam, blind.exam_runs = [], []
+    found = shipping(blind, [GRADIENT_TO_REMOVE])
+    assert found.shipped == [GRADIENT_TO_REMOVE]
+    assert found.before_dph is not None and found.after_dph is not None
+    assert found.after_dph < 0.5 * found.before_dph
+    wrong = replace(GRADIENT_TO_REMOVE, values={"tau_s": TAU_S, "amplitude_dph_per_c": -SIZE_DPH_PER_C})
+    assert shipping(blind, [wrong]).shipped == []
+    assert shipping(blind, [GRADIENT_TO_REMOVE, wrong]).shipped == [GRADIENT_TO_REMOVE], (
+        "what makes it worse is left"
+    )
+    offset = replace(GRADIENT_TO_REMOVE, id="turn_on_offset", values={"sigma_dph": 1e-3})
+    assert shipping(blind, [offset]).shipped == [], "no table holds it"
+
+
+def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_path: Path) -> None:
+    """The temperature of a run's end was held where the record did not have it: the right shift made exams worse."""
+    print("seed", SEED + 1)
+    rng, late, time = np.random.default_rng(SEED + 1), 300.0, 10.0 * np.arange(720)
+
+    def true_c(at: np.ndarray, k: int) -> np.ndarray:
+        return 20.0 + 30.0 * np.sin(2.0 * np.pi * at / (3100.0 + 700.0 * k) + k)
+
+    for k in range(4):
+        rate = 0.01 + 2e-4 * true_c(time, k) + 1e-3 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "temperature_c": true_c(time - late, k), "rate_dph": rate}
+        write_csv(tmp_path / f"{k}.csv", columns)
+    runs = [f'file = "{k}.csv"\nrole = "{"exam" if k == 3 else "train"}"' for k in range(4)]
+    (tmp_path / "dataset.toml").write_text(toml(*runs), "utf-8")
+    dataset = load(tmp_path)
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    refitting = Refitting(dataset, records, OPTIONS, single_cycle=False)
+    shift = Effect("time_misalignment", {"shift_s": late})
+    run = refitting.exam[0]
+    mask = known(run, [shift])
+    assert np.array_equal(mask, run.data.time_s <= run.data.time_s[-1] - late)
+    assert known(run, [GRADIENT_TO_REMOVE]).all()
+    before, after = refitting.on_exam([[], [shift]])
+    assert [r.time_s.tolist() for r in before] == [r.time_s.tolist() for r in after], "the same samples"
+    gain = gain_of(before, after, LEVEL, 100.0)
+    assert gain.positive and gain.rms_after < 1.3 * LEVEL < 0.6 * gain.rms_before
+
+
+def test_without_causes_there_is_no_extension(case: Case) -> None:
+    found = extend(case.dataset, case.refitting.records, (), OPTIONS, lambda _: None)
+    assert found.extended is None and found.steps == () and found.measured_on == "exam"
+    assert found.baseline_rms > 2.0 * LEVEL, "the plain map leaves the gradient"
+
+
+def test_recordings_at_one_temperature_cannot_decide(tmp_path: Path) -> None:
+    time = 10.0 * np.arange(200)
+    rate = 1e-3 * np.random.default_rng(SEED).standard_normal(time.size)
+    write_csv(tmp_path / "a.csv", {"time_s": time, "temperature_c": 20.0 + 1e-4 * time, "rate_dph": rate})
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    found = diagnose(load(tmp_path))
+    assert found.result.verdict == "not_testable" and found.analysis is None
+
+
+@pytest.mark.parametrize("verdict", get_args(DiagnosisVerdict))
+def test_each_verdict_has_a_sentence_and_all_but_ambiguous_a_step(verdict: DiagnosisVerdict) -> None:
+    assert VERDICTS[verdict].endswith(".")
+    steps = next_steps(verdict, [], [], shipped=True)
+    assert bool(steps) == (verdict != "ambiguous")
+
+
+def test_where_temperature_hardly_changes_nothing_is_decided(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    ACCEPTED["Parquet"](tmp_path / "RLG-1")
+    result = not_testable(load(tmp_path / "RLG-1"), FitOptions(), 0.25)
+    assert result.verdict == "not_testable"
+    assert "0.25 C" in result.text
+    assert not result.causes and result.extended is None
+
+
+@pytest.mark.parametrize("id", ["thermal_gradient", "turn_on_offset"])
+def test_a_cause_that_the_fixture_can_imitate_says_so_and_what_tells(id: str) -> None:
+    """Tilt and scale factor times Earth's rate: no recording on one axis tells them, another mounting does."""
+    words = CATALOGUE[id].words
+    cause = NamedCause(
+        id=id,
+        family=CATALOGUE[id].family,
+        name=words.name,
+        p_value=1e-4,
+        parameters={},
+        equivalent=(),
+        separate_by=None,
+        gain=None,
+        signature=words.signature,
+        remedy=words.remedy,
+    )
+    told = [step for step in next_steps("explained", [cause], [], shipped=True) if "Earth's rate" in step]
+    assert len(told) == 1 and (
+        "turned by 180 degrees" in told[0] or "without touching the fixture" in told[0]
+    )

@@ -1,33 +1,40 @@
-"""What must not change a diagnosis, and what must: units, sign, order of runs, truth beside the recordings.
+"""What must not change a diagnosis, and what must: units, sign, order of runs, blocks, cuts, truth beside the data.
 
-Recordings of the independent generator of tests/blind with a fixed seed; every claim holds for any.
+Simulated recordings come from the independent generator of tests/blind with a fixed seed; every claim holds for any.
+Tests on measured recordings are skipped, and told, where these are absent.
 """
 
 from __future__ import annotations
 
-import sys
+import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from conftest import ROOT, Command
 from gyrotc.diagnose.blocks import Record, Records, records_of
 from gyrotc.diagnose.detection import project
 from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.joined import _root
 from gyrotc.diagnose.noise import Declared, declared_noise
 from gyrotc.diagnose.pipeline import Analysis, analyse
+from gyrotc.diagnose.refit import Effect
 from gyrotc.diagnose.search import open_search
+from gyrotc.diagnose.single_cycle import cycle_of
 from gyrotc.diagnose.summary import verdict_of
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Run, joined_runs
+from gyrotc.train.fitting import FitOptions
+from recordings import write_csv
 
-ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
-
-from tests.blind import campaign as blind  # noqa: E402
-from tests.blind.noise import Noise  # noqa: E402
+from tests.blind import campaign as blind
+from tests.blind.noise import Noise
 
 SEED = 20260301
 LEVEL = Noise(7e-4, 3e-5)
@@ -265,3 +272,110 @@ def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
     root = _root(gram)
     assert np.abs(root @ root.T - gram).max() < 1e-8
     assert np.isfinite(root).all()
+
+
+SOURCE = (
+    Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
+    / "mpu6000-chamber-cycle"
+    / "data.csv"
+)
+CUT_S = 3130.0
+AVERAGE_S = 100.0
+Table = dict[str, np.ndarray]
+
+
+def recording(axis: str) -> Table:
+    if not SOURCE.is_file():
+        pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
+    names = SOURCE.read_text("utf-8").split("\n", 1)[0].split(",")
+    table = dict(zip(names, np.loadtxt(SOURCE, delimiter=",", skiprows=1).T, strict=True))
+    return {name: table[name] for name in ("time_s", "temperature_c")} | {
+        "rate_dph": table[f"rate_{axis}_dph"]
+    }
+
+
+def handed_over(folder: Path, table: Table, cuts: list[float], later_s: float = 0.0) -> Dataset:
+    """Training spans that touch at the cuts, named last first, and the exam after them."""
+    write_csv(folder / "a.csv", table)
+    edges = [None, *(cut + later_s for cut in [*cuts, CUT_S])]
+    spans = []
+    for low, high in pairwise(edges):
+        start = "" if low is None else f"from_s = {low}\n"
+        spans.append(f'[[run]]\nfile = "a.csv"\npower_on_s = "unknown"\n{start}to_s = {high}\n')
+    exam = f'[[run]]\nfile = "a.csv"\npower_on_s = "unknown"\nfrom_s = {CUT_S + later_s}\nrole = "exam"\n'
+    (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{"".join(spans[::-1])}{exam}', "utf-8")
+    dataset = load(folder)
+    return replace(dataset, runs=joined_runs(dataset.runs))  # as every job does it
+
+
+def left(dataset: Dataset, block_s: float = 10.0) -> float:
+    """RMS on the exam of states and a map of T, both from the training part, deg/h."""
+    records = records_of(dataset, "train", block_s=block_s, average_s=AVERAGE_S)
+    options = FitOptions(method="mrbf", block_s=block_s, average_s=AVERAGE_S)
+    refitting = Refitting(dataset, records, options, single_cycle=True)
+    [runs] = refitting.on_exam([[Effect.of(state) for state in cycle_of(records).states]])
+    return float(np.sqrt(np.mean(np.concatenate([run.after_dph for run in runs]) ** 2)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_the_length_of_a_block_hardly_matters(tmp_path: Path, axis: str) -> None:
+    """From 1 s to 20 s, within 5 % of the middle: what is in force is what is fitted."""
+    dataset = handed_over(tmp_path, recording(axis), [])
+    found = [left(dataset, block_s) for block_s in (1.0, 5.0, 20.0)]
+    np.testing.assert_allclose(found, np.median(found), rtol=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_cuts_and_constants_do_not_matter(tmp_path: Path, axis: str) -> None:
+    """Where touching spans are cut, and in which order they are named: within 2 %; constants: within rounding."""
+    table = recording(axis)
+    whole = left(handed_over(tmp_path / "whole", table, []))
+    assert left(handed_over(tmp_path / "cut", table, [1800.0])) == pytest.approx(whole, rel=0.02)
+    assert left(handed_over(tmp_path / "cuts", table, [700.0, 2001.0])) == pytest.approx(whole, rel=0.02)
+    moved = table | {"rate_dph": table["rate_dph"] + 5e3}
+    assert left(handed_over(tmp_path / "moved", moved, [])) == pytest.approx(whole, rel=1e-3)
+    later = table | {"time_s": table["time_s"] + 4096.0}
+    assert left(handed_over(tmp_path / "later", later, [], 4096.0)) == pytest.approx(whole, rel=1e-3)
+
+
+REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
+STATIC_MAP_DPH = 1311.0  # a map of (T, dT/dt) on the x axis of the branch that it has not seen
+
+
+def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command) -> dict[str, Any]:
+    """Everything after the cut is scored once."""
+    if not (REAL / name).is_dir():
+        pytest.skip(f"{name} is absent: see GYROTC_REAL_DATA")
+    data = folder / "data"
+    data.mkdir()
+    (data / "data.csv").write_bytes((REAL / name / "data.csv").read_bytes())
+    run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
+    (data / "dataset.toml").write_text(
+        f'schema = 1\nserial = "R1"\n{run}to_s = {cut_s}\n{run}from_s = {cut_s}\nrole = "exam"\n'
+    )
+    done = gyrotc("diagnose", data, "--axis", axis, "--average-s", 10, "--out", folder / "out")
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads((folder / "out" / "diagnose.json").read_text()))
+
+
+@pytest.mark.slow
+def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(
+    tmp_path: Path, gyrotc: Command
+) -> None:
+    result = diagnosed("mpu6000-chamber-cycle", 3130.0, "x", tmp_path, gyrotc)
+    assert result["extended"]["exam_rms_dph"] < 0.5 * STATIC_MAP_DPH
+    assert result["extended"]["terms"] == ["thermal_gradient", "thermal_gradient"]
+    assert result["verdict"] == "not_testable", "one cycle does not tell a memory from a static dT/dt"
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "How much can be said" in page and "no memory: products of T and dT/dt" in page
+    assert {"warm_up", "turn_on_offset", "ageing"} <= {
+        c["id"] for c in result["considered"] if "not_testable" in c
+    }
+
+
+@pytest.mark.slow
+def test_nothing_is_said_of_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
+    result = diagnosed("mpu6050-isothermal", 524.0, "x", tmp_path, gyrotc)
+    assert (result["verdict"], result["causes"], result["extended"]) == ("not_testable", [], None)

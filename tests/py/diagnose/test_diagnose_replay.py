@@ -1,31 +1,44 @@
-"""What a diagnosis promises and what the target's code does: states and clocks of extension terms agree."""
+"""Extension terms in diagnosis and on the target: equal states and clocks, hysteresis of any form, a single cycle."""
 
 from __future__ import annotations
 
-import sys
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import quick_and_slow
 from gyrotc.causes import CATALOGUE
+from gyrotc.causes.base import History
+from gyrotc.diagnose.attribution import Attribution, attribute
+from gyrotc.diagnose.blocks import Records, records_of
+from gyrotc.diagnose.candidates import columns_of
 from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import stand_ins_of
+from gyrotc.diagnose.extension import Refitting, stand_ins_of
+from gyrotc.diagnose.gains import Gains
+from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
 from gyrotc.diagnose.refit import Effect, Played, added_range, play_runs, samples
+from gyrotc.diagnose.search import Search
+from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
+from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
+from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Rows, Run
+from gyrotc.recordings.records import Rows, Run, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.maps import evaluate_map
+from gyrotc.target.recursions import first_order, play
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
 from gyrotc.train.samples import missed_before
 from gyrotc.verify.replay import history_of
-from libc_build import ROOT
 from numpy.typing import NDArray
+from single_cycles import NOISE, clean_cycle
+from small_campaign import LEVEL_DPH, Campaign, small_campaign
 
-sys.path.insert(0, str(ROOT))
 from bench.signals import rms_of, without
 
 Array = NDArray[np.float64]
@@ -237,3 +250,280 @@ def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alon
     low, high = added_range(played, effects[:1], stand_in.added)
     alone = added_range(played, effects[:1])
     assert low >= alone[0] + stand_in.added.min() - 1e-12 and high <= alone[1] + stand_in.added.max() + 1e-12
+
+
+WIDTH_C = 6.0
+
+
+@pytest.fixture(scope="module")
+def campaign() -> Campaign:
+    return small_campaign()
+
+
+def measured(campaign: Campaign, effect: Array, d: float, seed: int) -> Search:
+    """An effect in white noise, as large as makes its energy beside the map d²."""
+    static = campaign.bank.map
+    size = d * LEVEL_DPH / float(np.linalg.norm(effect - static @ (static.T @ effect)))
+    noise = LEVEL_DPH * np.random.default_rng(seed).standard_normal(effect.size)
+    return campaign.search(1e-4 * campaign.temperature + size * effect + noise)
+
+
+def relays(records: Records, seed: int) -> Array:
+    """The mean of forty relays, each with a place and a width of its own: nothing of it is a play."""
+    rng = np.random.default_rng(seed)
+    place, half = rng.normal(15.0, 15.0, 40), 4.0 * np.exp(rng.normal(0.0, 0.5, 40))
+
+    def mean(history: History) -> Array:
+        state = np.where(history.temperature_c[0] > place, 1.0, -1.0)
+        out = np.empty((history.temperature_c.size, 1))
+        for k, t in enumerate(history.temperature_c.tolist()):
+            state = np.where(t > place + half, 1.0, np.where(t < place - half, -1.0, state))
+            out[k] = state.mean()
+        return out
+
+    return records.columns(mean)[:, 0]
+
+
+def local_loop(history: History) -> Array:
+    """A play that acts about 40 C and hardly elsewhere."""
+    t = history.temperature_c
+    return np.asarray(((play(WIDTH_C, t) - t) * np.exp(-(((t - 40.0) / 15.0) ** 2)))[:, None])
+
+
+def loop(history: History) -> Array:
+    return np.asarray((play(WIDTH_C, history.temperature_c) - history.temperature_c)[:, None])
+
+
+def gradient(history: History) -> Array:
+    lag = first_order(600.0, history.time_s, history.temperature_c)
+    return np.asarray((lag - history.temperature_c)[:, None])
+
+
+def local_gradient(history: History) -> Array:
+    return np.asarray(gradient(history) * np.exp(-(((history.temperature_c[:, None] - 40.0) / 15.0) ** 2)))
+
+
+def named(found: Attribution) -> list[str]:
+    return [c.candidate.id for c in found.causes] if holds(found) else []
+
+
+@pytest.mark.parametrize("seed", quick_and_slow([0], [1, 2, 3]))
+def test_relays_are_hysteresis(campaign: Campaign, seed: int) -> None:
+    """One play leaves what one finds with certainty, and is not four fifths of it: it was told as unexplained."""
+    found = attribute(measured(campaign, relays(campaign.records, seed), 40.0, seed))
+    assert named(found) == ["hysteresis"] and found.wide is not None
+    assert found.left.share > 0.8 and verdict_of(found, ()) in ("explained", "partial")
+    assert found.columns.shape[1] > found.wide.columns.shape[1], "the play itself stays in the model"
+
+
+@pytest.mark.slow
+def test_relays_need_no_second_cause(campaign: Campaign) -> None:
+    """A lag and a finer map beside a play came as near to these, and stood with it as three causes."""
+    found = attribute(measured(campaign, relays(campaign.records, 0), 25.0, 0))
+    assert named(found) == ["hysteresis"]
+
+
+@pytest.mark.slow
+def test_a_wave_beside_a_play_stays_a_cause_of_its_own(campaign: Campaign) -> None:
+    wave = columns_of(campaign.records, "path_length_periodicity", {"period_c": 9.0})[:, 0]
+    effect = campaign.records.columns(loop)[:, 0] / 6.0 + wave
+    found = attribute(measured(campaign, effect, 40.0, 3))
+    assert set(named(found)) == {"hysteresis", "path_length_periodicity"}
+
+
+@pytest.mark.parametrize("seed", quick_and_slow([0], [1]))
+def test_a_strength_that_goes_with_temperature_is_told(campaign: Campaign, seed: int) -> None:
+    found = attribute(measured(campaign, campaign.records.columns(local_loop)[:, 0], 25.0, seed))
+    assert named(found) == ["hysteresis"] and found.wide is not None
+    assert found.wide.varies and "goes with temperature" in found.wide.text
+
+
+@pytest.mark.parametrize("seed", quick_and_slow([2], [3]))
+def test_a_loop_about_one_temperature_is_no_lag(campaign: Campaign, seed: int) -> None:
+    """A lag of the whole map came nearer to it than one play of one strength, and was named."""
+    search = measured(campaign, campaign.records.columns(local_loop)[:, 0], 40.0, seed)
+    gains = Gains(search)
+    assert MarginalLikelihood(gains).preferred(list(gains.single())).members[0].id == "cavity_lag"
+    found = attribute(search)
+    assert named(found) == ["hysteresis"] and found.left.share > 0.9
+    assert "cavity_lag" not in [r.id for r in found.rivals[0]]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_play_of_one_strength_is_not_told_to_change(campaign: Campaign, seed: int) -> None:
+    wide = rate_independent(Gains(measured(campaign, campaign.records.columns(loop)[:, 0], 40.0, seed)), ())
+    assert wide is not None and not wide.varies and "goes with" not in wide.text
+
+
+@pytest.mark.parametrize("shape", [gradient, local_gradient])
+@pytest.mark.parametrize("seed", range(2))
+def test_memory_that_fades_is_no_hysteresis(
+    campaign: Campaign, shape: Callable[[History], Array], seed: int
+) -> None:
+    """However it acts over temperature: the rival is as wide as the family of plays."""
+    gains = Gains(measured(campaign, campaign.records.columns(shape)[:, 0], 40.0, seed))
+    assert rate_independent(gains, ()) is None
+    assert not outlasts(gains, 0.0, -np.inf), "as good as one play"
+    assert not outlasts(gains, 1e3, -np.inf), "far better than one play"
+
+
+def test_noise_is_no_hysteresis(campaign: Campaign) -> None:
+    for seed in range(3):
+        gains = Gains(measured(campaign, np.sin(np.arange(campaign.records.size) * 1.7), 0.0, seed))
+        assert rate_independent(gains, ()) is None
+
+
+def test_what_is_beside_is_not_counted_again(campaign: Campaign) -> None:
+    """Where another cause holds it already, nothing is left that speaks for hysteresis."""
+    column = campaign.records.columns(loop)
+    gains = Gains(measured(campaign, column[:, 0], 40.0, 1))
+    assert rate_independent(gains, ()) is not None
+    assert rate_independent(gains, (column,)) is None
+
+
+def test_the_page_says_what_a_table_does_not_hold() -> None:
+    """In the finding and in how the cause shows; a cause of another family shows as it always does."""
+    none = np.zeros((3, 0))
+    goes, more = WideMemory(100.0, 50.0, none), WideMemory(100.0, 99.0, none)
+    assert "goes with temperature" in shows_as("hysteresis", goes)
+    assert "more than a single play" in shows_as("hysteresis", more)
+    assert shows_as("warm_up", goes) == CATALOGUE["warm_up"].words.signature
+    assert "goes with temperature" in sentence_of("explained", (), None, "", goes)
+    assert sentence_of("explained", (), None, "") == sentence_of("explained", (), None, "", None)
+
+
+SEED = 20260321
+CYCLE_ROW_S = 5.0
+TAUS_S = (120.0, 450.0)
+CUT_S = 2850.0  # the end of the second branch
+
+
+def cycle(branches: int) -> tuple[np.ndarray, np.ndarray]:
+    """Time and temperature of ramps between -20 and 70 C, each at another rate."""
+    legs = [1500.0 - 150.0 * k for k in range(branches)]
+    corners = np.concatenate(([0.0], np.cumsum(legs)))
+    time = np.arange(0.0, corners[-1], CYCLE_ROW_S)
+    return time, np.interp(time, corners, np.resize([70.0, -20.0], corners.size))
+
+
+def recorded_cycle(folder: Path, temperature: np.ndarray, rate: np.ndarray, exam_from_s: float) -> Path:
+    """One recording, its last part for the exam."""
+    rows = [
+        f"{CYCLE_ROW_S * k:g},{t:.4f},{y:.6g}" for k, (t, y) in enumerate(zip(temperature, rate, strict=True))
+    ]
+    (folder / "data.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
+    run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
+    (folder / "dataset.toml").write_text(
+        f'schema = 1\nserial = "C1"\nearth_rate = "none"\n{run}to_s = {exam_from_s}\n'
+        f'{run}from_s = {exam_from_s}\nrole = "exam"\n'
+    )
+    return folder
+
+
+def records(folder: Path) -> Records:
+    return records_of(load(folder), "train", block_s=10.0, average_s=10.0)
+
+
+def two_states(time: np.ndarray, temperature: np.ndarray) -> np.ndarray:
+    """A curved map of T and two first-order states, with noise."""
+    print("seed", SEED)
+    x = (temperature - 25.0) / 45.0
+    states = [first_order(tau, time, temperature) - temperature for tau in TAUS_S]
+    noise = np.random.default_rng(SEED).standard_normal(time.size)
+    return np.asarray(1000.0 * x + 400.0 * x**3 + 20.0 * states[0] - 15.0 * states[1] + 20.0 * noise)
+
+
+def test_a_cycle_is_known_by_its_temperatures(tmp_path: Path) -> None:
+    for branches, single in ((3, True), (8, False)):
+        time, temperature = cycle(branches)
+        folder = tmp_path / str(branches)
+        folder.mkdir()
+        recorded_cycle(folder, temperature, np.ones(time.size), float(time[-1]) * 0.99)
+        assert is_single_cycle(records(folder)) is single
+
+
+def test_two_states_are_found(tmp_path: Path) -> None:
+    time, temperature = cycle(3)
+    found = cycle_of(records(recorded_cycle(tmp_path, temperature, two_states(time, temperature), CUT_S)))
+    assert [c.candidate.id for c in found.causes] == ["thermal_gradient"] * 2
+    for cause, tau in zip(found.causes, TAUS_S, strict=True):
+        interval = cause.parameters["tau_s"]
+        assert interval.low <= tau <= interval.high
+    assert found.p_value < 1e-6
+
+
+def test_a_map_alone_needs_no_state(tmp_path: Path) -> None:
+    _, temperature = cycle(3)
+    x = (temperature - 25.0) / 45.0
+    noise = np.random.default_rng(SEED).standard_normal(x.size)
+    found = cycle_of(records(recorded_cycle(tmp_path, temperature, 1000.0 * x + 20.0 * noise, CUT_S)))
+    assert found.chosen is None and found.causes == ()
+    assert found.rms_dph == pytest.approx(20.0 / np.sqrt(2.0), rel=0.1), "two rows a block"
+
+
+def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> None:
+    """The map of (T, dT/dt) fails on the third branch, states beside a map of T do not."""
+    time, temperature = cycle(3)
+    folder = recorded_cycle(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    found = diagnose(load(folder), options=FitOptions(average_s=10.0))
+    assert found.result.verdict in ("ambiguous", "partial")
+    extended = found.result.content()["extended"]
+    assert extended["terms"] == ["thermal_gradient", "thermal_gradient"]
+    gain = extended["gain"]
+    assert gain["exam_rms_after_dph"] < 0.5 * gain["exam_rms_before_dph"]
+    assert found.model is not None
+    low, high = found.model.envelope.slope_c_per_min
+    at = np.array([20.0, 20.0])
+    cold, hot = found.model.map_dph(at, np.array([low, high]))
+    assert cold == pytest.approx(hot, rel=1e-5), "no dT/dt in the map"
+
+
+def test_clean_cycles_get_no_memory(tmp_path: Path) -> None:
+    """Gyros with a static map of (T, dT/dt); `make cycles` has 100 at four levels of the noise, here are a few."""
+    count = int(os.environ.get("GYROTC_CYCLES", "8"))
+    named = []
+    for seed in range(count):
+        found = cycle_of(clean_cycle(tmp_path, seed, NOISE[seed % len(NOISE)]))
+        named += [(seed, found.causes[0].candidate.id, found.lead)] if found.causes else []
+    print(f"{len(named)} of {count} clean cycles named", named)
+    assert len(named) <= 0.02 * count, named
+
+
+def test_a_correction_hardly_depends_on_the_length_of_a_block(tmp_path: Path) -> None:
+    """The same cycle by blocks of 5, 10 and 20 s: the same states, and the same error on the unseen branch."""
+    time, temperature = cycle(3)
+    folder = recorded_cycle(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    left = []
+    for block_s in (5.0, 10.0, 20.0):
+        refitting = Refitting(
+            load(folder),
+            records_of(load(folder), "train", block_s=block_s, average_s=100.0),
+            FitOptions(block_s=block_s),
+            single_cycle=True,
+        )
+        effects = [Effect.of(state) for state in cycle_of(refitting.records).states]
+        (chain,) = refitting.on_exam([effects])
+        left.append(float(np.sqrt(np.mean(np.concatenate([a.after_dph for a in chain]) ** 2))))
+    assert max(left) < 1.05 * min(left), left
+
+
+def test_spans_that_touch_are_one_run(tmp_path: Path) -> None:
+    time, temperature = cycle(3)
+    recorded_cycle(tmp_path, temperature, two_states(time, temperature), CUT_S)
+    whole = load(tmp_path).runs
+    text = (tmp_path / "dataset.toml").read_text()
+    run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
+    cut = f"{run}from_s = 1000.0\nto_s = {CUT_S}\n{run}to_s = 1000.0\n"
+    (tmp_path / "dataset.toml").write_text(text.replace(f"{run}to_s = {CUT_S}\n", cut))
+    assert len(load(tmp_path).runs) == 3
+    assert joined_runs(load(tmp_path).runs) == joined_runs(whole)
+
+
+def test_a_ramp_that_never_turns_cannot_test_memory(tmp_path: Path) -> None:
+    time, temperature = cycle(1)
+    found = diagnose(load(recorded_cycle(tmp_path, temperature, two_states(time, temperature), 1400.0)))
+    result = found.result.content()
+    assert result["verdict"] == "not_testable" and result["causes"] == []
+    assert result["single_cycle"]["turns"] == 0 and "never turns" in result["text"]
+    untestable = {c["id"] for c in result["considered"] if "not_testable" in c}
+    assert {"thermal_gradient", "hysteresis"} <= untestable

@@ -1,24 +1,33 @@
-"""The main job as the user types it: recordings in, verified C and a report out."""
+"""The main job as the user types it: verified C and a report out; failed or killed ones leave nothing half."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import random
 import re
 import shutil
+import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import HOST, Command
+from conftest import EXAMPLE, HOST, Command
 from gyrotc.assess.evaluate import evaluate
+from gyrotc.jobs.build import _failures
 from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
 from gyrotc.recordings.load import load
+from gyrotc.results.verification import MapError
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.emit import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset
+from recordings import columns, described, write_csv
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[4] / "shared/data/real"))
 
@@ -268,3 +277,104 @@ def test_traces_of_files_with_one_stem_do_not_meet() -> None:
     names = [trace_name(run, runs) for run in runs]
     assert names[2:] == ["c@5.csv", "c@9.csv"]
     assert len(set(names)) == 4
+
+
+def test_a_proven_bound_that_is_exceeded_fails_a_build() -> None:
+    """`verify` counted it as failed, `build` went on with exit status 0."""
+    exceeded = MapError(numeric="q31", status="fail", bound_dph=1e-7, worst_dph=2e-7, inputs_visited=1)
+    verification = SimpleNamespace(targets=(), emitted=(), errors=(exceeded,))
+    [failure] = _failures(SimpleNamespace(mismatches=0), verification, None)
+    assert "q31" in failure and "2e-07" in failure and "1e-07" in failure
+
+
+KILLS = 6
+
+
+def start(folder: Path, out: Path) -> subprocess.Popen[bytes]:
+    """The installed command in a process group of its own, so that its compilers end with it."""
+    program = Path(sys.executable).with_name("gyrotc")
+    command = [str(program), "build", str(folder), "--out", str(out), "--numeric", "f32"]
+    return subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+
+
+def whole(out: Path) -> bool:
+    """Every file that the manifest names is there with its hash."""
+    files = json.loads((out / "manifest.json").read_text())["files"]
+    return len(files) > 10 and all(
+        hashlib.sha256((out / name).read_bytes()).hexdigest() == digest for name, digest in files.items()
+    )
+
+
+@pytest.mark.slow
+def test_a_build_killed_at_random_times(tmp_path: Path) -> None:
+    seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    described(tmp_path / "RLG-1")
+    small = columns(360) | {"rate_dph": columns(360)["rate_dph"] - 20.0}
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", small)
+    begun = time.monotonic()
+    assert start(tmp_path / "RLG-1", tmp_path / "first").wait() == 0
+    length_s = time.monotonic() - begun
+    assert whole(tmp_path / "first")
+    for kill in range(KILLS):
+        out = tmp_path / "out"
+        process = start(tmp_path / "RLG-1", out)
+        time.sleep(draw.uniform(0.0, 1.05) * length_s)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        assert not out.exists() or whole(out), f"kill {kill}, seed {seed}"
+    assert start(tmp_path / "RLG-1", tmp_path / "out").wait() == 0, "what was left behind is in nobody's way"
+    assert whole(tmp_path / "out")
+
+
+DAMAGE = {
+    "not json": lambda text: text[: len(text) // 2],
+    "nan": lambda text: text.replace('"w0": ', '"w0": NaN, "was": ', 1),
+    "infinite": lambda text: text.replace('"block_s": 10.0', '"block_s": 1e999', 1),
+    "text for a number": lambda text: text.replace('"block_s": 10.0', '"block_s": "10"', 1),
+    "another schema": lambda text: text.replace("gyrotc.model/1", "gyrotc.model/9", 1),
+    "illegal serial": lambda text: text.replace('"RLG-0042"', '"../../RLG"', 1),
+    "code as serial": lambda text: text.replace('"RLG-0042"', '"x\\"; system(\\"rm\\"); \\""', 1),
+    "absurd size": lambda text: text.replace('"slope_blocks": 10', '"slope_blocks": 1000000', 1),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_emit_refuses(damage: str, tmp_path: Path, gyrotc: Command) -> None:
+    text = (EXAMPLE / "model.json").read_text()
+    spoilt = DAMAGE[damage](text)
+    assert spoilt != text
+    (tmp_path / "model.json").write_text(spoilt)
+    done = gyrotc("emit", tmp_path / "model.json", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert str(tmp_path / "model.json") in done.stderr and "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_other_command_that_reads_a_model_refuses(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
+    result = tmp_path / "result"
+    shutil.copytree(demo / "result", result)
+    content = json.loads((result / "model.json").read_text())
+    content["networks"][0]["weights"] = content["networks"][0]["weights"][:-1]
+    (result / "model.json").write_text(json.dumps(content))
+    before = {p: p.read_bytes() for p in result.rglob("*") if p.is_file()}
+    data = demo / "data"
+    for command in (
+        ("verify", result),
+        ("evaluate", result, data),
+        ("report", result),
+        ("fit", data, "--applied", result / "model.json", "--out", tmp_path / "o"),
+        ("build", data, "--applied", result / "model.json", "--out", tmp_path / "o"),
+        ("check", data, "--applied", result / "model.json"),
+        ("compare", data, "--applied", result / "model.json"),
+        ("diagnose", data, "--model", result / "model.json"),
+    ):
+        done = gyrotc(*command)
+        assert done.returncode == 2, (command, done.stdout, done.stderr)
+        assert "networks" in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "o").exists()
+    assert before == {p: p.read_bytes() for p in result.rglob("*") if p.is_file()}

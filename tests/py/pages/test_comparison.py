@@ -1,11 +1,15 @@
-"""What `gyrotc compare` shows: the paper's figures where they belong, every method and environment in the picture."""
+"""What `gyrotc compare` shows, the last line of `build`, and the picture of all calibrations of a unit."""
 
 from __future__ import annotations
 
 import io
 import re
+from typing import Any
 
+import numpy as np
 import pytest
+from gyrotc.cli.results import summary
+from gyrotc.common.metrics import Averages
 from gyrotc.pages.comparison import (
     AFTER_DPH,
     BEFORE_DPH,
@@ -14,7 +18,18 @@ from gyrotc.pages.comparison import (
     comparison_tables,
     with_published,
 )
-from gyrotc.results.evaluation import Comparison, Group, Method
+from gyrotc.pages.plots import calibrations_over_time
+from gyrotc.results.evaluation import (
+    Calibration,
+    Comparison,
+    EvaluatedRun,
+    Evaluation,
+    Group,
+    Method,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+)
 from rich.console import Console
 
 
@@ -94,3 +109,125 @@ def test_no_residual_at_all_is_shown_as_zero() -> None:
 
 def test_the_same_result_gives_the_same_bytes() -> None:
     assert comparison_picture(result(ENVIRONMENTS)) == comparison_picture(result(ENVIRONMENTS))
+
+
+RNG = np.random.default_rng(3)
+BEFORE = 7e-3 + 9e-4 * RNG.normal(size=400)
+AFTER = 7e-4 * RNG.normal(size=400)
+CONSTANT = 7.2e-3  # mean of the training runs
+
+
+def part(before: np.ndarray, after: np.ndarray) -> Pooled:
+    still = np.zeros(len(before))
+    return Pooled.of([Averages(still, before, after, still)])
+
+
+def evaluation(**changes: object) -> Evaluation:
+    exam, train = part(BEFORE, AFTER), part(np.full(400, CONSTANT), AFTER)
+    longer = dict.fromkeys(("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph"))
+    runs = tuple(
+        EvaluatedRun(file=f"{name}.csv", role="exam", environment=name, samples=400, before=exam.before,
+                     after=RunStatistics(**exam.after.model_dump(), **longer))
+        for name in ENVIRONMENTS
+    )  # fmt: skip
+    sizes = ModelSizes(method="mrbf", centers=4, table_bytes=104, rom_bytes=None, ram_bytes=None, sizes_on=None,
+                       sum_abs_weights_dph=1e-3)  # fmt: skip
+    fields: dict[str, object] = {
+        "gyrotc_version": "0.1.0", "serial": "A-1", "axis": None, "numeric": "f32", "block_s": 10.0,
+        "average_s": 100.0, "noise_floor_dph": 7e-4, "noise_floor_source": "simulated", "mismatches": None,
+        "runs": runs, "train": train, "exam": exam, "findings": (), "model": sizes,
+    }  # fmt: skip
+    return Evaluation(**{**fields, **changes})  # type: ignore[arg-type]
+
+
+def test_the_headline_says_how_much_of_the_improvement_is_a_constant() -> None:
+    def rms(x: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(x**2)))
+
+    zero, alone = rms(BEFORE) / rms(AFTER), rms(BEFORE) / rms(BEFORE - CONSTANT)
+    mean = BEFORE.std() / AFTER.std()
+    assert len({f"{x:.2f}" for x in (zero, alone, mean)}) == 3
+    assert summary(evaluation()).startswith(
+        f"improvement about zero {zero:.2f} (paper: 9.8-10.4; a constant alone: {alone:.2f}), about the mean {mean:.2f}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "begins"),
+    [
+        ({"noise_floor_source": "estimated"}, "improvement about zero {0:.2f} (a constant alone: "),
+        ({"train": None}, "improvement about zero {0:.2f} (paper: 9.8-10.4), about the mean {1:.2f}; RMS "),
+        (
+            {"exam": None, "left_out": part(BEFORE, AFTER)},
+            "improvement about zero on spans left out {0:.2f} (a constant alone: ",
+        ),
+    ],
+)
+def test_what_is_not_known_is_not_said(changes: dict[str, object], begins: str) -> None:
+    """The paper's figures beside its own campaign alone; a constant only where there are training runs."""
+    judged = part(BEFORE, AFTER)
+    assert judged.improvement is not None and judged.before.std_dph is not None and judged.after.std_dph
+    ratio = judged.before.std_dph / judged.after.std_dph
+    assert summary(evaluation(**changes)).startswith(begins.format(judged.improvement, ratio))
+
+
+DAYS = ("2020-01-11", "2021-02-11", "2023-03-11", "2024-04-11")
+
+
+def calibration(k: int, date: str | None, **more: Any) -> Calibration:
+    known: dict[str, Any] = {
+        "as_found_rms_dph": 9e-4 + 1e-4 * k if k else None,
+        "as_left_rms_dph": 7e-4,
+        "moved_rms_dph": 4e-4 if k else None,
+        "moved_mean_dph": 3e-4 if k else None,
+        "expanded_uncertainty_dph": 1e-4 if k else None,
+        "significant": k % 2 == 0 if k else None,
+    }
+    return Calibration.model_validate({"date": date, "model_hash": "a" * 64} | known | more)
+
+
+def labels(svg: str | None) -> list[str]:
+    assert svg is not None
+    return [re.sub(r"<[^>]*>", "", text) for text in re.findall(r"<text.*?</text>", svg, re.DOTALL)]
+
+
+def test_one_calibration_has_no_trend() -> None:
+    assert calibrations_over_time([]) is None
+    assert calibrations_over_time([calibration(0, DAYS[0])]) is None
+
+
+def test_dates_stand_below_where_they_follow_one_another() -> None:
+    shown = labels(calibrations_over_time([calibration(k, day) for k, day in enumerate(DAYS)]))
+    assert all(shown.count(day) == 2 for day in DAYS)
+    assert {"as found: the correction before", "as left: the new one"} <= set(shown)
+
+
+@pytest.mark.parametrize(
+    "days", [(None,) * 4, ("2020-01-11",) * 4, ("spring", "2021", "2022", "2023"), DAYS[::-1]]
+)
+def test_without_dates_the_calibrations_are_counted(days: tuple[str | None, ...]) -> None:
+    shown = labels(calibrations_over_time([calibration(k, day) for k, day in enumerate(days)]))
+    assert shown.count("number of the calibration") == 2 and not set(DAYS) & set(shown)
+
+
+def test_many_dates_become_days() -> None:
+    many = [calibration(k, f"{2000 + k}-01-01") for k in range(20)]
+    assert labels(calibrations_over_time(many)).count("days since the first calibration") == 2
+
+
+def test_what_is_not_known_is_not_drawn() -> None:
+    bare = dict.fromkeys(
+        ("as_found_rms_dph", "as_left_rms_dph", "moved_rms_dph", "moved_mean_dph", "expanded_uncertainty_dph")
+    )
+    shown = labels(
+        calibrations_over_time([calibration(k, day, **bare, significant=None) for k, day in enumerate(DAYS)])
+    )
+    assert "as found: the correction before" not in shown
+
+
+def test_a_move_that_is_significant_is_filled() -> None:
+    def filled(significant: bool) -> int:
+        history = [calibration(k, day, significant=significant if k else None) for k, day in enumerate(DAYS)]
+        return len(re.findall(r'<use [^>]*style="fill: #ffffff', str(calibrations_over_time(history))))
+
+    assert (filled(False), filled(True)) == (4, 1)

@@ -1,31 +1,36 @@
-"""Events of recordings: steps with time and size, what they leave out, and no step in what has none."""
+"""Events, spikes, bursts and loose thermometers are found with time and size, and none where there are none."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gyrotc.quality import steps as lasting_steps
+from gyrotc.quality.check import check
 from gyrotc.quality.drifts import drifts_of
 from gyrotc.quality.events import Event, accepted, events_of
+from gyrotc.quality.outliers import departing
 from gyrotc.quality.sign_and_gain import another_gain_throughout, gain_changes, turned_runs
 from gyrotc.quality.steps import steps_of
+from gyrotc.quality.thermometers import thermometer_findings
 from gyrotc.recordings.load import load
-from recordings import toml, write_csv
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from gyrotc.recordings.records import Dataset
+from gyrotc.simulate.campaign import simulate
+from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from numpy.typing import NDArray
+from recordings import Columns, toml, write_csv
 
 from tests.blind.other.record import draw_recording, write
 
 SEED, ROW_S, HOURS = 20261122, 10.0, 8
 NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means
-Columns = dict[str, np.ndarray]
+EventColumns = dict[str, np.ndarray]
 
 
-def recording(rng: np.random.Generator, kind: int) -> Columns:
+def recording(rng: np.random.Generator, kind: int) -> EventColumns:
     """Eight hours at a constant temperature, or with ramps, of a bias that follows temperature and its rate."""
     time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
     corners = ([0, 8], [20, 20]) if kind % 3 == 0 else ([0, 1, 2, 4, 6, 8], [0, 0, 60, 60, -30, -30])
@@ -37,7 +42,7 @@ def recording(rng: np.random.Generator, kind: int) -> Columns:
 
 
 def written(
-    folder: Path, change: Columns | None = None, run: int = 1, kept: np.ndarray | None = None
+    folder: Path, change: EventColumns | None = None, run: int = 1, kept: np.ndarray | None = None
 ) -> Path:
     """Three runs; one, the second, has the rates of `change` added, and of its rows those that are `kept`."""
     rng = np.random.default_rng(SEED)
@@ -228,7 +233,7 @@ def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
     assert found["thermometer_lost"].leave_out == pytest.approx((1500.0, 1800.0), abs=2.0)
 
 
-def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path:
+def ramps(folder: Path, change: Callable[[EventColumns], None] | None = None) -> Path:
     """Four runs with ramps, an hour later in the programme each; the third is changed."""
     folder.mkdir(exist_ok=True)
     rng = np.random.default_rng(SEED)
@@ -244,7 +249,7 @@ def ramps(folder: Path, change: Callable[[Columns], None] | None = None) -> Path
 
 
 def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
-    def louder(columns: Columns) -> None:
+    def louder(columns: EventColumns) -> None:
         columns["rate_dph"] = 1.3 * columns["rate_dph"]
 
     dataset = load(ramps(tmp_path, louder))
@@ -257,7 +262,7 @@ def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("factor", [0.8, 1.15, 1.3])
 def test_no_memory_stands_for_another_gain(tmp_path: Path, factor: float) -> None:
-    def louder(columns: Columns) -> None:
+    def louder(columns: EventColumns) -> None:
         columns["rate_dph"] = factor * columns["rate_dph"]
 
     assert another_gain_throughout(load(ramps(tmp_path, louder)).runs, 2)
@@ -267,10 +272,10 @@ def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path
     """In the midst of four hours of ramps; without a change, or with a level that changes, no gain does."""
     at = 3.2 * 3600.0
 
-    def louder(columns: Columns) -> None:
+    def louder(columns: EventColumns) -> None:
         columns["rate_dph"] = columns["rate_dph"] * np.where(columns["time_s"] >= at, 1.4, 1.0)
 
-    def higher(columns: Columns) -> None:
+    def higher(columns: EventColumns) -> None:
         columns["rate_dph"] = columns["rate_dph"] + 0.02 * (columns["time_s"] >= at)
 
     (event,) = gain_changes(load(ramps(tmp_path / "gain", louder)))
@@ -283,7 +288,7 @@ def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path
 
 
 def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:
-    def turned(columns: Columns) -> None:
+    def turned(columns: EventColumns) -> None:
         columns["rate_dph"] = -columns["rate_dph"]
 
     (event,) = turned_runs(load(ramps(tmp_path, turned)))
@@ -291,8 +296,201 @@ def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:
 
 
 def test_runs_that_agree_are_told_nothing_of(tmp_path: Path) -> None:
-    def shifted(columns: Columns) -> None:
+    def shifted(columns: EventColumns) -> None:
         columns["rate_dph"] = columns["rate_dph"] + 0.01
 
     assert turned_runs(load(ramps(tmp_path))) == []
     assert turned_runs(load(ramps(tmp_path, shifted))) == [], "an offset is no gain"
+
+
+Floats = NDArray[np.float64]
+ROWS = 28_800
+RUN = 'file = "a.csv"'
+
+
+def cycle(seed: int = 1) -> Columns:
+    """Eight hours of rows of a second: two cycles of temperature, a smooth bias, white noise of 0.1 deg/h a row."""
+    g = np.random.default_rng(seed)
+    t = np.arange(ROWS) * 1.0
+    temperature = 20.0 + 30.0 * np.sin(t * (4.0 * np.pi / ROWS))
+    rate = 0.02 * np.sin(temperature / 12.0) + g.normal(0.0, 0.1, ROWS)
+    return {
+        "time_s": t,
+        "temperature_c": np.round(temperature + g.normal(0.0, 0.005, ROWS), 4),
+        "rate_dph": rate,
+    }
+
+
+def fitted(folder: Path, table: Columns, run: str = RUN) -> Fitted:
+    write_csv(folder / "a.csv", table)
+    (folder / "dataset.toml").write_text(toml(run), "utf-8")
+    return fit_dataset(load(folder), FitOptions())
+
+
+def departure(one: Fitted, other: Fitted) -> float:
+    """RMS between two maps over the temperatures and rates of the runs, deg/h."""
+    t, r = np.meshgrid(np.linspace(-9.0, 49.0, 60), np.linspace(-0.7, 0.7, 9))
+    return float(np.sqrt(np.mean((one.model.map_dph(t, r) - other.model.map_dph(t, r)) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Fitted:
+    return fitted(tmp_path_factory.mktemp("clean") / "R", cycle())
+
+
+def test_ten_spikes_cost_less_than_a_hundredth_of_the_floor(tmp_path: Path, clean: Fitted) -> None:
+    """Before: the RMS departure of the map was several noise floors, without a finding."""
+    table = cycle()
+    at = np.arange(1, 11) * 2600
+    table["rate_dph"][at] += 5.0
+    spiked = fitted(tmp_path / "R", table)
+    floor = clean.training.noise_floor_dph
+    print("departure in floors", departure(spiked, clean) / floor, "centers", spiked.training.centers)
+    assert departure(spiked, clean) < 0.01 * floor
+    assert abs(spiked.training.noise_floor_dph / floor - 1.0) < 0.01
+    assert spiked.training.centers == clean.training.centers
+    told = spiked.training.content()["outliers"]
+    assert told["rows"] == 10
+    assert [s["from_s"] for s in told["stretches"]] == at.tolist()
+    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "rate_outliers"]
+    line = doubt.text[doubt.text.index("exclude = ") :]
+    again = fitted(tmp_path / "R", table, f"{RUN}\n{line}")  # pasted as it is offered
+    assert again.training.content()["outliers"]["rows"] == 0
+    assert "rate_outliers" not in {d.id for d in check(tmp_path / "R").doubts}
+
+
+def test_a_burst_is_left_out_whole(tmp_path: Path, clean: Fitted) -> None:
+    table = cycle()
+    table["rate_dph"][9000:9015] += np.random.default_rng(3).normal(0.0, 20.0, 15)
+    burst = fitted(tmp_path / "R", table)
+    assert 14 <= burst.training.content()["outliers"]["rows"] <= 30
+    assert departure(burst, clean) < 0.1 * clean.training.noise_floor_dph
+
+
+def test_a_clean_recording_loses_nothing(clean: Fitted) -> None:
+    assert clean.training.content()["outliers"] == {"rows": 0, "share": 0.0, "stretches": []}
+
+
+NOISES: dict[str, Callable[[np.random.Generator, int], Floats]] = {
+    "white": lambda g, n: g.normal(0.0, 1.0, n),
+    "quantised": lambda g, n: np.round(g.normal(0.0, 0.3, n)),
+    "rare counts": lambda g, n: (g.random(n) < 0.002) * 1.0,
+    "low pass": lambda g, n: np.convolve(g.normal(0.0, 1.0, n + 99), np.ones(100) / 100.0, "valid"),
+    "Laplace": lambda g, n: g.laplace(0.0, 1.0, n),
+    "louder from the middle on": lambda g, n: (
+        g.normal(0.0, 1.0, n) * np.where(np.arange(n) < n // 2, 1.0, 10.0)
+    ),
+    "a lasting step": lambda g, n: g.normal(0.0, 1.0, n) + np.where(np.arange(n) < n // 2, 0.0, 40.0),
+    "ramps": lambda g, n: np.abs(np.arange(n) - n / 2) / 60.0 + g.normal(0.0, 0.1, n),
+    "constant": lambda g, n: np.zeros(n),
+}
+
+
+@pytest.mark.parametrize("rows_per_block", [1, 10, 100])
+@pytest.mark.parametrize("name", NOISES)
+def test_less_than_a_thousandth_of_a_clean_recording_is_left_out(name: str, rows_per_block: int) -> None:
+    rate = NOISES[name](np.random.default_rng(11), 200_000)
+    assert departing(rate, rows_per_block).sum() < 200
+
+
+def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean: Fitted) -> None:
+    """Before: refused, even inside `exclude`."""
+    table = cycle()
+    table["rate_dph"][100:130] = np.nan
+    table["rate_dph"][20_000] = np.nan
+    table["temperature_c"][15_000:15_004] = np.nan
+    run = f'{RUN}\nexclude = [{{from_s = 90.0, to_s = 140.0, reason = "no lock"}}]'
+    result = fitted(tmp_path / "R", table, run)
+    assert departure(result, clean) < 0.2 * clean.training.noise_floor_dph
+    assert check(tmp_path / "R").problems == ()
+    [run_of] = load(tmp_path / "R").runs
+    assert len(run_of.rows()) == ROWS - 4
+
+
+@pytest.mark.slow
+def test_the_report_lists_what_was_left_out_with_the_line_to_paste(
+    tmp_path: Path,
+) -> None:
+    from gyrotc.jobs.build import build
+
+    table = cycle()
+    table["rate_dph"][[5000, 9000]] += 5.0
+    write_csv(tmp_path / "R" / "a.csv", table)
+    (tmp_path / "R" / "dataset.toml").write_text(toml(RUN), "utf-8")
+    build(tmp_path / "R", tmp_path / "out", FitOptions(), numerics=["f32"], targets=["host-gcc-O2"])
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Rows left out of training" in page
+    lines = (
+        "exclude = [{from_s = 5000.0, to_s = 5000.5, reason = &#34;outlier&#34;}, "
+        "{from_s = 9000.0, to_s = 9000.5, reason = &#34;outlier&#34;}]"
+    )
+    assert lines in page
+
+
+RUNS = """
+extends = "signals"
+[profile."up and down"]
+start_c = 10.0
+record_min = 240
+steps = [{hold_min = 80}, {ramp_to_c = 40.0, c_per_min = 2.0}, {hold_min = 20}, {ramp_to_c = 0.0, c_per_min = 2.0},
+  {hold_min = 30}, {ramp_to_c = 20.0, c_per_min = 2.0}, {hold_min = 30}]
+[profile."down and up"]
+start_c = 30.0
+record_min = 240
+steps = [{hold_min = 70}, {ramp_to_c = 0.0, c_per_min = 3.0}, {hold_min = 20}, {ramp_to_c = 40.0, c_per_min = 1.0},
+  {hold_min = 30}, {ramp_to_c = 20.0, c_per_min = 2.0}, {hold_min = 30}]
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = ["up and down", "down and up", "up and down", "down and up"]
+"""
+LOOSE = """[[thermometer]]
+name = "mirror_c"
+node = "mirror"
+loose_from_day = 2.5
+[[thermometer]]
+name = "case_c"
+node = "case"
+"""
+
+
+def made(folder: Path, text: str) -> Dataset:
+    (folder / "runs.toml").write_text(text, "utf-8")
+    simulate(folder / "runs.toml", seed=9, out=folder / "data")
+    return load(folder / "data")
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return made(tmp_path_factory.mktemp("sound"), RUNS)
+
+
+def test_thermometers_at_their_places_are_not_accused(sound: Dataset) -> None:
+    assert list(thermometer_findings(sound)) == []
+
+
+def test_a_thermometer_that_lost_contact_is_named_with_its_run(tmp_path: Path) -> None:
+    dataset = made(tmp_path, RUNS + LOOSE)
+    found = list(thermometer_findings(dataset))
+    assert [(f["evidence"]["channel"], f["evidence"]["file"]) for f in found] == [("mirror_c", "run-04.csv")]
+    assert "shows" in found[0]["text"]
+    assert "less" in found[0]["text"]
+
+
+def test_one_that_answers_later_is_named_and_by_how_much(sound: Dataset) -> None:
+    """The third run's mirror, delayed by ten minutes in the file itself."""
+
+    def late(k: int) -> object:
+        run = sound.runs[k]
+        rows = run.rows()
+        shifted = np.concatenate([np.full(60, rows.channels["mirror_c"][0]), rows.channels["mirror_c"][:-60]])
+        changed = replace(rows, channels={**rows.channels, "mirror_c": shifted})
+        return replace(run, reader=lambda: changed)
+
+    runs = tuple(late(k) if k == 2 else run for k, run in enumerate(sound.runs))
+    (found,) = thermometer_findings(replace(sound, runs=runs))  # type: ignore[arg-type]
+    assert found["evidence"]["file"] == "run-03.csv"
+    assert "s later" in found["text"]
+
+
+def test_two_runs_say_nothing(sound: Dataset) -> None:
+    assert list(thermometer_findings(replace(sound, runs=sound.runs[:2]))) == []

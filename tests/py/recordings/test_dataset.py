@@ -1,12 +1,14 @@
-"""A data set after loading: numbers as written, spans, axes, pulses, Earth's rate, channels, times."""
+"""A data set after loading: numbers as written; every form that is accepted, every fault and damage that is refused."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import random
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -16,6 +18,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 from gyrotc.common.errors import InputError
+from gyrotc.quality.check import check
 from gyrotc.recordings import files
 from gyrotc.recordings.csv_file import CsvFile
 from gyrotc.recordings.description import Problems
@@ -24,7 +27,18 @@ from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.records import Applied
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from recordings import ROWS, RUN, columns, columns_of_pulses, csv_text, described, toml, write_csv
+from recordings import (
+    ACCEPTED,
+    REFUSED,
+    ROWS,
+    RUN,
+    columns,
+    columns_of_pulses,
+    csv_text,
+    described,
+    toml,
+    write_csv,
+)
 
 Table = dict[str, np.ndarray]
 
@@ -446,3 +460,108 @@ def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path)
     rows, peak_kib = map(int, done.stdout.split())
     assert rows == 6 * n
     assert peak_kib < 512 * 1024
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_with_place_found_and_expected(case: str, tmp_path: Path) -> None:
+    refused = REFUSED[case]
+    folder = tmp_path / refused.folder
+    refused.make(folder)
+    with pytest.raises(InputError) as caught:
+        load(folder)
+    for part in refused.message:
+        assert part in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("case", ACCEPTED)
+def test_accepted(case: str, tmp_path: Path) -> None:
+    folder = tmp_path / "RLG-1"
+    ACCEPTED[case](folder)
+    dataset = load(folder)
+    for run in dataset.runs:
+        assert len(run.rows()) == run.n_rows == ROWS
+        assert run.in_span(run.rows().time_s).any()
+
+
+TRIALS = 150
+
+
+def _flip(data: bytearray, draw: random.Random) -> None:
+    data[draw.randrange(len(data))] = draw.randrange(256)
+
+
+def _cut(data: bytearray, draw: random.Random) -> None:
+    del data[draw.randrange(len(data)) :]
+
+
+def _drop(data: bytearray, draw: random.Random) -> None:
+    start = draw.randrange(len(data))
+    del data[start : start + draw.randrange(1, 40)]
+
+
+def _double(data: bytearray, draw: random.Random) -> None:
+    start = draw.randrange(len(data))
+    data[start:start] = data[start : start + draw.randrange(1, 40)]
+
+
+def _insert(data: bytearray, draw: random.Random) -> None:
+    word = draw.choice(
+        [b",", b"\n", b'"', b"\x00", b"1e999", b"nan", b"[[", b"=", b"\xff", b"-", b"\r", b"{}"]
+    )
+    at = draw.randrange(len(data))
+    data[at:at] = word
+
+
+DAMAGE: tuple[Callable[[bytearray, random.Random], None], ...] = (_flip, _cut, _drop, _double, _insert)
+
+
+@pytest.mark.parametrize(
+    ("case", "name"),
+    [
+        ("no dataset.toml", "a.csv"),
+        ("Parquet", "a.parquet"),
+        ("several runs", "dataset.toml"),
+        ("pulses", "a.csv"),
+    ],
+)
+def test_damaged_files_are_read_or_refused(case: str, name: str, tmp_path: Path) -> None:
+    seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    folder = tmp_path / "RLG-1"
+    ACCEPTED[case](folder)
+    whole = (folder / name).read_bytes()
+    refused = 0
+    for _ in range(TRIALS):
+        data = bytearray(whole)
+        for _ in range(draw.randint(1, 3)):
+            if data:
+                draw.choice(DAMAGE)(data, draw)
+        (folder / name).write_bytes(data)
+        try:
+            for run in load(folder).runs:
+                run.rows()
+        except InputError as problem:
+            refused += 1
+            assert str(problem)
+            assert check(folder).problems, "check tells what fit refuses"
+        else:
+            assert not check(folder).problems
+    assert refused > TRIALS // 10
+
+
+def test_a_damaged_description_of_parquet_never_ends_the_process(tmp_path: Path) -> None:
+    """Descriptions of columns that contradict each other made pyarrow abort when it was asked for one of them."""
+    folder, draw = tmp_path / "RLG-1", random.Random(1)
+    ACCEPTED["Parquet"](folder)
+    path = folder / "a.parquet"
+    whole = path.read_bytes()
+    footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
+    for _ in range(200):
+        data = bytearray(whole)
+        for _ in range(draw.randint(1, 3)):
+            data[draw.randrange(footer, len(data) - 8)] = draw.randrange(256)
+        path.write_bytes(data)
+        with contextlib.suppress(InputError):
+            load(folder)

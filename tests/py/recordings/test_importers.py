@@ -1,25 +1,34 @@
-"""Files as loggers write them become data sets by one command; what is not declared is refused, never guessed."""
+"""Files as loggers write them become data sets by one command; a refusal names the place and the change to make."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
+import subprocess
+import sys
+from collections.abc import Callable
 from datetime import datetime, timezone
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from conftest import run_gyrotc
+from conftest import Command, run_gyrotc
+from gyrotc.recordings.importers.job import ImportOptions, import_files
+from gyrotc.recordings.importers.map_file import Map, load_map
 from gyrotc.recordings.importers.stamps import Stamps
 from gyrotc.recordings.load import load
+from gyrotc.results.base import read_result
+from gyrotc.results.recordings import ImportedFiles
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
 from logger_strangers import STRANGERS, milliseconds
 from logger_table import PAGE, cases, filled
 
 
-def run(*arguments: str | Path) -> tuple[int, str, str]:
+def run_alone(*arguments: str | Path) -> tuple[int, str, str]:
     """Exit status, stdout and stderr of the command as a user types it."""
     done = run_gyrotc(*arguments)
     return done.returncode, done.stdout, done.stderr
@@ -32,7 +41,7 @@ def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
     seen = truth()
     case.write(tmp_path / case.file, seen)
     out = tmp_path / "RLG-1"
-    status, told, error = run("import", tmp_path / case.file, "--out", out, *case.options)
+    status, told, error = run_alone("import", tmp_path / case.file, "--out", out, *case.options)
     assert status == 0, error + told
     for k, axis in enumerate("xyz") if case.axes else [(0, None)]:
         rows = (dataset := load(out, axis=axis)).runs[0].rows()
@@ -71,11 +80,11 @@ def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(tmp_path: Path
     """1.234 is 1234 for one logger and 1.234 for another; where nothing tells, the column is no column of numbers."""
     lines = [f"{k},5;{20 + k % 2},25;{1 + k % 3}.{200 + k}" for k in range(60)]
     (tmp_path / "a.csv").write_text("Zeit [s];Temp [°C];Rate [°/h]\n" + "\n".join(lines) + "\n", "utf-8")
-    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    status, _, error = run_alone("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 2
     assert "no column that a rate is told from" in error
     stated = ("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--csv", "thousands=.")
-    status, _, error = run(*stated)
+    status, _, error = run_alone(*stated)
     assert status == 0, error
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1200.0
 
@@ -84,9 +93,9 @@ def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(tmp_path: Path
 def test_the_kept_map_reads_the_next_file(case: Case, tmp_path: Path) -> None:
     """Without any option, and to the same rows."""
     case.write(tmp_path / case.file, truth())
-    assert run("import", tmp_path / case.file, "--out", tmp_path / "A", *case.options)[0] == 0
+    assert run_alone("import", tmp_path / case.file, "--out", tmp_path / "A", *case.options)[0] == 0
     again = ("import", tmp_path / case.file, "--map", tmp_path / "A" / "map.toml", "--out", tmp_path / "B")
-    status, _, error = run(*again)
+    status, _, error = run_alone(*again)
     assert status == 0, error
     [one], [two] = (sorted((tmp_path / name).glob("*.parquet")) for name in "AB")
     assert one.read_bytes() == two.read_bytes()
@@ -95,7 +104,502 @@ def test_the_kept_map_reads_the_next_file(case: Case, tmp_path: Path) -> None:
 def test_milliseconds_beside_a_stamp_are_read(tmp_path: Path) -> None:
     milliseconds(tmp_path / "gl.csv", truth())
     command = ("import", tmp_path / "gl.csv", "--out", tmp_path / "R", "--trust-units")
-    status, told, error = run(*command)
+    status, told, error = run_alone(*command)
     assert status == 0, error
     assert "Date&Time + ms" in told
     np.testing.assert_allclose(load(tmp_path / "R").runs[0].rows().time_s, truth().time_s / 20.0, atol=1e-9)
+
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(gyrotc: Command) -> Run:
+    """The command as a user types it: exit status, stdout, stderr."""
+
+    def one(*arguments: str | Path) -> tuple[int, str, str]:
+        done = gyrotc(*arguments)
+        return done.returncode, done.stdout, done.stderr
+
+    return one
+
+
+def lines(head: str, row: Callable[[int, float, float], str], rows: int = 600) -> str:
+    """A laser gyro with Earth's rate in it: 0.0005 deg/sqrt(h), 20 to 50 C and back in 100 minutes."""
+    rng = np.random.default_rng(3)
+    temperature = (
+        20.0 + 30.0 * (1.0 - np.abs(2.0 * np.arange(rows) / rows - 1.0)) + rng.normal(0.0, 0.01, rows)
+    )
+    rate = 10.0 + rng.normal(0.0, 0.01, rows)
+    every = zip(temperature.tolist(), rate.tolist(), strict=True)
+    return "\n".join([head, *(row(k, t, r) for k, (t, r) in enumerate(every))]) + "\n"
+
+
+OWN = "time_s,temperature_c,rate_dph"
+PLAIN = "time,temperature,gyro"
+
+REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "no units": (
+        lines(PLAIN, lambda k, t, r: f"{10 * k},{t},{r}"),
+        (),
+        ("no unit of the rate in column 'gyro'", "--rate-unit", "--temperature-unit", "--time-unit"),
+        ("--rate-unit", "deg/h", "--temperature-unit", "degC", "--time-unit", "s"),
+    ),
+    "one unit missing": (
+        lines("t_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
+        (),
+        ("no unit of the rate", "--rate-unit"),
+        ("--rate-unit", "deg/h"),
+    ),
+    "deg/s taken for deg/h": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{r / 3600}"),
+        (),
+        ("white noise", "below that of any gyro", '--rate-unit "deg/s"', "--trust-units"),
+        ("--rate-unit", "deg/s"),
+    ),
+    "rad/s taken for deg/h": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{np.radians(r / 3600)}"),
+        (),
+        ("below that of any gyro", "rad/s", "--trust-units"),
+        ("--rate-unit", "rad/s"),
+    ),
+    "minutes taken for seconds": (
+        lines(OWN, lambda k, t, r: f"{k / 6},{t},{r}"),
+        (),
+        ("C/min", "faster than a chamber", '--time-unit "min"'),
+        ("--time-unit", "min"),
+    ),
+    "hours taken for seconds": (
+        lines(OWN, lambda k, t, r: f"{k / 360},{t},{r}"),
+        (),
+        ("faster than a chamber", "C/min"),
+        ("--time-unit", "h"),
+    ),
+    "kelvin taken for C": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t + 273.15},{r}"),
+        (),
+        ("line 2", "--temperature-unit K"),
+        ("--temperature-unit", "K"),
+    ),
+    "fahrenheit taken for C": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{(t + 15) * 1.8 + 32},{r}"),
+        (),
+        ("fahrenheit", '--temperature-unit "degF"'),
+        ("--temperature-unit", "degF"),
+    ),
+    "a word among numbers": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{'OVR' if k == 300 else r}"),
+        (),
+        ("line 302, column rate_dph", "'OVR'", "--csv missing"),
+        ("--csv", "missing=OVR"),
+    ),
+    "a line of words": (
+        lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}" if k != 300 else "Logger restarted"),
+        (),
+        ("line 302", "Logger restarted", "--csv comment"),
+        ("--csv", "comment=Logger"),
+    ),
+    "day or month": (
+        lines(
+            "time,temp_c,rate_dph",
+            lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}",
+        ),
+        (),
+        ("cannot be told apart", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
+        ("--time-format", "%d/%m/%Y %H:%M:%S"),
+    ),
+    "stamps too coarse": (
+        lines(
+            "time,temp_c,rate_dph", lambda k, t, r: f"2026-03-01 08:{k // 100:02d}:{k // 10 % 60:02d},{t},{r}"
+        ),
+        (),
+        ("line 3", "the time of the row before", "--rate-hz"),
+        ("--rate-hz", "0.1"),
+    ),
+    "two thermometers": (
+        lines("time_s,T1 [C],T2 [C],rate_dph", lambda k, t, r: f"{10 * k},{t},{t},{r}"),
+        (),
+        ("'T1 [C]', 'T2 [C]' could be the temperature", "--column temperature="),
+        ("--column", "temperature=T2 [C]"),
+    ),
+    "no times": (
+        lines("temp_c,rate_dph", lambda k, t, r: f"{t},{r}"),
+        (),
+        ("no column that a time is told from", "--rate-hz"),
+        ("--rate-hz", "0.1"),
+    ),
+    "the hours of deg/hr taken for a time": (
+        lines("Excel date,Temp C,Rate deg/hr", lambda k, t, r: f"{46100 + k / 8640:.9f},{t},{r}"),
+        (),
+        ("no unit of the time in column 'Excel date'", "--time-unit"),
+        ("--time-unit", "d"),
+    ),
+    "no line of names": (
+        lines("0,20,10", lambda k, t, r: f"{10 * k + 10},{t},{r}"),
+        (),
+        ("column 1, column 2, column 3", '--column time="column ..." --time-unit', "--rate-unit"),
+        (
+            "--column",
+            "time=column 1",
+            "--time-unit",
+            "s",
+            "--column",
+            "temperature=column 2",
+            "--temperature-unit",
+            "degC",
+            "--column",
+            "rate=column 3",
+            "--rate-unit",
+            "deg/h",
+        ),
+    ),
+    "points between thousands of a whole number": (
+        lines(
+            "Zeit [ms];T [C];rate [deg/h]",
+            lambda k, t, r: (
+                f"{10000 * k:,};{t:.4f};{r:.6f}".replace(",", "#").replace(".", ",").replace("#", ".")
+            ),
+        ),
+        (),
+        ("no column that a time is told from", "as Zeit [ms] holds", "--csv thousands=."),
+        ("--csv", "thousands=."),
+    ),
+    "a unit that is none": (
+        lines("time_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
+        ("--rate-unit", "furlongs"),
+        ("--rate-unit", "furlongs", "deg/s"),
+        ("--rate-unit", "deg/h"),
+    ),
+    "a unit of something else": (
+        lines("time_s,temp_c,gyro [V]", lambda k, t, r: f"{10 * k},{t},{r}"),
+        ("--column", "rate=gyro [V]"),
+        ("'V'", "no rate", "--rate-unit"),
+        ("--column", "rate=gyro [V]", "--rate-unit", "deg/h"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_refusal_names_what_goes_on_and_that_goes_on(case: str, tmp_path: Path, run: Run) -> None:
+    text, options, words, mended = REFUSED[case]
+    (tmp_path / "log.csv").write_text(text)
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", *options)
+    assert status == 2, out
+    assert all(word in error for word in words), error
+    assert not (tmp_path / "RLG-1").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv"]
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", *mended)
+    assert status == 0, error
+    rows = load(tmp_path / "RLG-1").runs[0].rows()
+    assert rows.rate_dph.mean() == pytest.approx(10.0, abs=0.01)
+    assert rows.temperature_c.max() == pytest.approx(50.0, abs=15.1)
+    assert rows.time_s[-1] - rows.time_s[0] == pytest.approx(5990.0, rel=0.01)
+
+
+def test_values_that_are_right_as_they_are_come_in_and_it_is_recorded(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(REFUSED["deg/s taken for deg/h"][0])
+    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", "--trust-units")
+    assert status == 0, error
+    assert "units are trusted: rate_dph: white noise" in out
+    dataset = load(tmp_path / "RLG-1")
+    assert "white noise" in dataset.trusted[0]
+
+
+def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_path: Path, run: Run) -> None:
+    text = lines("t;T;G", lambda k, t, r: f"{10 * k};{t};{r / 3600}".replace(".", ","))
+    stated = [
+        "--column",
+        "rate=G",
+        "--column",
+        "temperature=T",
+        "--rate-unit",
+        "deg/s",
+        "--temperature-unit",
+        "degC",
+    ]
+    (tmp_path / "one.csv").write_text(text)
+    first = run(
+        "import",
+        tmp_path / "one.csv",
+        "--out",
+        tmp_path / "A",
+        *stated,
+        "--time-unit",
+        "s",
+        "--serial",
+        "RLG-1",
+    )
+    assert first[0] == 0, first[2]
+    (tmp_path / "one-again.csv").write_text(text)
+    kept = tmp_path / "A" / "map.toml"
+    second = run("import", tmp_path / "one.csv", "--out", tmp_path / "B", "--map", kept)
+    third = run(
+        "import", tmp_path / "one-again.csv", "--out", tmp_path / "C", "--map", kept, "--serial", "RLG-2"
+    )
+    assert second[0] == third[0] == 0, second[2] + third[2]
+    for name in ("dataset.toml", "map.toml", "one.parquet"):
+        assert (tmp_path / "A" / name).read_bytes() == (tmp_path / "B" / name).read_bytes(), name
+    assert load(tmp_path / "C").serial == "RLG-2"
+    source = load(tmp_path / "A").sources[0]
+    assert source["file"] == "one.csv" and source["bytes"] == len(text)
+
+
+def test_a_person_on_a_terminal_is_asked_for_a_unit(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(lines(PLAIN, lambda k, t, r: f"{k / 6},{t + 273.15},{r / 3600}"))
+    answers = {"rate": "deg/s", "temperature": "K", "time": "min"}
+    asked: list[str] = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return next(unit for kind, unit in answers.items() if f"unit of the {kind}" in question)
+
+    import_files([tmp_path / "log.csv"], tmp_path / "R", Map(), ImportOptions(), ask=ask)
+    assert len(asked) == 3 and all("log.csv" in question for question in asked)
+    rows = load(tmp_path / "R").runs[0].rows()
+    assert rows.rate_dph.mean() == pytest.approx(10.0, abs=0.01)
+    assert rows.time_s[-1] == pytest.approx(5990.0)
+    kept = load_map(tmp_path / "R" / "map.toml")
+    assert kept.units == answers
+
+
+def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    result = tmp_path / "import.json"
+    status, _, error = run(
+        "import",
+        tmp_path / "a.csv",
+        tmp_path / "b.csv",
+        "--out",
+        tmp_path / "R",
+        "--format",
+        "csv",
+        "--json",
+        result,
+    )
+    assert status == 0, error
+    dataset = load(tmp_path / "R")
+    assert [run.file for run in dataset.runs] == ["a.csv", "b.csv"]
+    assert [source["file"] for source in dataset.sources] == ["a.csv", "b.csv"]
+    assert json.loads(result.read_text())["schema"] == "gyrotc.import/1"
+    assert dataset.runs[0].power_on_s is None
+
+
+def test_a_folder_that_import_did_not_make_is_left_alone(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    (tmp_path / "R").mkdir()
+    (tmp_path / "R" / "thesis.tex").write_text("mine")
+    status, _, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "R")
+    assert status == 2 and "R" in error
+    assert [p.name for p in (tmp_path / "R").iterdir()] == ["thesis.tex"]
+
+
+def test_what_an_import_says_is_a_typed_result(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "a.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r if k != 7 else 'NaN'}"))
+    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R-1", "--json", tmp_path / "i.json")[0] == 0
+    said = read_result(tmp_path / "i.json", ImportedFiles)
+    (one,) = said.runs
+    assert (said.serial, one.rows, one.left_out) == ("R-1", 599, {"no number in rate_dph": 1})
+    assert one.source.file == "a.csv" and one.source.bytes == (tmp_path / "a.csv").stat().st_size
+
+
+def test_a_dry_run_writes_nothing(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    status, out, _ = run("import", tmp_path / "log.csv", "--out", tmp_path / "R", "--dry-run")
+    assert status == 0 and "row 1:" in out and "nothing was written" in out
+    assert not (tmp_path / "R").exists()
+
+
+def test_a_missing_library_is_one_line_that_says_what_to_install(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
+    status, _, error = run("import", tmp_path / "flight.ulg", "--out", tmp_path / "R")
+    assert status == 2 and "pip install 'gyrotc[ulog]'" in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"", b"ULog\x01\x12\x35\x01\0", b"\x89HDF\r\n\x1a\n\0\0", b"MATLAB 5.0 MAT-file\0\0", b"TDSm\0\0\0",
+     b"#ROSBAG V2.0\n\0", b"MDF     4.10    \0", b"\xa3\x95\x80\0\0", b"PAR1\0\0", b"SQLite format 3\x00\0",
+     b"PK\x03\x04", bytes(range(256)) * 9],
+    ids=lambda head: repr(head[:8]),
+)  # fmt: skip
+def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) -> None:
+    (tmp_path / "log.bin").write_bytes(head)
+    status, _, error = run("import", tmp_path / "log.bin", "--out", tmp_path / "R")
+    assert status == 2, error
+    assert error.splitlines()[-1].startswith("gyrotc: ") and not (tmp_path / "R").exists()
+
+
+@pytest.mark.slow
+def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
+    """Twelve megabytes and four times that need the same memory within 60 MiB: nothing is kept of the rows."""
+    peaks = []
+    row = "{},{:.3f},20.123456,0.123456\n"
+    for k, blocks in enumerate((1, 4)):
+        path = tmp_path / f"{k}.csv"
+        with path.open("w") as file:
+            file.write("time_s,temperature_c,rate_dph,supply_v\n")
+            for block in range(blocks):
+                start = block * 400_000
+                file.writelines(
+                    row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000)
+                )
+        program = (
+            "import sys; from gyrotc.cli.main import run; status = run(sys.argv[1:]); "
+            "facts = dict(line.split(':') for line in open('/proc/self/status')); "  # ru_maxrss has the parent's, too
+            "print(status, int(facts['VmHWM'].split()[0]) // 1024)"
+        )
+        command = [sys.executable, "-c", program, "import", str(path), "--out", str(tmp_path / f"R{k}")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        status, peak = done.stdout.splitlines()[-1].split()
+        assert status == "0", done.stderr
+        peaks.append(int(peak))
+        assert pq.ParquetFile(tmp_path / f"R{k}" / f"{k}.parquet").metadata.num_rows == blocks * 400_000
+    assert peaks[1] < peaks[0] + 60, peaks
+    assert peaks[1] < 700, peaks
+
+
+@pytest.mark.parametrize(
+    ("name", "extra", "head"),
+    [
+        ("a.ulg", "ulog", b"ULog\x01\x12\x35"),
+        ("a.tdms", "tdms", b"TDSm"),
+        ("a.h5", "hdf5", b"\x89HDF\r\n\x1a\n"),
+        ("a.bag", "ros", b"#ROSBAG V2.0"),
+        ("a.bin", "dataflash", b"\xa3\x95"),
+        ("a.mf4", "mdf", b"MDF     "),
+    ],
+)
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(
+    name: str,
+    extra: str,
+    head: bytes,
+    tmp_path: Path,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from gyrotc.recordings.importers import tables
+
+    class Importlib:
+        """Finds nothing."""
+
+        @staticmethod
+        def import_module(module: str) -> None:
+            raise ImportError(module)
+
+    (tmp_path / name).write_bytes(head + bytes(2000))
+    monkeypatch.setattr(tables, "importlib", Importlib)
+    status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
+    assert status == 2
+    assert error.startswith(f"gyrotc: {name}: ")
+    assert f"expected pip install 'gyrotc[{extra}]'" in error
+
+
+GOES_ON = {
+    "pulses": (
+        "time_s,pulses,temp_c",
+        "{k},{k},20.5",
+        "--pulse-weight-arcsec W",
+        ("--pulse-weight-arcsec", "2.0"),
+    ),
+    "increments": (
+        "Time (s),DeltaAngle X (rad),Temp (C)",
+        "{k},0.0001{k},20.5",
+        '--column rate="DeltaAngle X (rad)" --rate-unit "rad / (0.01 s)"',
+        ("--column", "rate=DeltaAngle X (rad)", "--rate-unit", "rad / (0.01 s)"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", GOES_ON)
+def test_the_option_that_is_named_goes_on(case: str, tmp_path: Path, run: Run) -> None:
+    head, row, named, options = GOES_ON[case]
+    lines = [head, *(row.format(k=k + 100) for k in range(50))]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    command = ("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    status, _, error = run(*command)
+    assert status == 2
+    assert named in error
+    assert run(*command, *options, "--trust-units")[0] == 0
+
+
+def test_a_line_that_looks_like_a_row_is_never_offered_as_a_comment(tmp_path: Path, run: Run) -> None:
+    """Before: --csv comment="1000" was offered, which leaves out 10000 too."""
+    lines = ["time_s,temp_c,rate_dph", *(f"{10 * k},20.5,{k % 7}" + ",x" * (k == 100) for k in range(200))]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert "line 102: 4 cells" in error
+    assert "comment=" not in error
+
+
+def test_units_in_cells_are_taken_out_by_the_command_that_the_refusal_gives(tmp_path: Path, run: Run) -> None:
+    text = lines("time,temperature,rate", lambda k, t, r: f"{10 * k}.0 s,{t:.3f} °C,{r:.9f} °/h")
+    (tmp_path / "a.csv").write_text(text, "utf-8")
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    sed = error[error.index("sed ") : error.index(" takes the units out")]
+    subprocess.run(sed, shell=True, check=True, cwd=tmp_path)
+    units = ("--time-unit", "s", "--temperature-unit", "degC", "--rate-unit", "deg/h")
+    assert run("import", tmp_path / "a.csv.csv", "--out", tmp_path / "R", *units)[0] == 0
+    assert load(tmp_path / "R").runs[0].n_rows == 600
+
+
+def test_digits_that_may_be_hexadecimal_are_told(tmp_path: Path, run: Run) -> None:
+    text = lines("tick [ms],temp_c,rate_dph", lambda k, t, r: f"{10000 * k:06X}h,{t},{r}")
+    (tmp_path / "a.csv").write_text(text)
+    _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert "as tick [ms] holds '" in error and "0x before each of its numbers" in error
+
+
+@pytest.mark.parametrize("rows", [10, 20, 45])
+@pytest.mark.parametrize("above", [0, 25])
+def test_a_short_file_is_read(rows: int, above: int, tmp_path: Path, run: Run) -> None:
+    """Before: a header among the last 60 lines hid that the rows are numbers."""
+    lines = [*(f"note {k}" for k in range(above)), "time_s,temp_c,rate_dph"]
+    lines += [f"{10 * k},20.{k},{k % 7}.5" for k in range(rows)]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 0, error
+    assert load(tmp_path / "R").runs[0].n_rows == rows
+
+
+def test_commas_between_columns_and_in_decimals_are_told(tmp_path: Path, run: Run) -> None:
+    text = "\n".join(["time_s,temp_c,rate_dph", *(f"{k},0,20,{k},4,{k % 7}" for k in range(60))])
+    (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 2
+    assert "line 1: 3 names above rows of 6 cells" in error
+
+
+def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path: Path, run: Run) -> None:
+    """Before: read as hours and minutes, sixty times too slow, in silence."""
+    text = "\n".join(
+        ["Time,temp_c,rate_dph", *(f"{k // 6:02d}:{k % 6}0,20.{k % 10},{k % 7}" for k in range(120))]
+    )
+    (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 2
+    assert '--time-format "%H:%M" or --time-format "%M:%S"' in error
+    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--time-format", "%M:%S")[0] == 0
+    assert load(tmp_path / "R").runs[0].row_period_s == 10.0
+
+
+def test_a_time_that_counts_on_beyond_a_day_is_read(tmp_path: Path, run: Run) -> None:
+    rows = (f"{k // 6}:{k % 6}0:00,20.{k % 10},{k % 7}" for k in range(300))
+    (tmp_path / "a.csv").write_text("\n".join(["Elapsed,temp_c,rate_dph", *rows]) + "\n", "utf-8")
+    status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    assert status == 0, error
+    assert load(tmp_path / "R").runs[0].rows().time_s[-1] == 299 * 600.0
+
+
+def test_a_column_of_text_that_should_hold_numbers_is_named(tmp_path: Path, run: Run) -> None:
+    rows = (f"{10 * k};20,{10 + k % 80};1.{400 + k}" for k in range(100))
+    (tmp_path / "a.csv").write_text("\n".join(["time_s;temp_c;rate_dph", *rows]) + "\n", "utf-8")
+    command = ("import", tmp_path / "a.csv", "--out", tmp_path / "R")
+    status, _, error = run(*command)
+    assert status == 2
+    assert "temp_c holds '20,29'" in error
+    assert run(*command, "--csv", "decimal=,", "--csv", "thousands=.")[0] == 0
+    assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1400.0

@@ -9,14 +9,12 @@ with a probability below 1e-4.
 from __future__ import annotations
 
 import secrets
-import sys
 from pathlib import Path
 
 import pytest
 from scipy.stats import binom
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
 
 from tests.blind.grade import alarmed, family_right, wrong_family  # noqa: E402
 from tests.blind.run import Plan, run  # noqa: E402

@@ -6,14 +6,12 @@
 from __future__ import annotations
 
 import ast
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
 
 from tests.blind.other import heat, noise  # noqa: E402
 from tests.blind.other.grade import table  # noqa: E402

@@ -1,26 +1,23 @@
-"""Archives of `make dist`: what they hold, that they are made the same twice, and the bills of materials."""
+"""Archives of `make dist` and releases: what they hold, that they are made the same twice, what is refused."""
 
 from __future__ import annotations
 
 import gzip
 import hashlib
 import json
+import os
 import shutil
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
 
+import archives
 import pytest
-
-ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tools"))
-
-import archives  # noqa: E402
-import reference  # noqa: E402
-import version  # noqa: E402
-
-pytestmark = pytest.mark.slow
+import reference
+import version
+from conftest import ROOT
 
 TOP = f"gyrotc-{version.header_version(ROOT)}"
 
@@ -40,6 +37,7 @@ def unpacked(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / TOP
 
 
+@pytest.mark.slow
 def test_made_twice_it_is_the_same(archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     assert archives.sdist(tmp_path).read_bytes() == archive.read_bytes()
@@ -48,6 +46,7 @@ def test_made_twice_it_is_the_same(archive: Path, tmp_path: Path, monkeypatch: p
     assert gzip.decompress(archive.read_bytes()) and archive.read_bytes()[4:8] == b"\0\0\0\0"
 
 
+@pytest.mark.slow
 def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unpacked: Path) -> None:
     tracked = subprocess.run(
         ["git", "ls-files", "gen", "include", "libc"], cwd=ROOT, capture_output=True, text=True, check=False
@@ -65,6 +64,7 @@ def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unp
     assert not [p for p in unpacked.rglob("*") if p.suffix in (".so", ".pyc")]
 
 
+@pytest.mark.slow
 def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp_path: Path) -> None:
     """Without the sources beside it: it finds the runtime that it carries."""
     program = (
@@ -88,6 +88,7 @@ def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp
         assert (tmp_path / "out" / "c" / name).read_bytes() == (model.parent / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
     generator, c = (json.loads(path.read_text("utf-8")) for path in archives.sboms(tmp_path))
     for bom in (generator, c):
@@ -104,6 +105,7 @@ def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
         assert component["hashes"][0]["content"] == hashlib.sha256(content).hexdigest()
 
 
+@pytest.mark.slow
 def test_every_file_has_a_licence_that_lies_in_licenses() -> None:
     """REUSE: one rule for all; the text of the licence it names is there. `reuse lint` says the rest."""
     rules = (ROOT / "REUSE.toml").read_text("utf-8")
@@ -115,3 +117,103 @@ def test_every_file_has_a_licence_that_lies_in_licenses() -> None:
         pytest.skip("reuse is not installed")
     done = subprocess.run([reuse, "lint"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+TOOLS = ("release.sh", "version.py", "archives.py", "packages.py", "reference.py")
+
+
+def _run(*command: str, cwd: Path, status: int = 0, python: str = sys.executable) -> str:
+    environment = os.environ | {
+        "PYTHON": python,
+        "GIT_AUTHOR_NAME": "a", "GIT_AUTHOR_EMAIL": "a@b", "GIT_COMMITTER_NAME": "a", "GIT_COMMITTER_EMAIL": "a@b",
+    }  # fmt: skip
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> Path:
+    """The last commit, with the tools of this tree."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("the sources are an archive without history")
+    folder = tmp_path / "clone"
+    made = subprocess.run(
+        ["git", "clone", "-q", "--shared", str(ROOT), str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if made.returncode != 0:
+        pytest.skip(f"git does not clone the sources: {made.stderr.strip()[:100]}")
+    for name in TOOLS:
+        (folder / "tools" / name).write_bytes((ROOT / "tools" / name).read_bytes())
+        (folder / "tools" / name).chmod(0o755)
+    _run("git", "add", "-A", cwd=folder)
+    _run("git", "commit", "-q", "--allow-empty", "-m", "tools", cwd=folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_from_tag_to_archives(clone: Path) -> None:
+    """Prepared where nothing is set up yet; archives of the tag, packages by the tag's own generator."""
+    told = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
+    assert "git tag -a v0.2.0" in told
+    assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
+    emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
+    emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
+    command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
+    command.write_text(command.read_text("utf-8").replace("fish.", "fish of the tag."), "utf-8")
+    _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
+    _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
+    (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
+    _run("tools/release.sh", "archive", "v0.2.0", "--sdist", cwd=clone)
+    made = clone / "build" / "release" / "0.2.0"
+    assert {"gyrotc-0.2.0.tar.gz", "sbom-c.cdx.json", "SHA256SUMS", "packages"} <= {
+        p.name for p in made.iterdir()
+    }
+    packages = list((made / "packages").iterdir())
+    assert len(packages) == 4 and all(p.is_file() and "0.2.0" in p.name for p in packages)
+    (arduino,) = (p for p in packages if "arduino" in p.name)
+    with zipfile.ZipFile(arduino) as archive:
+        source = archive.read("gyrotc/src/gtc.c").decode()
+    assert "in one file of the tag;" in source and "not of the tag" not in source
+    page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
+    assert "fish of the tag." in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
+    _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
+    listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
+    files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}
+    assert listed == files - {"SHA256SUMS"}
+    (clone / "libc" / "gtc_crc.c").unlink()
+    _run("git", "checkout", "-q", ".", cwd=clone)
+    assert "there is a tag v0.2.0 already" in _run(
+        "tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("prepare", "2"), "is no version"),
+        (("archive", "0.2.0"), "is no tag"),
+        (("archive", "v0.2.0"), "there is no tag v0.2.0"),
+        ((), "expected prepare or archive"),
+    ],
+)
+def test_what_is_no_release_is_refused(clone: Path, words: tuple[str, ...], why: str) -> None:
+    assert why in _run("tools/release.sh", *words, cwd=clone, status=2)
+
+
+@pytest.mark.slow
+def test_archives_need_what_make_setup_makes_and_say_so(clone: Path) -> None:
+    _run("git", "tag", "v9.9.9", cwd=clone)
+    told = _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2, python="")
+    assert "there is no .venv here: make setup" in told
+
+
+@pytest.mark.slow
+def test_a_tag_of_another_version_is_refused(clone: Path) -> None:
+    _run("git", "tag", "v9.9.9", cwd=clone)
+    assert "holds another version" in _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2)
+    assert not (clone / "build" / "release").exists()

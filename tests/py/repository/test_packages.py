@@ -1,4 +1,4 @@
-"""Packages for firmware: each is built by its own tool where the machine has it, else by what its files say.
+"""Packages for firmware, each built by its own tool where the machine has it; the installed C library.
 
 All of them carry the version of `include/gtc.h`, and give the bits of the C functions.
 """
@@ -10,14 +10,16 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import version
+from conftest import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
+import packages
+
 PACKAGES = ROOT / "packages"
 MINIMAL = ROOT / "examples" / "minimal"
 RUNTIME = [ROOT / "libc" / f"gtc_{part}.c" for part in ("crc", "f32", "q31")]
@@ -30,13 +32,7 @@ FLAGS = (
     f"-I{ROOT / 'include'}",
     f"-I{MINIMAL}",
 )
-sys.path.insert(0, str(ROOT / "tools"))
 
-import version  # noqa: E402
-
-import packages  # noqa: E402
-
-pytestmark = pytest.mark.slow
 
 #: What packages/rust/example and packages/ada/example do, in C.
 RAMP = r"""
@@ -118,6 +114,7 @@ def archives(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # --- one source of the version -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_file_carries_the_version_of_the_header() -> None:
     assert version.differing(ROOT) == []
 
@@ -131,6 +128,7 @@ def copies(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", version.PLACES)
 def test_a_file_with_another_version_is_told_and_mended(name: str, copies: Path) -> None:
     path = copies / name
@@ -141,6 +139,7 @@ def test_a_file_with_another_version_is_told_and_mended(name: str, copies: Path)
     assert path.read_text() == (ROOT / name).read_text()
 
 
+@pytest.mark.slow
 def test_a_new_version_is_set_in_one_place_and_reaches_all(copies: Path) -> None:
     version.set_header(copies, "1.20.3")
     assert version.header_version(copies) == "1.20.3" and len(version.differing(copies)) == len(
@@ -150,6 +149,7 @@ def test_a_new_version_is_set_in_one_place_and_reaches_all(copies: Path) -> None
     assert version.differing(copies) == []
 
 
+@pytest.mark.slow
 def test_no_file_of_a_package_carries_a_version_that_the_list_lacks() -> None:
     current = version.header_version(ROOT)
     listed = set(version.PLACES) | {"packages/README.md"}
@@ -162,6 +162,7 @@ def test_no_file_of_a_package_carries_a_version_that_the_list_lacks() -> None:
 # --- each by its tool ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_meson_builds_a_user_of_the_wrap(tmp_path: Path, ramp: str) -> None:
     _need("ninja")
     meson = _need("meson")
@@ -249,6 +250,7 @@ def _asked(path: Path) -> set[str]:
     return set(re.findall(r"CONFIG_\w+", path.read_text()))
 
 
+@pytest.mark.slow
 def test_zephyr_finds_the_module_and_its_options(tmp_path: Path, ramp: str) -> None:
     """`zephyr/module.yml` names the folders, each option that CMake asks for is one of Kconfig."""
     named = dict(
@@ -263,6 +265,7 @@ def test_zephyr_finds_the_module_and_its_options(tmp_path: Path, ramp: str) -> N
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["sources", "archive"])
 def test_esp_idf_takes_the_component(where: str, tmp_path: Path, ramp: str, archives: Path) -> None:
     component = PACKAGES / "esp-idf" if where == "sources" else archives / "esp-idf" / "gyrotc"
@@ -272,6 +275,7 @@ def test_esp_idf_takes_the_component(where: str, tmp_path: Path, ramp: str, arch
     assert _run(_image(component, tmp_path / "image", **chosen)) == ramp
 
 
+@pytest.mark.slow
 def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
     text = (ROOT / "include" / "gtc_config.h").read_text()
     defaults = dict(re.findall(r"#ifndef GTC_(\w+)\n#define GTC_\w+ (\d+)", text))
@@ -282,6 +286,7 @@ def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
             assert options.get(f"CONFIG_GYROTC_{name}") == expected, (path, name)
 
 
+@pytest.mark.slow
 def test_platformio_compiles_what_its_manifest_says(tmp_path: Path, ramp: str) -> None:
     manifest = json.loads((ROOT / "library.json").read_text())
     build = manifest["build"]
@@ -296,6 +301,7 @@ def test_platformio_compiles_what_its_manifest_says(tmp_path: Path, ramp: str) -
         assert list(ROOT.glob(pattern)), pattern
 
 
+@pytest.mark.slow
 def test_a_cmsis_pack_holds_every_file_that_its_description_names(archives: Path) -> None:
     (pack,) = archives.glob("*.pack")
     with zipfile.ZipFile(pack) as opened:
@@ -313,6 +319,7 @@ def test_a_cmsis_pack_holds_every_file_that_its_description_names(archives: Path
     assert asked <= conditions
 
 
+@pytest.mark.slow
 def test_the_arduino_library_keeps_to_c99_arithmetic_without_a_flag(archives: Path, tmp_path: Path) -> None:
     """Its builder compiles as gnu11 with flags of its own; without the pragma, products are fused."""
     source = archives / "arduino" / "gyrotc" / "src" / "gtc.c"
@@ -331,6 +338,7 @@ def test_the_arduino_library_keeps_to_c99_arithmetic_without_a_flag(archives: Pa
     assert fused["with"] == 0 < fused["without"]
 
 
+@pytest.mark.slow
 def test_the_arduino_builder_takes_the_library(archives: Path, tmp_path: Path) -> None:
     builder = _need("arduino-builder")
     hardware = Path("/usr/share/arduino/hardware")
@@ -354,6 +362,7 @@ def test_the_arduino_builder_takes_the_library(archives: Path, tmp_path: Path) -
     assert "Sketch uses" in told
 
 
+@pytest.mark.slow
 def test_rust_gives_the_bits_of_c(ramp: str, archives: Path) -> None:
     """The crate as it is published (C sources inside) holds its own sizes against C's; the example gives C's bits."""
     cargo = _need("cargo")
@@ -366,6 +375,7 @@ def test_rust_gives_the_bits_of_c(ramp: str, archives: Path) -> None:
     assert _run(cargo, "run", "-q", cwd=PACKAGES / "rust" / "example", CARGO_TARGET_DIR=target) == ramp
 
 
+@pytest.mark.slow
 def test_rust_has_every_option_at_its_default_and_every_status() -> None:
     text = (PACKAGES / "rust" / "src" / "lib.rs").read_text()
     header = (ROOT / "include" / "gtc.h").read_text()
@@ -378,6 +388,7 @@ def test_rust_has_every_option_at_its_default_and_every_status() -> None:
     )
 
 
+@pytest.mark.slow
 def test_ada_gives_the_bits_of_c_with_every_contract_checked(ramp: str, tmp_path: Path) -> None:
     gnatmake = _need("gnatmake")
     for source in (*PACKAGES.glob("ada/*.ad?"), *PACKAGES.glob("ada/example/*.adb")):
@@ -393,8 +404,135 @@ def test_ada_gives_the_bits_of_c_with_every_contract_checked(ramp: str, tmp_path
 # --- archives ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_archives_made_twice_are_equal(archives: Path, tmp_path: Path) -> None:
     again = packages.assemble(tmp_path, list(packages.KINDS))
     assert len(again) == len(packages.KINDS)
     for path in again:
         assert path.read_bytes() == (archives / path.name).read_bytes()
+
+
+USER = r"""
+#include "gtc_rlg_0042.h"
+
+#if GTC_MAX_TERMS != 2
+#error "the option of the library does not reach its user"
+#endif
+
+int main(void)
+{
+    gtc_q31_state_t state;
+    const int_least32_t temp = 20 * 65536;
+    int_least32_t bias = 0;
+
+    if ((gtc_f32_check(&gtc_sn_rlg_0042_f32) != 0) || (gtc_q31_check(&gtc_sn_rlg_0042_q31) != 0)) {
+        return 1;
+    }
+    if ((gtc_q31_init(&state, &gtc_sn_rlg_0042_q31, 1000000UL) != 0) || (gtc_q31_sample(&state, &temp) < 0)
+        || (gtc_q31_sample(&state, &temp) < 0)) { /* one alone is not believed */
+        return 2;
+    }
+    return ((gtc_q31_bias(&state, &bias) >= 0) && (bias != 0)) ? 0 : 3;
+}
+"""
+_HEADER = (ROOT / "include" / "gtc.h").read_text(encoding="ascii")
+VERSION = re.findall(r"#define GTC_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", _HEADER)
+FOUND = f"find_package(gyrotc {VERSION[0]}.{VERSION[1]} REQUIRED)"
+PROJECT = f"""
+cmake_minimum_required(VERSION 3.18)
+project(user C)
+{FOUND}
+add_executable(user user.c gtc_rlg_0042.c)
+set_target_properties(user PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
+target_link_libraries(user PRIVATE gyrotc::gtc)
+"""
+
+
+def _printed(*command: str | Path, cwd: Path | None = None) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the library was installed, moved once since: nothing in it may name the folder of the build."""
+    work = tmp_path_factory.mktemp("package")
+    _printed(
+        "cmake",
+        "-S",
+        ROOT,
+        "-B",
+        work / "build",
+        "-DGTC_MAX_TERMS=2",
+        f"-DCMAKE_INSTALL_PREFIX={work / 'first'}",
+    )
+    _printed("cmake", "--build", work / "build")
+    _printed("cmake", "--install", work / "build")
+    return (work / "first").rename(work / "moved")
+
+
+@pytest.fixture
+def user(tmp_path: Path) -> Path:
+    """A folder with a program that uses the library and an emitted table."""
+    symbol = re.search(r"extern const gtc_f32_table_t (\w+)_f32;", _example("gtc_rlg_0042.h"))
+    assert symbol is not None
+    (tmp_path / "user.c").write_text(USER.replace("gtc_sn_rlg_0042", symbol[1]))
+    (tmp_path / "CMakeLists.txt").write_text(PROJECT)
+    for name in ("gtc_rlg_0042.c", "gtc_rlg_0042.h"):
+        (tmp_path / name).write_text(_example(name))
+    return tmp_path
+
+
+def _example(name: str) -> str:
+    return (ROOT / "examples" / "minimal" / name).read_text(encoding="ascii")
+
+
+@pytest.mark.slow
+def test_cmake_finds_it(prefix: Path, user: Path) -> None:
+    _printed("cmake", "-S", user, "-B", user / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
+    _printed("cmake", "--build", user / "build")
+    _printed(user / "build" / "user")
+
+
+@pytest.mark.slow
+def test_a_project_takes_the_sources_in(user: Path) -> None:
+    """FetchContent, with a folder in place of a URL: no installation, the options as in any build."""
+    taken = f"""include(FetchContent)
+set(GTC_MAX_TERMS 2)
+FetchContent_Declare(gyrotc SOURCE_DIR "{ROOT}")
+FetchContent_MakeAvailable(gyrotc)"""
+    (user / "CMakeLists.txt").write_text(PROJECT.replace(FOUND, taken))
+    _printed("cmake", "-S", user, "-B", user / "build", "-DGTC_MAX_TERMS=2")
+    _printed("cmake", "--build", user / "build")
+    _printed(user / "build" / "user")
+
+
+@pytest.mark.slow
+def test_pkg_config_finds_it(prefix: Path, user: Path) -> None:
+    (folder,) = prefix.glob("lib*/**/pkgconfig")
+    found = ["env", f"PKG_CONFIG_PATH={folder}", "pkg-config"]
+    assert _printed(*found, "--modversion", "gyrotc").strip() == ".".join(VERSION)
+    flags = _printed(*found, "--cflags", "--libs", "gyrotc").split()
+    _printed(
+        "gcc", "-std=c99", "-ffp-contract=off", "user.c", "gtc_rlg_0042.c", *flags, "-o", "user", cwd=user
+    )
+    _printed(user / "user")
+
+
+@pytest.mark.slow
+def test_every_option_of_the_configuration_is_one_of_the_package() -> None:
+    config = (ROOT / "include" / "gtc_config.h").read_text(encoding="ascii")
+    options = set(re.findall(r"^#define (GTC_\w+) \d", config, re.MULTILINE))
+    listed = re.search(r"set\(GTC_OPTIONS ([^)]*)\)", (ROOT / "CMakeLists.txt").read_text())
+    assert listed is not None and set(listed[1].split()) == options
+
+
+@pytest.mark.slow
+def test_each_option_has_its_reason() -> None:
+    """A comment of some length stands before each `#ifndef` of an option."""
+    config = (ROOT / "include" / "gtc_config.h").read_text(encoding="ascii")
+    for match in re.finditer(r"^#ifndef (GTC_\w+)\n", config, re.MULTILINE):
+        if match[1] != "GTC_CONFIG_H_INCLUDED":
+            before = config[: match.start()].rstrip()
+            assert before.endswith("*/") and len(before.rsplit("/*", 1)[1].split()) > 15, match[1]

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
+import reference
 from conftest import ROOT
 from gyrotc.cli.commands import app
 from gyrotc.cli.schemas import KINDS
 from gyrotc.results.describe import tables
 from gyrotc.verify.sizes import PUBLIC
 from typer.main import get_command
-
-sys.path.insert(0, str(ROOT / "tools"))
-
-import reference
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Set-up on any release of Debian: which packages it asks for, and what it does about those that are not there."""
+"""Set-up on any release of Debian, and what a user sets for `make`."""
 
 from __future__ import annotations
 
@@ -105,3 +105,102 @@ def test_proofs_whose_tool_is_missing_are_skipped_by_its_name(tmp_path: Path) ->
     for tool in ("frama-c", "gappa", "z3"):
         assert f"{tool} is not installed" in done.stdout
     assert list(tmp_path.iterdir()) == [], "figures of half a proof are not written"
+
+
+#: Stands in for every program: writes what it was called with.
+STUB = '#!/bin/sh\nprintf "%s\\n" "$(basename "$0")" "$@" ${GYROTC_ODD:+"ODD=$GYROTC_ODD"} >>"$CALLS"\n'
+HOSTILE = (
+    'x"; touch y; "',
+    "x'; touch y; '",
+    "$(touch y)",
+    "$(shell touch y)",
+    "${shell touch y}",
+    "`touch y`",
+    "x; touch y",
+    "x | touch y #",
+    "--out=y",
+    "a folder",
+    "a$b",
+    "*",
+    "~",
+    "Mämmi\\",
+)
+
+
+@pytest.fixture
+def stubbed(tmp_path: Path) -> Path:
+    """A folder with the Makefile in which every program is a stub."""
+    folder = tmp_path / 'a "house"'
+    for program in (
+        "tools/setup.sh",
+        ".venv/bin/gyrotc",
+        ".venv/bin/python",
+        "build/bench/bin/python",
+        "bin/cmake",
+        "build/fuzz/fuzz_map_f32",
+    ):
+        path = folder / program
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(STUB)
+        path.chmod(0o755)
+    shutil.copy(ROOT / "Makefile", folder)
+    return folder
+
+
+def make(stubbed: Path, *arguments: str, **variables: str) -> tuple[int, list[str]]:
+    """Exit status of make, and the words that the programs were called with, in order."""
+    calls = stubbed.parent / "calls"
+    calls.unlink(missing_ok=True)
+    known = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    path = f"{stubbed / 'bin'}:{os.environ['PATH']}"
+    environment = known | {"CALLS": str(calls), "PATH": path} | variables
+    done = subprocess.run(
+        ["make", *arguments], cwd=stubbed, env=environment, capture_output=True, check=False, timeout=60
+    )
+    assert not (stubbed / "y").exists(), "the value was run"
+    return done.returncode, calls.read_text().splitlines() if calls.exists() else []
+
+
+def _after(calls: list[str], word: str) -> str:
+    """What the program that is called with `word` is given next."""
+    return calls[calls.index(word) + 1]
+
+
+@pytest.mark.parametrize("value", HOSTILE)
+def test_values_reach_programs_as_they_are(value: str, stubbed: Path) -> None:
+    for given in ({}, {"DATA": value, "AXIS": value, "SEED": value, "GYROTC_REAL_DATA": value}):
+        words = [] if given else [f"{name}={value}" for name in ("DATA", "AXIS", "SEED", "GYROTC_REAL_DATA")]
+        status, calls = make(stubbed, "demo", *words, **given)
+        assert status == 0
+        assert calls[:2] == ["setup.sh", "gyrotc"] and calls[-3:] == [f"--axis={value}", "--", value]
+        for target in ("blind", "blind-other", "kills"):
+            status, calls = make(stubbed, target, *words, **given)
+            assert status == 0 and calls[-1] == f"--seed={value}"
+        status, calls = make(stubbed, "real", *words, **given)
+        assert status == 0 and _after(calls, "tools/real.py") == value
+
+
+@pytest.mark.parametrize("value", HOSTILE)
+def test_numbers_for_one_target_reach_it_as_they_are(value: str, stubbed: Path) -> None:
+    """Before: `make odd SETS='1; touch y'` ran what it said."""
+    for given in ({}, {"SETS": value, "MEGABYTES": value}):
+        words = [] if given else [f"SETS={value}", f"MEGABYTES={value}"]
+        assert make(stubbed, "odd", *words, **given)[1][-1] == f"ODD={value}"
+        assert make(stubbed, "bench-import", *words, **given)[1][-1] == value
+
+
+@pytest.mark.parametrize("value", [*HOSTILE, "-1", "0", "1e3", "20 30"])
+def test_a_fuzzing_time_that_is_none_is_refused(value: str, stubbed: Path) -> None:
+    """libFuzzer would take it for 0, which is for ever."""
+    for name in ("SECONDS", "STORM", "SEED"):
+        status, calls = make(stubbed, "fuzz", f"{name}={value}")
+        assert status == 2 and calls == []
+
+
+def test_values_left_out_are_the_defaults(stubbed: Path) -> None:
+    assert make(stubbed, "blind", "SEED=")[1][-2:] == ["--docs", "docs"]
+    assert _after(make(stubbed, "real")[1], "tools/real.py") == "../shared/data/real"
+    assert make(stubbed, "bench-import")[1][-1] == "docs" and make(stubbed, "odd")[1][-1] == "ODD=2000"
+    calls = make(stubbed, "fuzz", "SECONDS=7")[1]
+    assert "-max_total_time=7" in calls
+    assert "-max_total_time=20" in make(stubbed, "fuzz")[1]

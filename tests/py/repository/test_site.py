@@ -5,21 +5,17 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-import pytest
-from browser import CHROMIUM, Browser, browser
-from conftest import ROOT
-
-sys.path.insert(0, str(ROOT / "tools"))
-
 import architecture
+import pytest
 import reference
 import site_pages
+from browser import CHROMIUM, Browser, browser
+from conftest import ROOT
 
 PAGES = sorted((ROOT / "docs").rglob("*.md")) + sorted(p for p in site_pages.beside() if p.suffix == ".md")
 MKDOCS = ROOT / "build" / "site-tools" / "bin" / "mkdocs"

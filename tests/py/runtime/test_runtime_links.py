@@ -1,16 +1,28 @@
-"""The runtime as a linker sees it: no C library, one set of options, the functions under their names."""
+"""The runtime as compiler, linker and user see it: headers, names, what a program takes of it, images that open."""
 
 from __future__ import annotations
 
+import ctypes
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from conftest import quick_and_slow
 from gyrotc.common.runtime import runtime_folders
+from gyrotc.model import Model, Term
 from gyrotc.tables.amalgamate import amalgamate
+from gyrotc.tables.emit import emit, emit_texts, quantise_all
+from gyrotc.tables.quantise import NUMERICS
+from gyrotc.target.status import E_ID, E_IMAGE, E_LAYOUT
+from gyrotc.target.table import SERIAL_WORDS, Table, Words
 from gyrotc.verify.sizes import PUBLIC
+from gyrotc.verify.toolchain import all_targets, compile_objects
+from libc_build import Runtime, runtime
+from libc_device import Device, history, variant
+from models import random_model
 
 ROOT = Path(__file__).resolve().parents[3]
 MINIMAL = ROOT / "examples" / "minimal"
@@ -125,3 +137,313 @@ def test_an_emitted_runtime_holds_the_arithmetics_asked_for_alone(numeric: str, 
 
 def test_the_runtime_is_about_a_dozen_files() -> None:
     assert len([p for p in (ROOT / "libc").iterdir() if p.suffix in {".c", ".h", ".inl"}]) <= 16
+
+
+MAIN = """
+#include "{table}.h"
+
+int main(void)
+{{
+    gtc_q31_state_t state;
+    const int_least32_t channels[3] = {{0, 0, 0}};
+
+    return (gtc_q31_init(&state, &{table}_q31, 2500000UL) == 0) && (gtc_q31_sample(&state, channels) >= 0) ? 0 : 1;
+}}
+"""
+ALL = {"memory", "play", "warm_up", "harmonic", "auxiliary", "curve", "product"}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """libgtc.a, one object for each file, as the package makes it."""
+    folder = tmp_path_factory.mktemp("library")
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections"]
+    sources = sorted(str(p) for p in (ROOT / "libc").glob("*.c"))
+    subprocess.run(["gcc", *flags, f"-I{ROOT / 'include'}", "-c", *sources], cwd=folder, check=True)
+    subprocess.run(["ar", "rcs", "libgtc.a", *(p.name for p in folder.glob("*.o"))], cwd=folder, check=True)
+    return folder / "libgtc.a"
+
+
+def _symbols(library: Path, work: Path, table: str, c: Path) -> set[str]:
+    """Names of the runtime in a program that runs one table in fixed point."""
+    (work / "main.c").write_text(MAIN.format(table=table))
+    command = ["gcc", "-std=c99", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"]
+    include = [f"-I{ROOT / 'include'}", f"-I{c}"]
+    files = ["main.c", str(c / f"{table}.c"), str(library)]
+    subprocess.run([*command, *include, *files, "-o", "program"], cwd=work, check=True)
+    subprocess.run([str(work / "program")], check=True)
+    names = subprocess.run(["nm", "program"], cwd=work, check=True, capture_output=True, text=True).stdout
+    return set(re.findall(r"\bgtc_\w+", names))
+
+
+def _terms(symbols: set[str]) -> set[str]:
+    return {m[1] for s in symbols if (m := re.fullmatch(r"gtc_q31_term_(\w+)_20blocks_4terms", s))}
+
+
+def test_a_plain_table_links_the_front_end_and_the_map(library: Path, tmp_path: Path) -> None:
+    found = _symbols(library, tmp_path, "gtc_rlg_0042", ROOT / "examples" / "minimal")
+    assert _terms(found) == set()
+    assert not [s for s in found if s.startswith("gtc_f32_")], "the other arithmetic"
+    for name in ("blend", "open", "save", "restore", "check", "angle", "missed"):
+        assert not [s for s in found if s.startswith(f"gtc_q31_{name}")]
+    assert "gtc_q31_map_20blocks_4terms" in found
+
+
+@pytest.mark.parametrize(
+    ("table", "terms"),
+    [("gtc_test_t", {"memory", "play", "warm_up", "auxiliary"}), ("gtc_test_h", {"memory", "harmonic"})],
+)
+def test_a_table_links_the_terms_that_it_names(
+    library: Path, tmp_path: Path, table: str, terms: set[str]
+) -> None:
+    found = _terms(_symbols(library, tmp_path, table, ROOT / "tests" / "c" / "table"))
+    assert found == terms and found < ALL
+
+
+C_FLAGS = ("-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Werror")
+
+
+def test_the_snippet_of_the_readme_compiles_links_and_corrects(tmp_path: Path) -> None:
+    snippet = re.findall(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    model = random_model(1, serial="SIM-0001")
+    emit(model, tmp_path)
+    middle = sum(model.envelope.temperature_c) / 2.0
+    held = round(model.agree_s * 100.0)  # samples of 10 ms
+    main = (
+        "int correction_start(void);\nint correct(float temperature_c, float *rate_dph);\n"
+        f"{snippet[0]}\nint main(void)\n{{\n    float rate = 1.0F;\n    int k, held = 0;\n"
+        "    const int started = (correction_start() == 0);\n"
+        f"    for (k = 0; k < {held}; k++) {{\n        held += (correct({middle:.3f}F, &rate) == GTC_HELD);\n    }}\n"
+        f"    return started && (held == {held}) && (rate == 1.0F) && (correct({middle:.3f}F, &rate) == GTC_WARMING)"
+        " && (rate != 1.0F) ? 0 : 1; /* believed once readings agree for the guard's time */\n}\n"
+    )
+    (tmp_path / "c" / "user.c").write_text(main)
+    command = ["gcc", *C_FLAGS, "-Wmissing-declarations", "user.c", "gtc.c", "gtc_sim_0001.c", "-o", "user"]
+    subprocess.run(command, cwd=tmp_path / "c", check=True)
+    subprocess.run([tmp_path / "c" / "user"], check=True)
+
+
+def test_macros_of_an_emitted_header_are_those_of_the_model(tmp_path: Path) -> None:
+    terms = tuple(
+        Term(id="auxiliary", parameters={"slope_dph_per_unit": 1e-3, "reference": 5.0}, channel=name)
+        for name in ("supply_v", "magnetic_ut")
+    )
+    model = random_model(2, serial="SIM-0002", terms=terms)
+    emission = emit(model, tmp_path)
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    claims = [
+        "GTC_SIM_0002_BLOCK_US == 10000000UL",
+        *(
+            f"fabs((double)GTC_SIM_0002_{name} - {value!r}) < 1e-5"
+            for name, value in (
+                ("T_MIN_C", t0), ("T_MAX_C", t1), ("SLOPE_MIN_C_PER_MIN", r0), ("SLOPE_MAX_C_PER_MIN", r1),
+            )
+        ),
+        "GTC_SIM_0002_N_CHANNELS == 3",
+        'strcmp(GTC_SIM_0002_CHANNEL_0, "temperature_c") == 0',
+        'strcmp(GTC_SIM_0002_CHANNEL_1, "magnetic_ut") == 0',
+        'strcmp(GTC_SIM_0002_CHANNEL_2, "supply_v") == 0',
+        f"GTC_SIM_0002_Q31_BIAS_FRAC_BITS == {emission.tables['q31'].bias_frac_bits}",
+    ]  # fmt: skip
+    checks = "".join(
+        f"    if (!({claim})) {{\n        return {k + 1};\n    }}\n" for k, claim in enumerate(claims)
+    )
+    includes = '#include <math.h>\n#include <string.h>\n#include "gtc_sim_0002.h"\n'
+    text = f"{includes}int main(void)\n{{\n{checks}    return 0;\n}}\n"
+    (tmp_path / "c" / "user.c").write_text(text)
+    subprocess.run(["gcc", "-std=c99", "user.c", "-o", "user"], cwd=tmp_path / "c", check=True)
+    done = subprocess.run([tmp_path / "c" / "user"], check=False)
+    assert done.returncode == 0, claims[done.returncode - 1]
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+def test_read_only_bytes_of_the_header_are_those_of_a_compiled_table(numeric: str, tmp_path: Path) -> None:
+    target = all_targets()["cortex-m4f"]
+    if target.missing():
+        pytest.skip(f"{target.missing()} is not installed")
+    model = random_model(3, serial="SIM-0003")
+    emit(model, tmp_path, numerics=[numeric])
+    c = tmp_path / "c"
+    (table,) = compile_objects(target, [c / "gtc_sim_0003.c"], tmp_path, include=c)
+    sections = subprocess.run(["arm-none-eabi-size", "-A", table], capture_output=True, text=True, check=True)
+    found = sum(int(n) for n in re.findall(r"^\.rodata\S*\s+(\d+)", sections.stdout, re.MULTILINE))
+    stated = re.search(rf"{numeric.upper()}_TABLE_BYTES (\d+)UL", (c / "gtc_sim_0003.h").read_text())
+    assert stated is not None and int(stated[1]) == found
+
+
+CPLUSPLUS = """
+#include "gtc.hpp"
+#include "gtc_rlg_0042.h"
+
+int main()
+{
+    gtc::q31::Correction fixed;
+    gtc::f32::Correction correction;
+    gtc::f32::Increments increments;
+    gtc::f32::DegPerHour bias(0.0F), map(0.0F);
+    gtc::f32::Angle angle(0.0F);
+    gtc_word_t words[GTC_SAVE_WORDS];
+    const bool started = gtc::f32::check(gtc_rlg_0042_f32).is_ok()
+        && fixed.init(gtc_rlg_0042_q31, 1000000UL).is_ok() && !fixed.sample(gtc::q31::Celsius(20L * 65536L)).failed()
+        && correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok()
+        && correction.sample(gtc::f32::Celsius(20.0F)).has(GTC_HELD); // one alone is not believed
+    const bool went = correction.sample(gtc::f32::Celsius(20.0F)).has(GTC_WARMING)
+        && correction.bias(bias).has(GTC_WARMING)
+        && !gtc::f32::map(gtc_rlg_0042_f32, gtc::f32::Celsius(20.0F), gtc::f32::CelsiusPerBlock(0.0F), map).failed()
+        && increments.angle(bias, gtc::f32::Time(1.0F), angle).is_ok() && correction.save(words).is_ok()
+        && correction.restore(gtc_rlg_0042_f32, 1000000UL, words, 0U).is_ok();
+    return (started && went && (bias.value() == map.value()) WRONG) ? 0 : 1;
+}
+"""
+#: Each swaps units, and must not compile.
+SWAPPED = (
+    "&& correction.sample(20.0F).failed()",
+    "&& correction.sample(gtc::f32::DegPerHour(1.0F)).failed()",
+    "&& correction.bias(angle).failed()",
+    "&& increments.angle(gtc::f32::Time(1.0F), bias, angle).failed()",
+    "&& correction.sample(gtc::q31::Celsius(1)).failed()",
+)
+
+
+def _cplusplus(work: Path, compiler: str, wrong: str) -> int:
+    include = [f"-I{ROOT / 'include'}", f"-I{MINIMAL}"]
+    (work / "user.cpp").write_text(CPLUSPLUS.replace("WRONG", wrong))
+    flags = ["-std=c++11", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-fno-exceptions"]
+    done = subprocess.run(
+        [compiler, *flags, *include, "-c", "user.cpp"], cwd=work, capture_output=True, check=False
+    )
+    return done.returncode
+
+
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_cplusplus_face_gives_what_c_gives_and_refuses_swapped_units(
+    compiler: str, tmp_path: Path
+) -> None:
+    for wrong in SWAPPED:
+        assert _cplusplus(tmp_path, compiler, wrong) != 0, wrong
+    assert _cplusplus(tmp_path, compiler, "") == 0
+    flags = [*C_FLAGS[:2], f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}"]
+    files = [*SOURCES, str(MINIMAL / "gtc_rlg_0042.c")]
+    subprocess.run(["gcc", *flags, "-c", *files], cwd=tmp_path, check=True)
+    subprocess.run(
+        [compiler, *(p.name for p in tmp_path.glob("*.o")), "-o", "user"], cwd=tmp_path, check=True
+    )
+    subprocess.run([tmp_path / "user"], check=True)
+
+
+@pytest.mark.parametrize("broken", [False, True])
+@pytest.mark.slow
+def test_the_rule_of_the_header_is_free_of_races_and_a_breach_is_seen(broken: bool, tmp_path: Path) -> None:
+    include = [f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}", f"-I{MINIMAL}"]
+    files = [str(ROOT / "tests" / "py" / "threads.c"), *SOURCES, str(MINIMAL / "gtc_rlg_0042.c")]
+    flags = ["-std=gnu99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=thread", "-pthread"]
+    extra = ["-DBREAK_THE_RULE"] if broken else []
+    subprocess.run(["clang", *flags, *extra, *include, *files, "-o", "threads"], cwd=tmp_path, check=True)
+    # Without randomised addresses, which older sanitizers do not find their way in.
+    done = subprocess.run(
+        ["setarch", "-R", "./threads"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert "FATAL" not in done.stderr, done.stderr[:500]
+    assert ("data race" in done.stderr) == broken, done.stderr[:2000]
+    assert broken or done.returncode == 0
+
+
+SMALLEST = ("-UGTC_WITH_BANK", "-UGTC_OPEN_TERMS")
+
+
+def _images(model: Model) -> dict[str, tuple[Table, Words]]:
+    """Tables by arithmetic, each with the image that emit writes of it."""
+    emission = quantise_all(model, None)
+    texts = emit_texts(model, emission)
+    names = [f"gtc_{model.id}{suffix}.bin" for suffix in ("", *(f"_{n}" for n in list(emission.tables)[1:]))]
+    images = (np.frombuffer(texts[name], dtype="<u4").astype(np.uint32) for name in names)
+    return {n: (t, w) for (n, t), w in zip(emission.tables.items(), images, strict=True)}
+
+
+@pytest.fixture(scope="module")
+def build() -> Runtime:
+    return runtime("gcc", ("-O2",))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_emitted_image_opens_to_the_bits_of_the_compiled_table(build: Runtime, seed: int) -> None:
+    model = variant(seed)
+    for numeric, (table, words) in _images(model).items():
+        device = Device(build, table)
+        status, opened = device.open(words)
+        assert status == 0, numeric
+        assert opened.crc == table.crc and opened.calibrated == table.calibrated
+        assert device.function("check")(ctypes.byref(opened)) == 0
+        channels, missed = history(model, table, seed, 400, 7)
+        compiled, image = device.state(), device.state()
+        device.init(compiled, 7)
+        expected = device.steps(compiled, channels, missed)
+        device.struct = opened
+        device.init(image, 7)
+        for a, b in zip(expected, device.steps(image, channels, missed), strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=numeric)
+
+
+@pytest.mark.parametrize("serial", ["RLG-0042", "S" * 64])
+def test_an_opened_image_has_the_serial_and_the_date_of_its_model(build: Runtime, serial: str) -> None:
+    """It had none: a firmware could not say whose correction it had."""
+    model = random_model(3, serial=serial, meta={"calibrated_on": "2026-11-21"})
+    for table, words in _images(model).values():
+        status, opened = Device(build, table).open(words)
+        text = ctypes.string_at(opened.serial, 4 * SERIAL_WORDS)
+        assert status == 0 and text.rstrip(b"\0").decode("ascii") == serial
+        assert opened.calibrated == 20261121
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_was_not_compiled_in_is_refused(seed: int) -> None:
+    for table, words in _images(variant(seed)).values():
+        device = Device(runtime("gcc", ("-O2", *SMALLEST)), table)
+        assert device.open(words)[0] == E_LAYOUT
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_every_flipped_bit_of_an_emitted_image_is_refused(
+    build: Runtime, numeric: str, model_dict: dict[str, Any]
+) -> None:
+    table, words = _images(Model.from_dict(model_dict))[numeric]
+    device = Device(build, table)
+    spoiled = words.copy()
+    for i in range(32 * len(words)):
+        spoiled[i // 32] ^= np.uint32(1 << i % 32)
+        assert device.open(spoiled)[0] == E_IMAGE, f"bit {i % 32} of word {i // 32}"
+        spoiled[i // 32] = words[i // 32]
+    for n in range(len(words)):
+        assert device.open(words[:n].copy())[0] == E_IMAGE, f"{n} words"
+    assert device.open(words.byteswap())[0] == E_IMAGE
+    assert device.open(words, expected_id=table.id ^ 1)[0] == E_ID
+    assert device.open(words)[0] == 0
+
+
+def test_an_image_of_the_other_arithmetic_is_refused(build: Runtime, model_dict: dict[str, Any]) -> None:
+    images = _images(Model.from_dict(model_dict))
+    (f32, f32_words), (q31, q31_words) = images["f32"], images["q31"]
+    assert Device(build, f32).open(q31_words)[0] == E_LAYOUT
+    assert Device(build, q31).open(f32_words)[0] == E_LAYOUT
+
+
+def test_damaged_images_never_open(build: Runtime) -> None:
+    """Several words at once: exchanged, overwritten, parts of another image."""
+    seed = int(np.random.default_rng().integers(2**31))
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    for numeric, (table, words) in _images(random_model(seed)).items():
+        device = Device(build, table)
+        other = _images(random_model(seed, fallback_dph=0.5))[numeric][1]
+        for _ in range(2000):
+            spoiled = words.copy()
+            at, n = int(rng.integers(0, len(words))), int(rng.integers(1, 9))
+            kind = rng.integers(0, 3)
+            if kind == 0:
+                spoiled[at : at + n] = rng.integers(0, 2**32, len(spoiled[at : at + n]), dtype=np.uint32)
+            elif kind == 1:
+                spoiled[at : at + n] = rng.choice([0, 0xFFFFFFFF])
+            else:
+                spoiled[at:] = other[at:]
+            if (spoiled != words).any() and (spoiled != other).any():
+                assert device.open(spoiled)[0] == E_IMAGE, (numeric, at, n, kind)

@@ -1,19 +1,27 @@
-"""Further thermometers, differences of nodes and the laser's own signals in simulated recordings."""
+"""What simulated gyros hold: further thermometers and signals, lots, the chamber's programme, the thermal network."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import invoked
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
+from gyrotc.simulate import chamber, profile
 from gyrotc.simulate.campaign import campaign, simulate
+from gyrotc.simulate.chamber import ThermalNetwork
 from gyrotc.simulate.gyro import laser_bias, laser_readings, laser_states, thermometer_readings
-from gyrotc.simulate.scenario import Laser, Scenario, Thermometer, read
+from gyrotc.simulate.instrument import thermal_network
+from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
+from gyrotc.simulate.scenario import Chamber, Gyro, Laser, Scenario, Thermometer, read
 from gyrotc.simulate.truth import read_truth
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
+from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 _N = 4000
@@ -143,3 +151,273 @@ def test_what_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None
     with pytest.raises(InputError, match=said) as refused:
         read(path)
     assert "odd.toml" in str(refused.value)
+
+
+SEED = 20
+SHORT = """
+title = "A short run"
+
+[profile.ramp]
+start_c = 0.0
+record_min = 20
+steps = [{ramp_to_c = 20.0, c_per_min = 5.0}]
+
+[[set]]
+started = 2026-01-01T00:00:00Z
+profiles = ["ramp"]
+"""
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT, "utf-8")
+    return path
+
+
+def maps(order: LotOrder, seed: int) -> Array:
+    """Maps of the units over the operating range, deg/h, shape (units, points)."""
+    t, r = np.meshgrid(np.linspace(-32.0, 68.0, 21), np.linspace(-2.4, 2.4, 7), indexing="ij")
+    return np.array([unit.bias_map(t, r).ravel() for unit in draw_lot(read("paper")[1], order, seed)])
+
+
+def spread(found: Array) -> float:
+    """What units differ by, over what they share: RMS about the mean map, constants taken off."""
+    shapes = found - found.mean(axis=1, keepdims=True)
+    return float(np.std(shapes - shapes.mean(axis=0)) / np.std(shapes.mean(axis=0)))
+
+
+def test_family_is_the_correlation_of_a_parameter_between_two_units() -> None:
+    print("seed", SEED)
+    pairs = [
+        [list(u.lot.scores.values()) for u in draw_lot(read("paper")[1], LotOrder(2, 0.7), SEED + k) if u.lot]
+        for k in range(40)
+    ]
+    one, other = np.array(pairs)[:, 0], np.array(pairs)[:, 1]
+    found = np.mean(one * other) / np.mean(one**2)
+    assert found == pytest.approx(0.7, abs=0.08)  # 40 lots of 30 scores, some of them correlated
+    assert np.mean(one**2) == pytest.approx(1.0, abs=0.2)  # over 60 seeds it scatters by 0.042
+
+
+def test_units_of_a_stronger_family_differ_less() -> None:
+    print("seed", SEED)
+    strengths = (0.0, 0.5, 0.8, 0.94, 0.99)
+    found = [np.median([spread(maps(LotOrder(16, f), SEED + k)) for k in range(3)]) for f in strengths]
+    assert found == sorted(found, reverse=True)
+    assert 0.1 < found[3] < 0.5 < found[0]  # medians of many lots: docs/simulation.md, section 6
+    assert np.ptp(maps(LotOrder(3, 1.0), SEED), axis=0).max() < 1e-15
+
+
+def test_a_stranger_is_no_unit_of_its_lot() -> None:
+    order = LotOrder(20, 0.96, strangers=3)
+    units = draw_lot(read("paper")[1], order, 8)
+    strange = np.array([bool(u.lot and u.lot.stranger) for u in units])
+    assert strange.sum() == 3
+    found = maps(order, 8)
+    away = np.std(found - found[~strange].mean(axis=0), axis=1)
+    assert away[strange].min() > 2.0 * np.median(away[~strange])
+
+
+def test_clusters_have_centers_of_their_own() -> None:
+    order = LotOrder(30, 0.97, clusters=2)
+    cluster = np.array([u.lot.cluster for u in draw_lot(read("paper")[1], order, 5) if u.lot])
+    assert set(cluster) == {0, 1}
+    found = maps(order, 5)
+    apart = np.std(found[cluster == 0].mean(axis=0) - found[cluster == 1].mean(axis=0))
+    within = np.std(found[cluster == 0] - found[cluster == 0].mean(axis=0))
+    assert apart > 2.0 * within
+
+
+def test_a_unit_keeps_its_parameters_where_the_lot_grows() -> None:
+    small, large = (draw_lot(read("paper")[1], LotOrder(n, 0.9), 3) for n in (2, 6))
+    for one, other in zip(small, large, strict=False):
+        assert one.bias_map.described() == other.bias_map.described()
+        assert one.plan.sensor == other.plan.sensor
+    assert small[0].plan.sensor.offset_c != small[1].plan.sensor.offset_c
+    assert small[0].plan.gyro.node["case"].to != small[1].plan.gyro.node["case"].to
+
+
+def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp_path: Path) -> None:
+    order = LotOrder(3, 0.9, strangers=1)
+    first, again = ([*simulate_lot(order, seed=4, out=tmp_path / n, scenario=short)] for n in "ab")
+    assert first == again == ["LOT-0004-001", "LOT-0004-002", "LOT-0004-003"]
+    for serial in first:
+        for file in ("run-01.csv", "truth.json", "dataset.toml"):
+            assert (tmp_path / "a" / serial / file).read_bytes() == (
+                tmp_path / "b" / serial / file
+            ).read_bytes()
+        dataset = load(tmp_path / "a" / serial)
+        assert dataset.serial == serial
+        truth = read_truth(tmp_path / "a" / serial)
+        assert truth is not None and truth.content.lot is not None
+        assert set(truth.content.lot.scores) == set(SCORES)
+    told = [json.loads((tmp_path / "a" / s / "truth.json").read_text())["lot"]["stranger"] for s in first]
+    assert sum(told) == 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "strangers": 3}],
+)
+def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=f"--{[*wrong][-1]}"):
+        LotOrder(**wrong)  # type: ignore[arg-type]
+
+
+def test_the_command_asks_for_the_number_of_units(short: Path, tmp_path: Path) -> None:
+    done = invoked("simulate", "lot", "--units", "2", "--base", short, "--out", tmp_path / "lot")
+    assert done.exit_code == 0, done.output
+    assert sorted(p.name for p in (tmp_path / "lot").iterdir()) == ["LOT-0001-001", "LOT-0001-002"]
+    missing = invoked("simulate", "lot", "--out", tmp_path / "none")
+    assert isinstance(missing.exception, InputError) and "--units" in str(missing.exception)
+    other = invoked("simulate", "paper", "--family", "0.5", "--out", tmp_path / "none")
+    assert isinstance(other.exception, InputError) and "--family" in str(other.exception)
+    assert not (tmp_path / "none").exists()
+
+
+FASTEST = 10.0
+
+
+def programme(*steps: dict[str, object], start_c: float = 0.0, until_s: float = 1e5) -> tuple[Array, Array]:
+    checked = TypeAdapter(list[profile.Step]).validate_python(list(steps))
+    return profile.corners(checked, start_c, until_s, FASTEST)
+
+
+def visited(*steps: dict[str, object], start_c: float = 0.0) -> list[float]:
+    return [round(float(c), 9) for c in programme(*steps, start_c=start_c)[1]]
+
+
+def test_a_hold_and_a_ramp_have_their_length_and_rate() -> None:
+    times, temperatures = programme({"hold_min": 60}, {"ramp_to_c": 60, "c_per_min": 5}, until_s=7200.0)
+    assert times.tolist() == [0.0, 3600.0, 3600.0 + 720.0, 7200.0]
+    assert temperatures.tolist() == [0.0, 0.0, 60.0, 60.0]
+
+
+def test_a_jump_goes_as_fast_as_the_chamber_can_and_no_ramp_goes_faster() -> None:
+    assert programme({"step_to_c": 50})[0][1] == pytest.approx(300.0)
+    assert programme({"ramp_to_c": 50, "c_per_min": 40})[0][1] == pytest.approx(300.0)
+
+
+def test_a_staircase_holds_on_every_tread_in_both_directions() -> None:
+    up = {"staircase_to_c": 50, "tread_c": 25, "hold_min": 10, "c_per_min": 5}
+    down = {"staircase_to_c": 0, "tread_c": 20, "hold_min": 10, "c_per_min": 5}
+    assert visited(up, down)[:-1] == [0, 25, 25, 50, 50, 25, 25, 0, 0]
+    assert programme(up)[0][1:5].tolist() == [300.0, 900.0, 1200.0, 1800.0]
+
+
+def test_a_triangle_and_nested_loops_turn_where_they_should() -> None:
+    assert visited({"triangle_c": [10, 40], "c_per_min": 2, "cycles": 2})[1:-1] == [10, 40, 10, 40, 10]
+    loops = {"nested_c": 10, "half_ranges_c": [30, 10], "c_per_min": 2}
+    assert visited(loops)[1:-1] == [40, -20, 20, 0, 10]
+
+
+def test_a_repeat_without_a_number_fills_the_record_and_never_hangs() -> None:
+    inner = [{"ramp_to_c": 10, "c_per_min": 1}, {"ramp_to_c": 0, "c_per_min": 1}]
+    times, temperatures = programme({"repeat": inner}, until_s=6000.0)
+    assert times[-1] == 6000.0 and temperatures.tolist() == [0, *[10, 0] * 5]
+    assert visited({"repeat": inner, "times": 2})[:-1] == [0, 10, 0, 10, 0]
+    assert visited({"repeat": [{"ramp_to_c": 0, "c_per_min": 1}]})[-1] == 0.0
+
+
+def test_an_unknown_step_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValidationError, match="ramp_to_c"):
+        programme({"wait_min": 5})
+    with pytest.raises(ValidationError, match="c_per_min"):
+        programme({"ramp_to_c": 5})
+
+
+def follow(settings: Chamber, programmed: Array, seed: int = 0) -> Array:
+    return chamber.air(settings, programmed, 1.0, np.random.default_rng(seed))
+
+
+QUIET = Chamber(ripple_c=0.0, setpoint_sigma_c=0.0)
+
+
+def test_the_air_lags_a_ramp_by_the_lag_and_overshoots_a_step_by_the_damping() -> None:
+    time_s = np.arange(20000.0)
+    lagging = time_s / 60.0 - follow(QUIET, time_s / 60.0)
+    assert lagging[-1] == pytest.approx(QUIET.lag_s / 60.0, rel=1e-6)
+    step = np.where(time_s > 0.0, 10.0, 0.0)
+    for damping in (0.4, 0.7):
+        air = follow(QUIET.model_copy(update={"damping": damping}), step)
+        expected = 10.0 * (1.0 + np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2)))
+        assert air.max() == pytest.approx(expected, abs=0.01)
+        assert air[-1] == pytest.approx(10.0, abs=1e-6)
+
+
+def test_ripple_and_setpoint_error_are_as_large_as_declared() -> None:
+    flat = np.zeros(36000)
+    ripple = follow(QUIET.model_copy(update={"ripple_c": 0.3}), flat)
+    assert np.ptp(ripple) == pytest.approx(0.6, rel=1e-3)
+    offsets = [follow(QUIET.model_copy(update={"setpoint_sigma_c": 0.5}), flat[:2], s)[0] for s in range(400)]
+    assert np.std(offsets) == pytest.approx(0.5, rel=0.2)
+
+
+def network() -> ThermalNetwork:
+    return thermal_network(Gyro())
+
+
+def test_the_steady_state_is_the_chain_of_resistances() -> None:
+    """All power leaves by the case; what the gas gives off passes cavity and block."""
+    case, block, cavity, gas = network().steady(20.0, on=True)
+    assert case == pytest.approx(20.0 + (14.75 + 1.5) / 2.5)
+    assert block - case == pytest.approx(1.5 / 1.0)
+    assert cavity - block == pytest.approx(1.5 / 3.0)
+    assert gas - cavity == pytest.approx(1.5 / 0.05)
+    assert np.allclose(network().steady(-40.0, on=False), -40.0)
+
+
+def history(points: int, dt_s: float) -> tuple[Array, Array]:
+    time_s = dt_s * np.arange(points)
+    air = np.interp(time_s, [0.0, 1000.0, 2200.0, 4000.0, 5000.0], [0.0, 0.0, 60.0, 60.0, -20.0])
+    return air, (time_s >= 600.0).astype(np.float64)
+
+
+def test_energy_is_conserved() -> None:
+    """Heat stored in the nodes = electrical energy + what came in from the air."""
+    net = network()
+    air, on = history(8001, 1.0)
+    nodes = net.respond(air, on, 1.0)
+    stored = net.capacity @ (nodes[:, -1] - nodes[:, 0])
+    electrical = float(net.power.sum() * on[:-1].sum())
+    inflow = net.to_air @ (air - nodes)
+    assert stored == pytest.approx(electrical + np.trapezoid(inflow), rel=1e-6)
+
+
+def test_the_response_is_that_of_an_independent_integration() -> None:
+    net = network()
+    air, on = history(6001, 1.0)
+    time_s = np.arange(6001.0)
+    laplacian = net.laplacian()
+
+    def slope(t: float, nodes: Array) -> Array:
+        heat = net.to_air * np.interp(t, time_s, air) + net.power * (t >= 600.0)
+        return np.asarray((heat - laplacian @ nodes) / net.capacity)
+
+    parts = []
+    start = net.steady(0.0, on=False)
+    for low, high in ((0.0, 600.0), (600.0, 1000.0), (1000.0, 2200.0), (2200.0, 4000.0), (4000.0, 6000.0)):
+        at = np.arange(low, high + 0.5, 100.0)
+        solved = solve_ivp(slope, (low, high), start, t_eval=at, method="LSODA", rtol=1e-10, atol=1e-10)
+        parts.append((at, solved.y))
+        start = solved.y[:, -1]
+    nodes = net.respond(air, on, 1.0)
+    for at, expected in parts:
+        assert np.allclose(nodes[:, at.astype(int)], expected, atol=1e-5)
+
+
+def test_a_single_node_answers_a_ramp_as_the_formula_says() -> None:
+    one = np.ones(1)
+    net = ThermalNetwork(("node",), 700.0 * one, 1.4 * one, np.zeros((1, 1)), 7.0 * one)
+    tau = 700.0 / 1.4
+    time_s = np.arange(4001.0)
+    rate = 3.0 / 60.0
+    nodes = net.respond(rate * time_s, np.ones(4001), 1.0)[0]
+    heated = 7.0 / 1.4 * (1.0 - np.exp(-time_s / tau))
+    assert np.allclose(nodes, rate * (time_s - tau * (1.0 - np.exp(-time_s / tau))) + heated, atol=1e-9)
+
+
+def test_the_grid_does_not_matter() -> None:
+    fine = network().respond(*history(8001, 1.0), 1.0)
+    coarse = network().respond(*history(801, 10.0), 10.0)
+    assert np.allclose(fine[:, ::10], coarse, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Recorded channels as inputs: which are taken, which are refused and why, and what the target makes of them."""
+"""Recorded channels as inputs, bent lines and slopes that go with temperature, and bumps of a finer map."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaigns import up_and_down
-from conftest import HOST, Command
+from conftest import HOST, Command, run_gyrotc
 from gyrotc.causes.base import History
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.jobs.build import build_into
-from gyrotc.model import load_model
+from gyrotc.model import Model, load_model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import read_truth
 from gyrotc.tables.applied import applied_of
 from gyrotc.train.channels import SHAPES, chosen_channels, shape_of
-from gyrotc.train.data import TrainingData
+from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from gyrotc.train.methods import fit
+from gyrotc.train.mrbf import Bumps, find_bumps
+from gyrotc.train.result import predict
 from numpy.typing import NDArray
+
+from bench.signals import rms_of, without
 
 Array = NDArray[np.float64]
 
@@ -278,3 +283,179 @@ def test_a_fleet_with_channels_makes_what_a_build_with_channels_makes(
     assert load_model(unit) == fitted.model and fitted.model.terms
     exams = [json.loads((folder / "evaluate.json").read_text())["exam"] for folder in (unit, built)]
     assert exams[0] == exams[1]
+
+
+BENT = """
+[[channel]]
+name = "supply_v"
+level = 28.0
+wander_sigma = 0.1
+wander_tau_s = 600.0
+noise = 0.002
+[[channel]]
+name = "magnetic_ut"
+level = 40.0
+wander_sigma = 1.0
+wander_tau_s = 600.0
+noise = 0.01
+[[cause]]
+id = "auxiliary_curve"
+channel = "supply_v"
+reference = 27.9
+second_center = 28.15
+width = 0.12
+slope_dph_per_unit = 0.005
+first_dph = -4e-3
+second_dph = 2e-3
+[[cause]]
+id = "auxiliary_product"
+channel = "magnetic_ut"
+reference = 40.0
+reference_c = 20.0
+slope_dph_per_unit = 1.2e-3
+slope_dph_per_unit_per_c = 1.2e-4
+"""
+
+
+@pytest.fixture(scope="module")
+def shaped_recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shapes")
+    (folder / "bent.toml").write_text(up_and_down("separating", 6) + BENT, "utf-8")
+    simulate(folder / "bent.toml", seed=3, out=folder / "data")
+    return folder / "data"
+
+
+@pytest.fixture(scope="module")
+def built(shaped_recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The steps of a build, as a user types them; one compiler, for time."""
+    out = tmp_path_factory.mktemp("built")
+    steps: list[list[str | Path]] = [
+        ["fit", shaped_recordings, "--channels", "--out", out],
+        ["emit", out / "model.json", "--out", out],
+        ["verify", out, "--target", "host-gcc-O2"],
+        ["evaluate", out, shaped_recordings],
+        ["report", out],
+    ]
+    for step in steps:
+        done = run_gyrotc(*step)
+        assert done.returncode == 0, done.stdout + done.stderr
+        if step[0] == "fit":
+            (out / "fit.txt").write_text(done.stdout, "utf-8")
+    return out
+
+
+@pytest.fixture(scope="module")
+def model(built: Path) -> Model:
+    return load_model(built / "model.json")
+
+
+@pytest.mark.slow
+def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as_such(
+    built: Path, model: Model
+) -> None:
+    assert {t.channel: t.id for t in model.terms} == {
+        "supply_v": "auxiliary_curve",
+        "magnetic_ut": "auxiliary_product",
+    }
+    assert all(t.stand_in is not None for t in model.terms)
+    training = json.loads((built / "training.json").read_text("utf-8"))
+    shapes = {row["name"]: row["shape"] for row in training["channels"]}
+    assert shapes == {"supply_v": "curve", "magnetic_ut": "product"}
+    (product,) = (t.parameters for t in model.terms if t.id == "auxiliary_product")
+    assert product["slope_dph_per_unit_per_c"] == pytest.approx(1.2e-4, rel=0.2)
+    told = (built / "fit.txt").read_text("utf-8")
+    assert "along a bent line" in told
+    assert "slope that depends on temperature" in told
+    page = (built / "report.html").read_text("utf-8")
+    assert "taken: a bent line, two Gaussians beside a straight one" in page
+
+
+@pytest.mark.slow
+def test_the_code_gives_what_was_trained_bit_for_bit(built: Path) -> None:
+    verified = json.loads((built / "verify.json").read_text("utf-8"))
+    assert {(t["numeric"], t["status"], t["mismatches"]) for t in verified["targets"]} == {
+        ("f32", "pass", 0),
+        ("q31", "pass", 0),
+    }
+    evaluated = json.loads((built / "evaluate.json").read_text("utf-8"))
+    assert evaluated["mismatches"] == 0
+    after = evaluated["exam"]["after"]["rms_dph"]
+    assert after < 1.3 * evaluated["noise_floor_dph"]
+
+
+def test_the_correction_is_better_than_that_of_straight_lines_and_one_thermometer(
+    shaped_recordings: Path, model: Model, tmp_path: Path
+) -> None:
+    """And with channels lost in the exam no worse than one thermometer by 2 %: each alone, and both at once."""
+    dataset = load(shaped_recordings)
+    exam = [run.rows() for run in dataset.runs if run.role == "exam"]
+    plain = rms_of(fit_dataset(dataset, FitOptions()).model, exam, tmp_path)
+    assert rms_of(model, exam, tmp_path) < 0.3 * plain
+    rows = exam
+    for name in ("supply_v", "magnetic_ut"):
+        assert rms_of(model, [without(r, name) for r in exam], tmp_path) <= 1.02 * plain
+        rows = [without(r, name) for r in rows]
+    assert rms_of(model, rows, tmp_path) <= 1.02 * plain
+
+
+SEED_OF_BUMPS, BLOCK_S, NOISE_DPH = 20261123, 10.0, 3e-3
+HIDDEN = ((-20.0, 1.5, 6e-3), (15.0, 2.0, -4e-3), (40.0, 2.5, 4e-3))  # C, C, deg/h
+
+
+def smooth(t: np.ndarray, r: np.ndarray) -> np.ndarray:
+    return np.asarray(0.01 + 1e-4 * t + 2e-3 * np.tanh((t - 10.0) / 30.0) + 2e-4 * r * (1.0 + t / 100.0))
+
+
+def samples(rng: np.random.Generator, *, bumps: bool) -> TrainingData:
+    """Four runs of eight hours between −40 and 60 C at 1, 2, 3 and 5 C/min, with a hold at the end of each."""
+    parts = []
+    for run, speed in enumerate((1.0, 2.0, 3.0, 5.0)):
+        time = np.arange(0.0, 8 * 3600.0, BLOCK_S)
+        phase = np.minimum(speed * time / 60.0, 600.0) % 200.0
+        t = -40.0 + np.where(phase < 100.0, phase, 200.0 - phase)
+        r = np.gradient(t, time) * 60.0
+        y = smooth(t, r) + NOISE_DPH * rng.standard_normal(t.size)
+        if bumps:
+            y = y + sum(h * np.exp(-(((t - c) / w) ** 2)) for c, w, h in HIDDEN)
+        one = np.ones(t.size)
+        parts.append(TrainingData(t, r, y, one, np.full(t.size, run), time, BLOCK_S * one))
+    names = TrainingData.__slots__
+    return cleaned(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
+
+
+def test_bumps_have_their_place_and_width_and_mend_what_a_smooth_map_cannot() -> None:
+    print("seed", SEED_OF_BUMPS)
+    data = samples(np.random.default_rng(SEED_OF_BUMPS), bumps=True)
+    found = find_bumps(data, scaling_of(data))
+    assert len(found.centers_c) == len(HIDDEN), found
+    order = np.argsort(found.centers_c)
+    for k, (center, width, height) in zip(order, HIDDEN, strict=True):
+        assert abs(found.centers_c[k] - center) < 0.3, found
+        assert abs(found.widths_c[k] / width - 1.0) < 0.3, found
+        assert abs(found.heights_dph[k] / height - 1.0) < 0.3, found
+    t, r = data.temperature_c, data.slope_c_per_min
+    truth = smooth(t, r) + sum(h * np.exp(-(((t - c) / w) ** 2)) for c, w, h in HIDDEN)
+    plain = fit(data)
+    finer = fit(replace(data, bias_dph=data.bias_dph - found(t)))
+    before = np.sqrt(np.mean((predict(plain, t, r) - truth) ** 2))
+    after = np.sqrt(np.mean((predict(finer, t, r) + found(t) - truth) ** 2))
+    print(f"error of the map {before:.2e} -> {after:.2e} deg/h")
+    assert after < 0.5 * before
+    whole = replace(finer, outcome=replace(finer.outcome, networks=[_beside(found, finer)]))
+    assert np.allclose(predict(whole, t, r), predict(finer, t, r) + found(t), atol=1e-9), (
+        "one network holds both"
+    )
+
+
+def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
+    return found.beside(finer.networks[0], finer.scaling.half_range_c)
+
+
+@pytest.mark.slow
+def test_a_smooth_map_gets_no_bumps() -> None:
+    rng = np.random.default_rng(SEED_OF_BUMPS + 1)
+    counts = [
+        len(find_bumps(data, scaling_of(data)).centers_c)
+        for data in (samples(rng, bumps=False) for _ in range(6))
+    ]
+    assert sum(counts) <= 1, counts

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,10 +23,9 @@ from gyrotc.target.status import CHANNEL_LOST
 from gyrotc.target.table import Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.result import rescaled
-from libc_build import ROOT, runtime
+from libc_build import runtime
 from models import random_guards, random_history, random_model, random_stand_in, random_uncertainty
 
-sys.path.insert(0, str(ROOT))
 from bench.signals import rms_of, scenario_of, without
 
 Array = np.ndarray[Any, Any]

@@ -1,12 +1,19 @@
-"""Targets and toolchains: files that are sound, a meter that counts right, programs that end badly."""
+"""Targets and toolchains that are sound, programs that end badly, objects that are compiled once."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.store import cache
+from gyrotc.verify import bounds, toolchain
+from gyrotc.verify.board import board_entries
 from gyrotc.verify.toolchain import (
+    Object,
     Target,
     all_targets,
     compile_c,
@@ -14,9 +21,11 @@ from gyrotc.verify.toolchain import (
     compiler_version,
     load_target,
     run_program,
+    shared_object,
     symbols,
     writable_bytes,
 )
+from jobs import job_of
 from metered import metered
 
 FOLDER = Path(__import__("gyrotc").__file__).parent / "verify" / "targets"
@@ -113,3 +122,131 @@ def test_compiler_version_is_one_short_text() -> None:
 def test_flags_of_results_are_those_of_the_compiler() -> None:
     target = Target(name="x", compiler="cc", package="p", flags=("-Og",))
     assert target.all_flags[0] == "-std=c99" and target.all_flags[-1] == "-Og"
+
+
+class _Compiled:
+    """Counts what the compiler is asked for."""
+
+    count = 0
+
+
+@pytest.fixture
+def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[_Compiled]:
+    """A cache of the test's own, as a new process finds it."""
+    counted = _Compiled()
+
+    def counting(*arguments: object, **options: object) -> list[Path]:
+        counted.count += 1
+        return compile_objects(*arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(toolchain, "compile_objects", counting)
+    monkeypatch.setattr(toolchain, "_made", {})
+    yield counted
+
+
+def _asked(source: Path, work: Path, target: Target = HOST, *, fresh: bool = False) -> Object:
+    """As a process that has just begun."""
+    toolchain._made.clear()
+    return shared_object(target, source, work, include=source.parent, fresh=fresh)
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    folder = tmp_path / "c"
+    folder.mkdir()
+    (folder / "size.h").write_text("#define SIZE 3\n")
+    path = folder / "one.c"
+    path.write_text(
+        '#include "size.h"\nint one(void);\nint one(void)\n{\n    static int x[SIZE];\n    return x[0]++;\n}\n'
+    )
+    return path
+
+
+def test_an_object_is_taken_again_for_the_same_text_headers_flags_and_compiler_alone(
+    source: Path, tmp_path: Path, compiled: _Compiled
+) -> None:
+    first = _asked(source, tmp_path)
+    assert first.writable_bytes == 12 and [s.name for s in first.symbols if s.kind == "T"] == ["one"]
+    assert _asked(source, tmp_path) == first and compiled.count == 1, "the second comes from disk"
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    for name in ("one.c", "size.h"):
+        (other / name).write_bytes((source.parent / name).read_bytes())
+    assert _asked(other / "one.c", other).code == first.code and compiled.count == 1, "places do not matter"
+    (source.parent / "size.h").write_text("#define SIZE 4\n")
+    assert _asked(source, tmp_path).writable_bytes == 16 and compiled.count == 2
+    _asked(source, tmp_path, HOST.model_copy(update={"flags": ("-O1",)}))
+    assert compiled.count == 3
+    _asked(source, tmp_path, fresh=True)
+    assert compiled.count == 4
+
+
+def test_another_compiler_of_the_same_name_makes_its_own_objects(
+    source: Path, tmp_path: Path, compiled: _Compiled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _asked(source, tmp_path)
+    known = toolchain._identity(HOST.compiler)
+    assert len(known) == 4, "version, driver, compiler proper, assembler"
+    for changed in range(len(known)):
+        monkeypatch.setattr(
+            toolchain, "_identity", lambda _, k=changed: [*known[:k], known[k] + "1", *known[k + 1 :]]
+        )
+        _asked(source, tmp_path)
+        assert compiled.count == 2 + changed
+    monkeypatch.setattr(toolchain, "_identity", lambda _: [])
+    _asked(source, tmp_path)
+    assert compiled.count == 6, "a compiler that cannot be told from others compiles each time"
+
+
+def test_what_is_damaged_or_foreign_is_never_linked(
+    source: Path, tmp_path: Path, compiled: _Compiled
+) -> None:
+    sound = _asked(source, tmp_path)
+    [path] = cache.folder().glob("*.object")
+    whole = path.read_bytes()
+    (source.parent / "size.h").write_text("#define SIZE 5\n")
+    _asked(source, tmp_path)
+    [other] = set(cache.folder().glob("*.object")) - {path}
+    (source.parent / "size.h").write_text("#define SIZE 3\n")
+    head = len(cache._packed("", b""))
+    spoiled = (
+        b"",
+        whole[:-1],
+        whole[:-9] + bytes([whole[-9] ^ 1]) + whole[-8:],
+        other.read_bytes(),  # of another text, sound in itself
+        whole[:head] + whole[head:].replace(b"one", b"two", 1),
+        cache._packed(path.name, b"{}\n" + sound.code),
+        cache._packed(path.name, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
+    )
+    for k, content in enumerate(spoiled, 3):
+        path.write_bytes(content)
+        assert _asked(source, tmp_path) == sound
+        assert compiled.count == k, "compiled again"
+    cache.folder().chmod(0o777)
+    assert _asked(source, tmp_path) == sound and compiled.count == 3 + len(spoiled), "others may write there"
+
+
+@pytest.mark.parametrize("name", ["host-gcc-O2", pytest.param("cortex-m4f", marks=pytest.mark.slow)])
+def test_a_target_shows_the_same_with_kept_objects(
+    name: str, tmp_path: Path, compiled: _Compiled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = all_targets()[name]
+    if target.missing():
+        pytest.skip(f"{target.missing()} is not installed")
+    job = replace(job_of(emitted(tmp_path / "a")), trusted=False)
+    first = [entry.content() for entry in board_entries(job, target)]
+    assert all(entry["status"] == "pass" for entry in first)
+    toolchain._made.clear()
+    monkeypatch.setattr(bounds, "_bounds", lambda *_: pytest.fail("bounds are kept"))
+    before = compiled.count
+    assert [entry.content() for entry in board_entries(job, target)] == first
+    assert compiled.count == before, "the runtime is compiled once"
+
+
+def test_bounds_of_other_functions_or_tables_are_not_taken() -> None:
+    found = {"f32": dict.fromkeys(bounds.PUBLIC, 5)}
+    assert bounds._checked(found, {"f32": None}) == found  # type: ignore[dict-item]
+    assert bounds._checked(found, {}) is None
+    assert bounds._checked({"f32": {"map": 5}}, {"f32": None}) is None  # type: ignore[dict-item]
+    assert bounds._checked({"f32": dict.fromkeys(bounds.PUBLIC, -1)}, {"f32": None}) is None  # type: ignore[dict-item]

@@ -1,0 +1,460 @@
+"""The C++ core against plain formulas: orthogonal least squares, evidence, Kohonen network."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gyrotc import _core
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SEEDS = range(8)
+
+
+def cloud(seed: int, n: int = 400) -> tuple[Floats, Floats, Floats, Floats]:
+    """t, r, y, weight: holds at three temperatures and a sweep, a curved target with noise."""
+    rng = np.random.default_rng(seed)
+    t = np.concatenate([rng.choice([-0.8, 0.1, 0.9], n // 2), rng.uniform(-1.0, 1.0, n - n // 2)])
+    r = np.clip(rng.normal(0.0, 0.3, n), -1.0, 1.0)
+    y = 2.0 + np.sin(3.0 * t) / (1.5 + r) + rng.normal(0.0, 0.2, n)
+    return t, r, y, rng.uniform(0.5, 2.0, n)
+
+
+def design(t: Floats, r: Floats, centers: Floats, width_t: float, width_r: float) -> Floats:
+    """A constant and one Gaussian for each center, as columns."""
+    g = np.exp(
+        -(((t[:, None] - centers[:, 0]) / width_t) ** 2) - ((r[:, None] - centers[:, 1]) / width_r) ** 2
+    )
+    return np.concatenate([np.ones((len(t), 1)), g], axis=1)
+
+
+def textbook_ols(p: Floats, y: Floats, steps: int, guard: float = 1e-7) -> tuple[list[int], list[float]]:
+    """Eq. (7) to (15): at each step every candidate is orthogonalised, the largest error reduction is taken."""
+    chosen, reductions, basis = [0], [float((p[:, 0] @ y) ** 2 / (p[:, 0] @ p[:, 0]) / (y @ y))], [p[:, 0]]
+    while len(chosen) < steps:
+        best, best_err, best_b = -1, -1.0, p[:, 0]
+        for i in range(p.shape[1]):
+            if i in chosen:
+                continue
+            b = p[:, i].copy()
+            for _ in range(2):  # twice is enough for full precision
+                for other in basis:
+                    b = b - (other @ b) / (other @ other) * other
+            if b @ b <= guard * (p[:, i] @ p[:, i]):
+                continue
+            err = float((b @ y) ** 2 / ((b @ b) * (y @ y)))
+            if err > best_err:
+                best, best_err, best_b = i, err, b
+        if best < 0:
+            break
+        chosen.append(best)
+        reductions.append(best_err)
+        basis.append(best_b)
+    return chosen, reductions
+
+
+def grid(width_t: float, width_r: float) -> _core.EqualGaussians:
+    return _core.EqualGaussians.on_grid(-1.0, 0.25, 9, -1.0, 0.5, 5, width_t, width_r)
+
+
+def scattered(seed: int, width_t: float, width_r: float) -> _core.EqualGaussians:
+    centers = np.random.default_rng(seed).uniform(-1.0, 1.0, (40, 2))
+    return _core.EqualGaussians.at(centers, width_t, width_r)
+
+
+def both(seed: int, width_t: float, width_r: float) -> list[_core.EqualGaussians]:
+    return [grid(width_t, width_r), scattered(seed, width_t, width_r)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("widths", [(0.2, 0.4), (0.6, 0.6), (1.5, 0.9)])
+def test_closed_form_normal_equations_are_those_of_the_columns(
+    seed: int, widths: tuple[float, float]
+) -> None:
+    t, r, y, weight = cloud(seed)
+    for dictionary in both(seed, *widths):
+        dictionary.add(_core.Samples(t[:150], r[:150], y[:150], weight[:150]))
+        dictionary.add(_core.Samples(t[150:], r[150:], y[150:], weight[150:]))
+        p = design(t, r, dictionary.centers, *widths)
+        gram = p.T @ (weight[:, None] * p)
+        tolerance = 1e-12 * gram.max()
+        found = np.stack([dictionary.column(j) for j in range(len(gram))])
+        np.testing.assert_allclose(found, gram, rtol=0.0, atol=tolerance)
+        np.testing.assert_allclose(dictionary.norms(), np.diag(gram), rtol=0.0, atol=tolerance)
+        np.testing.assert_allclose(dictionary.moments(), p.T @ (weight * y), rtol=0.0, atol=3.0 * tolerance)
+        assert dictionary.energy == pytest.approx(float(weight @ y**2), rel=1e-13)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("width", [0.25, 0.5, 1.0])
+def test_the_selection_is_the_textbook_one(seed: int, width: float) -> None:
+    t, r, y, weight = cloud(seed)
+    root = np.sqrt(weight)
+    for dictionary in both(seed, width, 1.3 * width):
+        dictionary.add(_core.Samples(t, r, y, weight))
+        p = root[:, None] * design(t, r, dictionary.centers, width, 1.3 * width)
+        # Reductions below 1e-9 of the target are rounding of ill-conditioned columns, in either way of computing.
+        expected, reductions = textbook_ols(p, root * y, 12)
+        path = _core.select_columns(dictionary, 12)
+        kept = sum(1 for err in reductions if err > 1e-9)
+        assert path.chosen[:kept] == expected[:kept]
+        np.testing.assert_allclose(path.reduction[:kept], reductions[:kept], rtol=1e-5)
+        rest = (1.0 - np.cumsum(path.reduction)) * dictionary.energy
+        np.testing.assert_allclose(path.rest, rest, rtol=1e-9)
+
+
+def test_rho_ends_the_selection_at_eq_16() -> None:
+    t, r, y, weight = cloud(1)
+    dictionary = grid(0.5, 0.5)
+    dictionary.add(_core.Samples(t, r, y, weight))
+    whole = _core.select_columns(dictionary, 30)
+    rho = float(1.0 - np.sum(whole.reduction[:5])) * (1.0 + 1e-9)
+    stopped = _core.select_columns(dictionary, 30, rho=rho)
+    assert stopped.chosen == whole.chosen[:5]
+
+
+def test_columns_that_the_chosen_ones_span_are_passed_over() -> None:
+    """Five copies of one center give one column, and weights that stay small."""
+    t, r, y, weight = cloud(2)
+    centers = np.array([[0.2, 0.1]] * 5 + [[-0.5, 0.0]])
+    dictionary = _core.EqualGaussians.at(centers, 0.5, 0.5)
+    dictionary.add(_core.Samples(t, r, y, weight))
+    assert sorted(_core.select_columns(dictionary, 7).chosen) == [0, 1, 6]
+
+
+def test_subtracting_a_part_is_never_having_added_it() -> None:
+    t, r, y, weight = cloud(3)
+    first, second = slice(0, 250), slice(250, 400)
+    for make in (lambda: grid(0.4, 0.6), lambda: scattered(3, 0.4, 0.6)):
+        whole, part, rest = make(), make(), make()
+        whole.add(_core.Samples(t, r, y, weight))
+        part.add(_core.Samples(t[second], r[second], y[second], weight[second]))
+        rest.add(_core.Samples(t[first], r[first], y[first], weight[first]))
+        whole.subtract(part)
+        np.testing.assert_allclose(whole.column(3), rest.column(3), atol=1e-10)
+        assert _core.select_columns(whole, 8).chosen == _core.select_columns(rest, 8).chosen
+
+
+def test_errors_on_other_samples_are_those_of_least_squares_on_the_chosen_columns() -> None:
+    t, r, y, weight = cloud(4)
+    here, there = slice(0, 300), slice(300, 400)
+    dictionary = grid(0.5, 0.5)
+    dictionary.add(_core.Samples(t[here], r[here], y[here], weight[here]))
+    path = _core.select_columns(dictionary, 8)
+    errors = _core.errors_along(path, dictionary, _core.Samples(t[there], r[there], y[there], weight[there]))
+    p = design(t, r, dictionary.centers, 0.5, 0.5)[:, path.chosen]
+    root = np.sqrt(weight[here])
+    for size in range(1, len(path.chosen) + 1):
+        w = np.linalg.lstsq(root[:, None] * p[here, :size], root * y[here], rcond=None)[0]
+        expected = float(np.sum(weight[there] * (y[there] - p[there, :size] @ w) ** 2))
+        assert errors[size - 1] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("n", [30, 2047, 2048, 2049, 5000])
+def test_weights_by_qr_are_least_squares(n: int) -> None:
+    """Block borders of the streamed QR included; with a ridge, the minimum of the penalised sum."""
+    t, r, y, weight = cloud(5, n)
+    gaussians = np.array([[-0.5, 0.0, 0.4, 0.6], [0.3, 0.2, 0.7, 0.5], [0.9, -0.4, 0.5, 1.0]])
+    p = np.concatenate(
+        [np.ones((n, 1)), *[design(t, r, g[None, :2], g[2], g[3])[:, 1:] for g in gaussians]], axis=1
+    )
+    root = np.sqrt(weight)
+    for ridge in (0.0, 0.5):
+        penalty = np.sqrt(ridge) * np.eye(4)[1:]
+        expected = np.linalg.lstsq(
+            np.concatenate([root[:, None] * p, penalty]), np.concatenate([root * y, np.zeros(3)]), rcond=None
+        )[0]
+        found = _core.least_squares(_core.Samples(t, r, y, weight), gaussians, ridge)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+def test_lengths_that_differ_are_refused() -> None:
+    with pytest.raises(ValueError, match="length"):
+        _core.Samples(np.zeros(3), np.zeros(3), np.zeros(2), np.ones(3))
+
+
+REACH = 1.4
+PRIOR_MEAN = np.log([0.3, 0.15, 1.0, 0.7, 0.3, 0.8, 0.8, 0.3])
+PRIOR_SD = np.array([1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5, 3.0])
+
+
+def bins(seed: int, n: int = 60) -> dict[str, Floats | float]:
+    """Bins with counts, and the squares within them."""
+    rng = np.random.default_rng(seed)
+    t, r = rng.uniform(-1.0, 1.0, n), rng.uniform(-1.0, 1.0, n)
+    count = rng.integers(1, 20, n).astype(float)
+    mean = np.sin(4.0 * t) * (1.0 + 0.3 * r) + rng.normal(0.0, 0.3, n) / np.sqrt(count)
+    within = float(np.sum(rng.chisquare(count - 1 + 1e-9)) * 0.09)
+    return {"t": t, "r": r, "count": count, "mean": mean, "within": within, "samples": float(count.sum())}
+
+
+def model(data: dict[str, Floats | float]) -> _core.EvidenceModel:
+    return _core.EvidenceModel(**data)  # type: ignore[arg-type]
+
+
+def basis(t: Floats, r: Floats, reach_t: float, reach_r: float) -> tuple[Floats, Floats, Floats]:
+    """Columns sin(ω (x + L))/√L and their frequencies (T, dT/dt; 0 where a column does not depend on it)."""
+
+    def sines(x: Floats, n: int, reach: float) -> tuple[Floats, Floats]:
+        w = np.pi * np.arange(1, n + 1) / (2.0 * reach)
+        return np.sin(w * (x[:, None] + reach)) / np.sqrt(reach), w
+
+    of_t, w_t = sines(t, 40, reach_t)
+    of_r, w_r = sines(r, 8, reach_r)
+    coupled = (of_t[:, :10, None] * of_r[:, None, :]).reshape(len(t), -1)
+    columns = np.concatenate([np.ones((len(t), 1)), of_t, coupled], axis=1)
+    return columns, w_t, w_r
+
+
+def prior_variance(p: Floats, w_t: Floats, w_r: Floats) -> Floats:
+    def density(s: float, scale: float, w: Floats) -> Floats:
+        return np.asarray(s**2 * np.sqrt(2.0 * np.pi) * scale * np.exp(-0.5 * (scale * w) ** 2))
+
+    coupled = density(p[4], p[5], w_t[:10])[:, None] * density(1.0, p[6], w_r)[None, :]
+    return np.concatenate(
+        [[100.0], density(p[0], p[1], w_t) + density(p[2], p[3], w_t) + 1e-10, coupled.ravel() + 1e-10]
+    )
+
+
+def dense(data: dict[str, Floats | float], log_p: Floats) -> tuple[float, Floats, Floats, Floats]:
+    """Negative log posterior by the n x n covariance of the bins; prior covariance and columns for predictions."""
+    t, r, count, mean = (np.asarray(data[k]) for k in ("t", "r", "count", "mean"))
+    p = np.exp(log_p)
+    phi, w_t, w_r = basis(t, r, REACH * np.abs(t).max(), REACH * np.abs(r).max())
+    prior = prior_variance(p, w_t, w_r)
+    noise = p[7] ** 2
+    covariance = (phi * prior) @ phi.T + np.diag(noise / count)
+    _, logdet = np.linalg.slogdet(covariance)
+    value = 0.5 * mean @ np.linalg.solve(covariance, mean) + 0.5 * logdet + 0.5 * np.sum(np.log(count))
+    n, samples = len(t), float(data["samples"])
+    value += 0.5 * float(data["within"]) / noise + (samples - n) * log_p[7]
+    value += 0.5 * float(np.sum(((log_p - PRIOR_MEAN) / PRIOR_SD) ** 2))
+    return float(value), covariance, prior, phi
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_objective_is_the_negative_log_posterior(seed: int) -> None:
+    """Differences between parameter sets: the additive constant is free."""
+    data = bins(seed)
+    process = model(data)
+    rng = np.random.default_rng(100 + seed)
+    points = [PRIOR_MEAN + 0.5 * rng.normal(size=8) for _ in range(3)]
+    found = [process.objective(p)[0] for p in points]
+    expected = [dense(data, p)[0] for p in points]
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-7, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_gradient_is_the_slope_of_the_objective(seed: int) -> None:
+    process = model(bins(seed))
+    at = PRIOR_MEAN + 0.4 * np.random.default_rng(seed).normal(size=8)
+    _, gradient = process.objective(at)
+    step = 1e-5
+    for k in range(8):
+        up, down = at.copy(), at.copy()
+        up[k] += step
+        down[k] -= step
+        slope = (process.objective(up)[0] - process.objective(down)[0]) / (2.0 * step)
+        assert gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-4)
+
+
+def test_mean_and_variance_are_those_of_the_conditioned_process() -> None:
+    data = bins(7)
+    process = model(data)
+    log_p = PRIOR_MEAN + 0.2
+    process.condition(log_p)
+    _, covariance, prior, phi = dense(data, log_p)
+    t, r = np.asarray(data["t"]), np.asarray(data["r"])
+    at_t, at_r = np.linspace(-1.0, 1.0, 9), np.linspace(0.5, -0.5, 9)
+    columns, *_ = basis(at_t, at_r, REACH * np.abs(t).max(), REACH * np.abs(r).max())
+    cross = (columns * prior) @ phi.T
+    np.testing.assert_allclose(
+        process.mean(at_t, at_r), cross @ np.linalg.solve(covariance, np.asarray(data["mean"])), atol=1e-8
+    )
+    variance = np.sum(columns**2 * prior, axis=1) - np.sum(
+        cross * np.linalg.solve(covariance, cross.T).T, axis=1
+    )
+    np.testing.assert_allclose(process.variance(at_t, at_r), variance, rtol=1e-6)
+    # Effective parameters: the trace of the hat matrix.
+    count = np.asarray(data["count"])
+    hat = np.trace(np.linalg.solve(covariance, (phi * prior) @ phi.T))
+    assert process.freedom == pytest.approx(float(hat), rel=1e-6)
+    assert count.sum() == data["samples"]
+
+
+def test_the_optimum_is_no_worse_than_many_starts_find() -> None:
+    """Ripple and trend together: two starts of the short scale are what the search has."""
+    rng = np.random.default_rng(11)
+    t, r = np.sort(rng.uniform(-1.0, 1.0, 400)), rng.uniform(-1.0, 1.0, 400)
+    y = np.sin(2.0 * t) + 0.4 * np.cos(2.0 * np.pi * t / 0.22) + rng.normal(0.0, 0.3, 400)
+    process = _core.EvidenceModel(t, r, np.ones(400), y, 0.0, 400.0)
+    process.optimise()
+    best = process.value
+    gradient = process.objective(process.log_parameters)[1]
+    assert np.abs(gradient).max() < 1.0
+    for scale in (0.04, 0.1, 0.2, 0.5):
+        start = PRIOR_MEAN.copy()
+        start[1] = np.log(scale)
+        process.optimise_from(start)
+        assert process.value > best - 0.05
+
+
+def test_noise_is_found() -> None:
+    rng = np.random.default_rng(3)
+    t, r = rng.uniform(-1.0, 1.0, 800), rng.uniform(-1.0, 1.0, 800)
+    y = np.sin(3.0 * t) + 0.2 * r + rng.normal(0.0, 0.25, 800)
+    process = _core.EvidenceModel(t, r, np.ones(800), y, 0.0, 800.0)
+    process.optimise()
+    assert process.sigma == pytest.approx(0.25, rel=0.08)
+
+
+def test_many_points_are_answered_as_each_part_of_them() -> None:
+    """Points go through in blocks: none may be lost at an edge, nor depend on the others."""
+    rng = np.random.default_rng(7)
+    process = model(bins(7))
+    process.optimise()
+    t, r = rng.uniform(-1.1, 1.1, (2, 2003))
+    for ask in (process.mean, process.variance):
+        whole = ask(t, r)
+        for part in (slice(0, 1), slice(0, 481), slice(477, 962), slice(1400, 2003)):
+            np.testing.assert_allclose(ask(t[part], r[part]), whole[part], rtol=1e-11)
+
+
+def test_a_process_that_is_conditioned_anew_forgets_its_earlier_variance() -> None:
+    data = bins(8)
+    again, fresh = model(data), model(data)
+    at = np.linspace(-1.0, 1.0, 50), np.linspace(1.0, -1.0, 50)
+    again.condition(PRIOR_MEAN - 0.5)
+    before, freedom = again.variance(*at), again.freedom
+    again.condition(PRIOR_MEAN)
+    fresh.condition(PRIOR_MEAN)
+    assert not np.array_equal(again.variance(*at), before) and again.freedom != freedom
+    assert np.array_equal(again.variance(*at), fresh.variance(*at)) and again.freedom == fresh.freedom
+    assert np.array_equal(again.mean(*at), fresh.mean(*at))
+
+
+@pytest.mark.parametrize("sigma", [0.3, 1e-2, 1e-4])
+def test_variance_keeps_its_digits_where_hardly_any_noise_is_left(sigma: float) -> None:
+    """Of 1e-4 a sum of waves has cancelled to nothing. Held against a QR, which squares nothing."""
+    data = bins(12, 400)
+    log_p = PRIOR_MEAN.copy()
+    log_p[7] = np.log(sigma)
+    process = model(data)
+    process.condition(log_p)
+    t, r, count = (np.asarray(data[k]) for k in ("t", "r", "count"))
+    reach = REACH * np.abs(t).max(), REACH * np.abs(r).max()
+    phi, w_t, w_r = basis(t, r, *reach)
+    root = np.sqrt(prior_variance(np.exp(log_p), w_t, w_r))
+    factor = np.linalg.qr(
+        np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r"
+    )
+    at = np.linspace(-1.0, 1.0, 37), np.linspace(0.9, -0.9, 37)
+    columns, *_ = basis(*at, *reach)
+    expected = np.sum(np.linalg.solve(factor.T, (columns * root).T) ** 2, axis=0)
+    np.testing.assert_allclose(process.variance(*at), expected, rtol=1e-4)
+
+
+_MASK = (1 << 64) - 1
+
+
+class SplitMix64:
+    """The published generator, so that the reference sees the samples in the core's order."""
+
+    def __init__(self, seed: int) -> None:
+        self.state = seed
+
+    def next(self) -> int:
+        self.state = (self.state + 0x9E3779B97F4A7C15) & _MASK
+        z = self.state
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+        return z ^ (z >> 31)
+
+    def permutation(self, n: int) -> list[int]:
+        order = list(range(n))
+        for i in range(n, 1, -1):
+            j = self.next() % i
+            order[i - 1], order[j] = order[j], order[i - 1]
+        return order
+
+
+def plain_kohonen(samples: Floats, m: int, epochs: int, seed: int) -> tuple[Floats, Floats]:
+    """Every distance to every node, eq. (5); the nearest node moves, eq. (6); the rate decays geometrically."""
+    random = SplitMix64(seed)
+    nodes = samples[random.permutation(len(samples))[:m]].copy()
+    first, last = 0.5, 0.005
+    decay = (last / first) ** (1.0 / (len(samples) * epochs - 1.0))
+    rate = first
+    wins = np.zeros(m)
+    for _ in range(epochs):
+        wins[:] = 0.0
+        for i in random.permutation(len(samples)):
+            winner = int(np.argmin(np.sum((nodes - samples[i]) ** 2, axis=1)))
+            nodes[winner] += rate * (samples[i] - nodes[winner])
+            wins[winner] += 1.0
+            rate *= decay
+    return nodes, wins
+
+
+def blobs(seed: int, n: int) -> Floats:
+    """Crowded holds, a sparse sweep and a far point, in a long and flat range."""
+    rng = np.random.default_rng(seed)
+    holds = rng.choice([-0.9, 0.2, 0.95], n // 2)[:, None] + rng.normal(0.0, 0.003, (n // 2, 2))
+    sweep = np.stack([rng.uniform(-1.0, 1.0, n - n // 2 - 1), 0.05 * rng.normal(size=n - n // 2 - 1)], axis=1)
+    return np.concatenate([holds, sweep, [[3.0, 0.4]]])
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("n", "m"), [(300, 7), (500, 60), (200, 150)])
+def test_the_winner_found_in_cells_is_the_nearest_of_all_nodes(seed: int, n: int, m: int) -> None:
+    samples = blobs(seed, n)
+    nodes, wins = plain_kohonen(samples, m, 3, seed)
+    found = _core.kohonen(samples, m, max_epochs=3, tolerance=0.0, seed=seed)
+    np.testing.assert_allclose(found.nodes, nodes, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(found.occupancy, wins)
+    assert found.epochs == 3
+
+
+def test_nodes_stand_in_the_clusters() -> None:
+    rng = np.random.default_rng(0)
+    centers = np.array([[-0.8, -0.5], [0.1, 0.6], [0.7, -0.2]])
+    samples = np.repeat(centers, 200, axis=0) + rng.normal(0.0, 0.02, (600, 2))
+    nodes = _core.kohonen(samples, 12, seed=3).nodes
+    distance = np.min(np.linalg.norm(nodes[:, None] - centers, axis=2), axis=1)
+    assert distance.max() < 0.1
+
+
+def test_learning_ends_when_the_nodes_stand_still() -> None:
+    samples = np.tile([[0.0, 0.0], [1.0, 1.0]], (50, 1))
+    found = _core.kohonen(samples, 2, max_epochs=100, tolerance=1e-3, seed=1)
+    assert found.epochs < 100
+
+
+def test_no_more_samples_than_nodes_are_their_own_nodes() -> None:
+    samples = np.array([[0.0, 1.0], [2.0, 3.0]])
+    found = _core.kohonen(samples, 5)
+    np.testing.assert_array_equal(found.nodes, samples)
+
+
+def test_a_neighbourhood_orders_the_lattice() -> None:
+    """With a neighbourhood, nodes that are neighbours on the lattice end up nearer to each other than chance."""
+    samples = np.random.default_rng(5).uniform(-1.0, 1.0, (2000, 2))
+
+    def steps(neighbourhood: float) -> float:
+        nodes = _core.kohonen(samples, 64, max_epochs=10, neighbourhood=neighbourhood, seed=2).nodes
+        lattice = nodes.reshape(8, 8, 2)
+        return float(np.linalg.norm(np.diff(lattice, axis=0), axis=2).mean())
+
+    assert steps(3.0) < 0.5 * steps(0.0)
+
+
+def test_a_seed_gives_one_result_and_bad_input_is_refused() -> None:
+    samples = blobs(1, 200)
+    again = [_core.kohonen(samples, 20, seed=9).nodes for _ in range(2)]
+    np.testing.assert_array_equal(again[0], again[1])
+    assert np.abs(_core.kohonen(samples, 20, seed=10).nodes - again[0]).max() > 0.0
+    with pytest.raises(ValueError, match="finite"):
+        _core.kohonen(np.array([[np.nan, 0.0], [1.0, 1.0]]), 1)
+    with pytest.raises(ValueError, match="no"):
+        _core.kohonen(np.zeros((0, 2)), 1)
