@@ -1,4 +1,4 @@
-"""Status bits of the runtime, as `include/gtc.h` has them; `tests/py/target/test_status.py` holds the two together."""
+"""Status bits of the runtime, as `include/gtc.h` has them; `tests/py/target/test_reference.py` compares the two."""
 
 from __future__ import annotations
 

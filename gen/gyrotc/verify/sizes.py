@@ -78,7 +78,7 @@ PUBLIC = (
     "check", "open", "map", "init", "sample", "sample_at", "missed", "bias", "snapshot", "rezero", "unzero",
     "angle", "save", "restore",
 )  # fmt: skip
-"""Every function that gtc.h declares, without its prefix (`tests/py/verify/test_functions.py`)."""
+"""Every function that gtc.h declares, without its prefix (`tests/py/verify/test_exhaustive.py`)."""
 _NODE = re.compile(
     r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
 )
