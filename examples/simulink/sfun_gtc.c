@@ -86,7 +86,7 @@ static void mdlOutputs(SimStruct *S, int_T tid)
 
     (void)tid;
     if (status >= 0) {
-        status = gtc_f32_bias(state, &bias);
+        status |= gtc_f32_bias(state, &bias);
     }
     now.sigma = -1.0F;
     if (gtc_f32_snapshot(state, &now) < 0) {

@@ -47,7 +47,7 @@ static int correct(const float temperature[N_AXES], float rate[N_AXES])
         int status = gtc_f32_sample(&states[axis], &temperature[axis]);
 
         if (status >= 0) {
-            status = gtc_f32_bias(&states[axis], &bias);
+            status |= gtc_f32_bias(&states[axis], &bias);
         }
         if (status < 0) {
             return status;
