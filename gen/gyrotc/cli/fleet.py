@@ -105,18 +105,30 @@ def catalogue(
     place: Annotated[Path, typer.Argument(help="The --out of fleet, or a catalogue.sqlite.")],
     serial: Annotated[str | None, typer.Argument(help="Which table may this gyro carry?")] = None,
     day: Annotated[str | None, typer.Option("--on", help="On this day, ISO 8601; default today.")] = None,
+    exported: Annotated[
+        str | None,
+        typer.Option("--export", metavar="SERIAL", help="Write the complete result of this gyro to --out."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for --export.")] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
 
-    Exit status 1 where there is none.
+    --export writes the folder that a firmware engineer gets, with what a fleet keeps once for all gyros or not at
+    all. Exit status 1 where there is no table.
 
     Example: gyrotc catalogue fleet RLG-0042 --on 2026-09-01
     """
-    from ..fleet.catalogue import catalogued
+    from ..fleet.catalogue import catalogued, export
 
     asked = _day(day)
+    if exported is not None:
+        if out is None or serial is not None:
+            raise InputError("--export", "goes with --out and no other serial", "--export SERIAL --out DIR")
+        serial = exported
     answer = catalogued(place, serial, asked)
+    if exported is not None and out is not None and answer.found:
+        export(place, exported, asked, out)
     write_json(json_file, answer.content())
     for one in answer.found:
         until = f" to {one.valid_until}" if one.valid_until else ""
@@ -129,6 +141,8 @@ def catalogue(
         tell(f"  image {one.image_sha256}")
         for file in one.recordings if serial else ():
             tell(f"  {file.role} {file.file} {file.sha256}")
+    if exported is not None and answer.found:
+        tell(f"{out}: complete")
     if serial is None:
         tell(f"{answer.calibrations} calibrations in all")
     elif not answer.found:

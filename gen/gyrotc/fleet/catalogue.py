@@ -18,14 +18,16 @@ from ..common.errors import GyrotcError, InputError
 from ..jobs.release import unit_of
 from ..model import Model, load_model
 from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry
-from ..store.files import check_own, open_or_create, write_atomically
-from ..store.marker import sha256
-from .unit import ENTRY
+from ..store.files import check_own, open_or_create, write_own
+from ..store.folder import kept_by_hash, result_folder
+from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
+from ..verify.emitted import left_out_of, made_again, texts_again
+from .unit import ENTRY, PAYLOADS
 
-__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter"]
+__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter", "export"]
 
 CATALOGUE = "catalogue"
-_FILE, _PAYLOADS = "catalogue.sqlite", "payloads"
+_FILE = "catalogue.sqlite"
 _EXPECTED = "a catalogue as gyrotc fleet wrote it"
 _APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
 _MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
@@ -155,7 +157,9 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
         raise InputError(
             str(folder / ENTRY), "is not what the other results give", "a result as fleet wrote it"
         )
-    image, text = (_kept(out, path) for path in (_image(folder, model), folder / "model.json"))
+    image, text = (
+        kept_by_hash(out / PAYLOADS, path).name for path in (_image(folder, model), folder / "model.json")
+    )
     row = base.execute(
         "INSERT INTO calibration (serial, axis, valid_from, valid_until, tag, status, verdict, model_hash,"
         " image_sha256, model_sha256, input_sha256, after_rms_dph, expanded_dph, folder)"
@@ -173,20 +177,6 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
 
 def _image(folder: Path, model: Model) -> Path:
     return folder / "c" / f"gtc_{model.id}.bin"
-
-
-def _kept(out: Path, source: Path) -> str:
-    """Puts a file among the payloads under its hash, read-only, unless it is there; returns the hash."""
-    known = sha256(source)
-    place = out / CATALOGUE / _PAYLOADS / known[:2] / known
-    if place.exists() or place.is_symlink():
-        if not place.is_file() or sha256(place) != known:
-            raise InputError(str(place), "is not what its name says", _EXPECTED)
-    else:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(place, source.read_bytes())
-        place.chmod(0o444)
-    return known
 
 
 def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAnswer:
@@ -209,7 +199,7 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
             rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
             found = tuple(_told(base, row) for row in rows)
             for one in found if serial else ():
-                _check_payloads(path.parent / _PAYLOADS, one)
+                _check_payloads(path.parent / Path(PAYLOADS).name, one)
             total = base.execute("SELECT coalesce(max(id), 0) FROM calibration").fetchone()[0]
     except sqlite3.DatabaseError as error:
         raise InputError(
@@ -234,6 +224,51 @@ def _check_payloads(place: Path, one: Catalogued) -> None:
     model = load_model(text)
     if (model.serial, model.axis, model.hash) != (one.serial, one.axis, one.model_hash):
         raise InputError(str(text), f"is not the model that the catalogue names for {one.serial}", _EXPECTED)
+
+
+def export(place: Path, serial: str, day: str, out: Path) -> tuple[Catalogued, ...]:
+    """Writes what a gyro may carry on a day as one complete folder, as `build` leaves it.
+
+    Args:
+        place: A fleet's folder, or the catalogue's file.
+        day: ISO 8601.
+        out: The folder; of a gyro of several axes one in it for each.
+
+    Returns:
+        As `catalogued`; where that is nothing, nothing is written.
+
+    Raises:
+        InputError: As `catalogued`; a result is not as the fleet wrote it, or was replaced by that of another
+            calibration; `out` is taken, as of `result_folder`.
+    """
+    found = catalogued(place, serial, day).found
+    fleet = place.resolve().parents[1] if place.is_file() else place
+    for one in found:
+        folder = fleet / one.folder
+        wrong = faults(folder)
+        if wrong:
+            raise InputError(str(folder), wrong[0], "a result as gyrotc fleet wrote it")
+        if load_model(folder / "model.json").hash != one.model_hash:
+            raise InputError(
+                str(folder), "holds another calibration than the catalogue names", "the fleet of that one"
+            )
+        _copy(folder, out / one.axis if one.axis and len(found) > 1 else out, one)
+    return found
+
+
+def _copy(folder: Path, out: Path, one: Catalogued) -> None:
+    """A result with the files that its fleet did not keep."""
+    model = load_model(folder / "model.json")
+    options, emission = made_again(folder / "c", model)
+    left_out = left_out_of(folder, model, texts_again(model, options, emission))
+    with result_folder(out, "fleet", kind=KINDS["build"], inputs=[folder]) as stage:
+        stage.of(one.serial, one.axis)
+        for name in (read_marker(folder) or marker_of()).files:
+            target = stage.folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            write_own(target, (folder / name).read_bytes())
+        for name, data in left_out.items():
+            write_own(stage.folder / "c" / name, data)
 
 
 def _told(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:

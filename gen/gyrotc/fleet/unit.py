@@ -23,13 +23,14 @@ from ..results.evaluation import Evaluation
 from ..results.fleet import FleetEntry
 from ..store.cache import inputs_of, program_of
 from ..store.files import Lock, digest_of, json_text, write_atomically
-from ..store.folder import clean, leftovers, result_folder
+from ..store.folder import clean, leftovers, result_folder, share_by_hash
 from ..store.marker import KINDS, faults, read_marker, survey
 from .manifest import Fleet, Unit, printable
 from .outliers import facts_of
 
 __all__ = [
     "ENTRY",
+    "PAYLOADS",
     "Task",
     "clean_units",
     "do_unit",
@@ -77,6 +78,9 @@ def clean_units(out: Path, names: Sequence[str]) -> None:
 
 
 ENTRY = "entry.json"
+PAYLOADS = "catalogue/payloads"
+"""In the fleet's folder: what is kept under its hash."""
+_OF_ALL = ("c/gtc.c", "c/gtc.h")  # the same for every gyro
 
 
 def write_entry(folder: Path, entry: FleetEntry) -> FleetEntry:
@@ -210,6 +214,9 @@ def _built(task: Task) -> FleetEntry:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
         entry = _entry_of(task, key, dataset, built, runs)
         write_entry(stage.folder, entry)
+        for name in _OF_ALL:
+            share_by_hash(task.out.parent / PAYLOADS, stage.folder / name)
+        stage.leave_out(f"c/vectors_{built.model.id}.txt")  # nine tenths of what is this gyro's alone
     return entry.model_copy(update={"aside": aside}) if aside else entry
 
 

@@ -6,7 +6,7 @@ import os
 import secrets
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
@@ -33,7 +33,15 @@ from .marker import (
 )
 from .update import Update, can_exchange, exchange, write_marker
 
-__all__ = ["Stage", "clean", "leftovers", "result_folder", "write_result"]
+__all__ = [
+    "Stage",
+    "clean",
+    "kept_by_hash",
+    "leftovers",
+    "result_folder",
+    "share_by_hash",
+    "write_result",
+]
 
 _open: list[_Job] = []
 _ASIDE = ".old"
@@ -65,6 +73,13 @@ class Stage:
             check_serial(self._job.out, self._job.earlier, serial)
         parts = self._job.parts
         parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
+
+    def leave_out(self, name: str) -> None:
+        """Removes a file that was written and that the others tell; the marker keeps its hash."""
+        path, parts = self.folder / name, self._job.parts
+        known = parts[self._part].left_out | {name: sha256(path)}
+        parts[self._part] = parts[self._part].but(left_out=known)
+        path.unlink()
 
     def stale(self) -> None:
         """Says that what else gyrotc wrote into the folder no longer holds: it is removed when the new files come.
@@ -124,6 +139,38 @@ def result_folder(
         with deferred():
             if job is not None:
                 job.end()
+
+
+def kept_by_hash(store: Path, source: Path) -> Path:
+    """Where a copy of a file is kept under its hash, read-only; it is made where there is none.
+
+    Raises:
+        InputError: What lies there is something else.
+    """
+    known = sha256(source)
+    place = store / known[:2] / known
+    if place.exists() or place.is_symlink():
+        if not place.is_file() or sha256(place) != known:
+            raise InputError(
+                str(place), "is not what its name says", "a file that gyrotc fleet wrote, or none"
+            )
+    else:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(place, source.read_bytes())
+        place.chmod(0o444)
+    return place
+
+
+def share_by_hash(store: Path, path: Path) -> None:
+    """Makes a file of this job another name of the one that is kept under its hash; raises as `kept_by_hash`.
+
+    Where the file system has no such names, or no more of them, the file stays.
+    """
+    place = kept_by_hash(store, path)
+    part = path.with_name(f".{path.name}.gyrotc-part")
+    with suppress(OSError):
+        os.link(place, part)
+        part.replace(path)
 
 
 def write_result(path: Path, text: str) -> None:

@@ -23,8 +23,9 @@ from ..common.texts import C_COMMENT, C_INITIALISER
 from ..model import SERIAL, Model
 from ..results.verification import VerifiedFile
 from ..store.files import write_own
+from ..store.marker import read_marker
 from ..tables.amalgamate import ARITHMETICS, amalgamate
-from ..tables.emit import Emission, board_test_text, quantise_all
+from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
 
 __all__ = [
@@ -33,8 +34,10 @@ __all__ = [
     "c_hash",
     "checked_sources",
     "file_entries",
+    "left_out_of",
     "made_again",
     "table_files",
+    "texts_again",
 ]
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
@@ -43,11 +46,13 @@ _SHOWN = 160  # characters of a line
 _BEYOND = 2**16  # bytes that are read of a file beyond its right length
 
 
-def c_hash(c_folder: Path) -> str:
-    """SHA-256 over names and contents of the emitted files."""
+def c_hash(c_folder: Path, left_out: Mapping[str, bytes] | None = None) -> str:
+    """SHA-256 over names and contents of the emitted files, and of those that are not kept."""
+    paths = (p for p in c_folder.iterdir() if p.is_file() and p.name not in BESIDES)
+    contents = {**(left_out or {}), **{path.name: path.read_bytes() for path in paths}}
     digest = hashlib.sha256()
-    for path in sorted(p for p in c_folder.iterdir() if p.is_file() and p.name not in BESIDES):
-        digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    for name, data in sorted(contents.items()):
+        digest.update(f"{name} {hashlib.sha256(data).hexdigest()}\n".encode())
     return digest.hexdigest()
 
 
@@ -69,8 +74,35 @@ def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
         return options, quantise_all(model, None)
 
 
+def texts_again(model: Model, options: Options, emission: Emission) -> dict[str, bytes]:
+    """What must lie in an emitted folder, by name."""
+    return emit_texts(model, emission, asked=options.numeric is not None, zero_at=options.zero_at_c)
+
+
+def left_out_of(folder: Path, model: Model, texts: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files of a result's `c/` that were not kept, by name: at most the answers to the vectors.
+
+    Args:
+        texts: What emission gives.
+
+    Raises:
+        InputError: The marker says another hash, or is damaged.
+    """
+    name = f"vectors_{model.id}.txt"
+    marker = read_marker(folder)
+    known = marker.left_out.get(f"c/{name}") if marker else None
+    if known is None:
+        return {}
+    if hashlib.sha256(texts[name]).hexdigest() != known:
+        raise InputError(str(folder / "model.json"), f"does not give {name} as it was", "a result as written")
+    return {name: texts[name]}
+
+
 def file_entries(
-    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()
+    c_folder: Path,
+    texts: Mapping[str, bytes],
+    edited: Collection[str] = (),
+    left_out: Collection[str] = (),
 ) -> list[VerifiedFile]:
     """One entry for each file that should be there or is.
 
@@ -78,13 +110,19 @@ def file_entries(
         c_folder: The emitted folder.
         texts: What must lie there, by name.
         edited: Names of `EDITABLE` that may differ, but not be missing.
+        left_out: Names of files that were not kept; those that are there nevertheless are compared.
     """
-    return list(_entries(c_folder, texts, edited))
+    return list(_entries(c_folder, texts, edited, left_out))
 
 
-def _entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str]) -> Iterator[VerifiedFile]:
+def _entries(
+    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str], left_out: Collection[str]
+) -> Iterator[VerifiedFile]:
     there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
     for name, data in sorted(texts.items()):
+        if name not in there and name in left_out:
+            yield VerifiedFile(file=name, verdict="left_out", status="pass", mismatches=0)
+            continue
         if name not in there:
             yield VerifiedFile(file=name, verdict="missing", status="fail", mismatches=1)
             continue

@@ -32,10 +32,10 @@ from ..results.verification import (
     WorstError,
 )
 from ..store.marker import check_intact
-from ..tables.emit import emit_texts, expected_answers
+from ..tables.emit import expected_answers
 from ..tables.vectors import Vectors, make_vectors
 from .board import Job, board_entries, log_entries
-from .emitted import EDITABLE, c_hash, file_entries, made_again
+from .emitted import EDITABLE, c_hash, file_entries, left_out_of, made_again, texts_again
 from .exhaustive import visit_all
 from .replay import replay_dataset
 from .signatures import check_signature, load_public_key
@@ -94,17 +94,13 @@ def verify(
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
     job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
-    texts = emit_texts(
-        model,
-        emission,
-        asked=options.numeric is not None,
-        zero_at=options.zero_at_c,
-    )
-    emitted = file_entries(job.c_folder, texts, edited)
+    texts = texts_again(model, options, emission)
+    left_out = left_out_of(folder, model, texts)
+    emitted = file_entries(job.c_folder, texts, edited, left_out)
     signed = check_signature(job.c_folder, key) if key is not None else None
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
-    identity = (model.hash, c_hash(folder / "c"))
+    identity = (model.hash, c_hash(folder / "c", left_out))
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
     if dataset is not None and not barred:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import shutil
 import sqlite3
@@ -10,10 +12,16 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.catalogue import SCHEMA, catalogued
+from gyrotc.fleet.catalogue import SCHEMA, catalogued, export
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import run_fleet
-from gyrotc.store.marker import sha256
+from gyrotc.results.base import read_result
+from gyrotc.results.training import Manifest
+from gyrotc.results.verification import Verification
+from gyrotc.store.files import json_text, write_atomically
+from gyrotc.store.folder import result_folder, share_by_hash
+from gyrotc.store.marker import MARKER, faults, read_marker, sha256
+from gyrotc.verify.job import verify
 from recordings import columns, toml, write_csv
 
 DAYS = ("2026-03-01", "2026-09-01")
@@ -126,3 +134,104 @@ def test_the_command(fleet: Path, gyrotc: Command) -> None:
     assert told.returncode == 0 and "2026-03-01 to 2027-03-01" in told.stdout and "run-01.csv" in told.stdout
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "2030-01-01").returncode == 1
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "soon").returncode == 2
+
+
+_MOST_BYTES = 150_000  # that a gyro adds to a fleet
+IMAGE = "c/gtc_rlg_1.bin"
+ANSWERS = "c/vectors_rlg_1.txt"
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fleet of two gyros of one type."""
+    folder = tmp_path_factory.mktemp("two")
+    for serial in ("RLG-1", "RLG-2"):  # the same rows, so that both have the same arithmetics
+        write_csv(folder / "d" / serial / "run-01.csv", columns(720, seed=1))
+        head = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"'
+        text = toml('file = "run-01.csv"', head=head) + "\n[meta]\ncalibrated_on = 2026-03-01\n"
+        (folder / "d" / serial / "dataset.toml").write_text(text)
+    run_fleet(load_manifest(folder / "d"), folder / "out", jobs=1)
+    return folder / "out"
+
+
+def test_what_all_gyros_have_stands_once_in_a_fleet(two: Path) -> None:
+    for name in ("c/gtc.c", "c/gtc.h"):
+        known = sha256(two / "RLG-1" / name)
+        payload = two / "catalogue" / "payloads" / known[:2] / known
+        assert payload.samefile(two / "RLG-1" / name) and payload.samefile(two / "RLG-2" / name)
+        assert payload.stat().st_mode & 0o222 == 0, "a change of one would be one of all"
+    own = [p.stat().st_size for p in (two / "RLG-1").rglob("*") if p.is_file() and p.stat().st_nlink == 1]
+    assert sum(own) + sum((two / "RLG-1" / n).stat().st_size for n in ("model.json", IMAGE)) <= _MOST_BYTES
+
+
+def test_a_result_that_a_fleet_keeps_in_part_verifies_as_a_whole(two: Path, tmp_path: Path) -> None:
+    assert not (two / "RLG-1" / ANSWERS).exists() and not faults(two / "RLG-1")
+    found = verify(two / "RLG-1", compiled=False)
+    verdicts = {file.file: file.verdict for file in found.emitted}
+    assert verdicts.pop(Path(ANSWERS).name) == "left_out" and set(verdicts.values()) == {"equal"}
+    earlier = read_result(two / "RLG-1" / "verify.json", Verification)
+    assert found.failed == 0 and found.c_hash == earlier.c_hash
+    copy = shutil.copytree(two / "RLG-1", tmp_path / "copy")
+    with result_folder(copy, "verify", entries=("verify.json",)) as stage:
+        write_atomically(stage.folder / "verify.json", json_text(found.content()))
+    assert ANSWERS in read_marker(copy).left_out, "what writes into the folder keeps that"  # type: ignore[union-attr]
+    (copy / "c" / "gtc.h").unlink()
+    spoilt = {file.file: file.status for file in verify(copy, compiled=False).emitted}
+    assert spoilt["gtc.h"] == "fail", "nothing else may be missing"
+    text = (copy / MARKER).read_text()
+    (copy / MARKER).write_text(re.sub(rf'("{ANSWERS}": ")[0-9a-f]{{64}}', rf"\g<1>{'0' * 64}", text))
+    with pytest.raises(InputError, match="as it was"):
+        verify(copy, compiled=False)
+
+
+def test_an_exported_result_is_complete(two: Path, tmp_path: Path, gyrotc: Command) -> None:
+    done = gyrotc("catalogue", two, "--export", "RLG-1", "--on", "2026-04-01", "--out", tmp_path / "RLG-1")
+    assert done.returncode == 0, done.stderr
+    out, kept = tmp_path / "RLG-1", two / "RLG-1"
+    assert not faults(out) and not read_marker(out).left_out  # type: ignore[union-attr]
+    for path in kept.rglob("*"):
+        if path.is_file() and path.name != MARKER:
+            assert (out / path.relative_to(kept)).read_bytes() == path.read_bytes()
+    assert sha256(out / ANSWERS) == read_marker(kept).left_out[ANSWERS]  # type: ignore[union-attr]
+    assert {file.verdict for file in verify(out, compiled=False).emitted} == {"equal"}
+    assert all(path.stat().st_nlink == 1 for path in out.rglob("*") if path.is_file()), "apart from the fleet"
+    manifest = read_result(out / "manifest.json", Manifest)
+    assert all(sha256(out / name) == known for name, known in manifest.files.items())
+    none = gyrotc("catalogue", two, "--export", "RLG-9", "--out", tmp_path / "RLG-9")
+    assert none.returncode == 1 and not (tmp_path / "RLG-9").exists()
+    for wrong in (("--export", "RLG-1"), ("RLG-2", "--export", "RLG-1", "--out", tmp_path / "x")):
+        assert gyrotc("catalogue", two, *wrong).returncode == 2
+
+
+def test_a_result_that_was_replaced_or_changed_is_not_exported(two: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(two, tmp_path / "copy")
+    (copy / "RLG-1" / "evaluate.json").write_text("{}")
+    with pytest.raises(InputError, match="evaluate"):
+        export(copy, "RLG-1", "2026-04-01", tmp_path / "x")
+    shutil.rmtree(copy / "RLG-1")
+    (copy / "RLG-2").rename(copy / "RLG-1")
+    with pytest.raises(InputError, match="another calibration"):
+        export(copy, "RLG-1", "2026-04-01", tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+
+
+def test_without_second_names_every_gyro_has_its_own_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, "no hard links")
+
+    (tmp_path / "gtc.c").write_text("int x;")
+    monkeypatch.setattr(os, "link", refuse)
+    share_by_hash(tmp_path / "store", tmp_path / "gtc.c")
+    assert (tmp_path / "gtc.c").read_text() == "int x;" and len(list((tmp_path / "store").rglob("*"))) == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gtc.c", "store"]
+    monkeypatch.undo()
+    share_by_hash(tmp_path / "store", tmp_path / "gtc.c")
+    [payload] = (path for path in (tmp_path / "store").rglob("*") if path.is_file())
+    assert payload.samefile(tmp_path / "gtc.c")
+    payload.chmod(0o644)
+    payload.write_text("int y;")
+    (tmp_path / "other.c").write_text("int x;")
+    with pytest.raises(InputError, match="what its name says"):
+        share_by_hash(tmp_path / "store", tmp_path / "other.c")

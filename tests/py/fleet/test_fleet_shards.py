@@ -83,7 +83,8 @@ def test_a_share_leaves_its_results_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "d" / "RLG-2" / "run-01.csv").write_text("time_s,rate_dph\n")
     fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
     assert [entry.status for entry in run_share(fleet, out, Share(1, 1), jobs=1)] == ["done", "failed"]
-    assert [path.name for path in out.iterdir()] == ["RLG-1"]
+    assert sorted(path.name for path in out.iterdir()) == ["RLG-1", "catalogue"]
+    assert [path.name for path in (out / "catalogue").iterdir()] == ["payloads"], "of the runtime"
     found = gather(fleet, out)
     assert [(entry.status, entry.kept) for entry in found] == [("done", True), ("unfinished", False)]
     assert "no share" in (found[1].reason or "")
