@@ -116,7 +116,7 @@ def test_what_depends_on_the_machine_is_left_out_and_the_order_of_keys_is_not(tm
 
 
 def test_the_tracked_reference_is_small_and_has_every_set() -> None:
-    assert REFERENCE.stat().st_size < 300_000
+    assert REFERENCE.stat().st_size < 400_000
     reference = Reference(REFERENCE)
     assert all(reference.steps(name) for name in SETS)
 
