@@ -293,9 +293,10 @@ def check(
         )
         if plots is not None:
             from ..pages.check import write_check_page
+            from ..quality.pictures import pictured
 
             say("drawing")
-            write_check_page(plots, dataset, result)
+            write_check_page(plots, result.result(), pictured(dataset, result), str(dataset))
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..common.texts import picture_text
-from ..quality.check import CheckResult, Columned, Compared, Covered, Seen, Strip, pictured
+from ..quality.pictures import Columned, Compared, Covered, Picture, Seen, Strip
 from ..recordings.records import Curve
+from ..results.recordings import Checked
 from ..store.folder import write_result
 from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
 from .report import page_environment
@@ -24,7 +25,7 @@ _NARROW = 0.004  # of the picture's width: spans below it get a mark above
 _MOST_OTHERS = 40  # curves: more are a grey area
 
 
-def picture(shown: Seen | Columned | Compared | Covered) -> str:
+def picture(shown: Picture) -> str:
     """One picture as SVG."""
     with mpl.rc_context(STYLE):
         if isinstance(shown, Seen):
@@ -129,25 +130,24 @@ def _covered(shown: Covered) -> Figure:
 _MOST = 100  # pictures of one page
 
 
-def write_check_page(path: Path, folder: Path, result: CheckResult) -> None:
-    """Writes the page of a check of `folder`.
+def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Picture]], title: str) -> None:
+    """Writes the page of a check.
+
+    Args:
+        pictures: Of each problem, then of each doubt.
+        title: Of a data set whose serial could not be read.
 
     Raises:
-        InputError: There is a file at `path` that gyrotc did not write, or a recording changed meanwhile.
+        InputError: There is a file at `path` that gyrotc did not write.
     """
-    of_problems, of_doubts = pictured(folder, result)
     left = _MOST
     drawn: list[list[str]] = []
-    for pictures in chain(of_problems, of_doubts):
-        drawn.append([picture(one) for one in pictures[: max(left, 0)]])
-        left -= len(pictures)
-    problems = list(
-        zip(result.problems, (result.marks.get(str(p), ()) for p in result.problems), drawn, strict=False)
-    )
+    for shown in pictures:
+        drawn.append([picture(one) for one in shown[: max(left, 0)]])
+        left -= len(shown)
+    problems = list(zip(result.problems, drawn, strict=False))
     doubts = list(zip(result.doubts, drawn[len(problems) :], strict=True))
-    text = (
-        page_environment()
-        .get_template("check.html.j2")
-        .render(result=result, problems=problems, doubts=doubts, folder=str(folder), more=max(-left, 0))
+    page = page_environment().get_template("check.html.j2")
+    write_result(
+        path, page.render(result=result, problems=problems, doubts=doubts, title=title, more=max(-left, 0))
     )
-    write_result(path, text)

@@ -17,7 +17,7 @@ from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average
 from ..common.texts import file_stem, html_environment
-from ..quality.outliers import exclude_text
+from ..recordings.description import exclude_line
 from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
 from ..store.files import write_atomically
@@ -136,7 +136,10 @@ def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], s
     of_file = {
         name: [s for s in stretches if s.file == name] for name in dict.fromkeys(s.file for s in stretches)
     }
-    return [(name, mine, exclude_text(mine)) for name, mine in of_file.items()]
+    return [
+        (name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier"))
+        for name, mine in of_file.items()
+    ]
 
 
 def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
+from ..recordings.description import exclude_line
 from ..recordings.records import Dataset, Exclusion, Rows, Run
 from ..results.diagnosed import Estimate, EventSize, FoundEvent
 from ..target.front_end import samples_per_block
@@ -66,17 +67,12 @@ class Event:
     def result(self) -> FoundEvent:
         """For the result."""
         out = None if self.whole_run else self.leave_out
-        line = (
-            f'exclude = [{{from_s = {out[0]!r}, to_s = {out[1]!r}, reason = "{self.id}"}}]' if out else None
-        )
         time, size = (dict(zip(("value", "low", "high"), x, strict=True)) for x in (self.time_s, self.size))
-        return FoundEvent(
-            id=self.id,
-            file=self.file,
+        return FoundEvent.of_object(
+            self,
             time_s=Estimate(**time),
             size=EventSize(**size, unit=self.unit),
-            text=self.text,
-            exclude=line,
+            exclude=exclude_line([out], self.id) if out else None,
         )
 
 

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..model import Model
+from ..recordings.description import exclude_line
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..target.front_end import samples_per_block
 from .facts import RunFacts, facts_of
 from .orientation import orientation_findings
-from .outliers import departing_rows, exclude_text, stretches_left_out
+from .outliers import departing_rows, stretches_left_out
 from .recorded import (
     coarse_rate_findings,
     contradiction_findings,
@@ -154,10 +155,11 @@ def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[Doub
             f"{f.outlier.time_s:.10g} s: {f.outlier.rate_dph:.4g} deg/h"
         ]
     if stretches:
+        line = exclude_line([(s.from_s, s.to_s) for s in stretches[:_LINES]], "outlier")
         more = f" ({len(stretches) - _LINES} more stretches)" if len(stretches) > _LINES else ""
         texts.append(
             f"{len(wild)} rows in {len(stretches)} stretches are spikes or bursts and do not reach the fit; to leave "
-            f"them out of every figure: {exclude_text(stretches[:_LINES])}{more}"
+            f"them out of every figure: {line}{more}"
         )
     marks = [_mark(run.file, rows, s.from_s, s.to_s) for s in stretches[:_LINES]]
     if f.outlier is not None and not marks:

@@ -24,7 +24,7 @@ from ..results.training import LeftOutRows, Outliers
 if TYPE_CHECKING:
     from ..recordings.records import Rows
 
-__all__ = ["departing", "departing_rows", "exclude_text", "outliers_of", "stretches_left_out"]
+__all__ = ["departing", "departing_rows", "outliers_of", "stretches_left_out"]
 
 _JOINED = 10  # rows between two that make them one stretch
 _LISTED = 200  # stretches; beyond, they are counted only
@@ -59,12 +59,6 @@ def outliers_of(stretches: Sequence[LeftOutRows], kept: float) -> Outliers:
     """
     rows = sum(stretch.rows for stretch in stretches)
     return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))
-
-
-def exclude_text(stretches: Sequence[LeftOutRows]) -> str:
-    """The line of a run's entry in dataset.toml that leaves stretches of its file out of every figure."""
-    each = (f'{{from_s = {s.from_s!r}, to_s = {s.to_s!r}, reason = "outlier"}}' for s in stretches)
-    return f"exclude = [{', '.join(each)}]"
 
 
 T = TypeVar("T", bound=np.generic)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.metrics import LEAST_SPAN_C, median
+from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Mark, Rows, Run, SharedRows
 from .facts import RunFacts
@@ -27,7 +28,6 @@ __all__ = [
     "copied_channel_findings",
     "counter_findings",
     "earth_rate_findings",
-    "exclude_line",
     "finding",
     "jump_findings",
     "outlier_findings",
@@ -209,11 +209,6 @@ _REPEATS = 0.6  # share of rows that repeat the one before: the noise is below a
 _ONE_STEP = 1.5  # a reading that moves by less at a time moves by one step of its resolution
 
 
-def exclude_line(from_s: float, to_s: float, reason: str) -> str:
-    """A line for the run's entry in dataset.toml, ready to paste."""
-    return f'exclude = [{{from_s = {from_s!r}, to_s = {to_s!r}, reason = "{reason}"}}]'
-
-
 def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
     """Rows that several training runs, or several exams, hold, or one run twice: they count twice."""
     for shared in dataset.shared:
@@ -221,7 +216,7 @@ def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
         text = (
             f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} are also rows {shared.other_rows[0]} to "
             f"{shared.other_rows[1]} of {_other(shared)}: {rows} rows count twice. Keep one of them; to leave the "
-            f"former out: {exclude_line(*shared.span_s, f'also in {shared.other_file}')}"
+            f"former out: {exclude_line([shared.span_s], f'also in {shared.other_file}')}"
         )
         yield {"id": "shared_rows", "text": text, "evidence": asdict(shared)}
 
@@ -311,7 +306,7 @@ def stuck_temperature_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     if others < _STUCK_ROWS:
         return
     first, last = float(time[starts[k]]), float(time[starts[k] + length[k] - 1])
-    line = exclude_line(first, last + run.row_period_s, "thermometer stuck")
+    line = exclude_line([(first, last + run.row_period_s)], "thermometer stuck")
     yield {
         "id": "stuck_temperature",
         "text": (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, datetime, time, timezone
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -33,6 +33,7 @@ __all__ = [
     "RunEntry",
     "check_serial",
     "dataset_toml",
+    "exclude_line",
     "parse_description",
 ]
 
@@ -329,3 +330,8 @@ def dataset_toml(
 
 def _pairs(table: Mapping[str, Any]) -> list[str]:
     return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]
+
+
+def exclude_line(spans_s: Iterable[tuple[float, float]], reason: str) -> str:
+    """The line of a run's entry that leaves spans of its file out, from and to in s, ready to paste."""
+    return f"exclude = {toml_value([{'from_s': a, 'to_s': b, 'reason': reason} for a, b in spans_s])}"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from .description import FILE, Problems
+from .description import FILE, Problems, exclude_line
 from .reading import Reader, Recording
 from .records import Run, SharedRows
 from .shared_rows import windows_in_common, windows_that_repeat
@@ -68,8 +68,7 @@ def _turned(shared: SharedRows) -> SharedRows:
 
 def _refused(shared: SharedRows) -> InputError:
     """The exam holds training data."""
-    start, end = shared.span_s
-    line = f'exclude = [{{from_s = {start!r}, to_s = {end!r}, reason = "also in {shared.other_file}"}}]'
+    line = exclude_line([shared.span_s], f"also in {shared.other_file}")
     return InputError(
         f"{shared.file}, rows {shared.rows[0]} to {shared.rows[1]}",
         f"{shared.rows[1] - shared.rows[0] + 1} rows of an exam that are also rows {shared.other_rows[0]} to "

@@ -403,6 +403,7 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
     lines[7] = lines[6]
     (folder / "b.csv").write_text("\n".join(lines))
     from gyrotc.pages.check import write_check_page
+    from gyrotc.quality.pictures import pictured
 
     result = check(folder)
     assert len(result.problems) == 1
@@ -412,15 +413,17 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
         "runs_contradict",
         "earth_rate_not_stated",
     }
-    write_check_page(page, folder, result)
+    write_check_page(page, result.result(), pictured(folder, result), folder.name)
     text = page.read_text("utf-8")
     assert text.count("<svg") == 1 + len(result.doubts)
     assert text.count("<b>Next:</b>") >= 2
     assert "b.csv: row 7" in text
-    write_check_page(page, folder, result)  # its own page is replaced ...
+    write_check_page(
+        page, result.result(), pictured(folder, result), folder.name
+    )  # its own page is replaced ...
     page.write_text("mine")
     with pytest.raises(Exception, match="was not written by gyrotc"):  # ... and nobody else's
-        write_check_page(page, folder, result)
+        write_check_page(page, result.result(), pictured(folder, result), folder.name)
 
 
 def test_rows_and_what_to_do_next_stand_in_the_json(tmp_path: Path) -> None:
