@@ -1,4 +1,4 @@
-"""CSV recordings: fast reading by pyarrow, and a slow look at a file that cannot be read, to say why.
+"""CSV: blocks of whole lines, read fast by pyarrow, and recordings, with a slow look at what cannot be read so.
 
 Read are UTF-8 text with or without byte order mark, LF or CRLF, quotes and spaces around cells, empty lines,
 a last line without end. A last line that was torn off in the middle (a recording that still grows, a logger
@@ -7,11 +7,12 @@ that lost power) is left out.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +25,100 @@ from ..common.inputs import need_memory, open_input, refuse_above
 from .files import Prefix, Source
 from .values import Fault
 
-__all__ = ["CsvFile"]
+__all__ = ["CsvFile", "blocks_of_lines", "parsed"]
 
-_BLOCK_BYTES = 2**20  # of a read: bounds memory
+_BLOCK_BYTES = 2**21  # of a read: bounds memory; its whole lines are parsed at once
 _LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
 _COPIES = 2.0  # of the columns while they are checked
 _IMPORT = "`gyrotc import` reads other forms"
 _NAN = ("nan", "+nan", "-nan")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
+
+
+def blocks_of_lines(
+    path: Path, size: int, name: str, *, first: int = 2, encoding: str = "utf-8"
+) -> Iterator[tuple[bytes, int, float]]:
+    """Blocks of whole lines in UTF-8 with line ends of LF, the number of their first line, and the share read.
+
+    Args:
+        size: Number of bytes that are read.
+        name: Name of the file in messages.
+        first: Number of the first line that is wanted; the header is line 1.
+
+    Raises:
+        InputError: Bytes that the encoding does not know, or a line without end.
+    """
+    decoder = codecs.getincrementaldecoder(encoding)("strict")
+    plain = encoding in ("utf-8", "utf-8-sig", "ascii")
+    rest, number, left = b"", 1, size
+    with Prefix(path, size) as prefix:
+        while block := prefix.read(_BLOCK_BYTES):
+            left -= len(block)
+            try:
+                text = block if plain else decoder.decode(block, final=not left).encode()
+            except UnicodeDecodeError as error:
+                found, place = f"bytes that are no {encoding}", number + rest.count(b"\n")
+                raise InputError(
+                    f"{name}, after line {place}", found, "another --csv encoding=..."
+                ) from error
+            block = _with_lf(rest + text, last=not left)
+            end = len(block) if not left else block.rfind(b"\n") + 1
+            if end == 0 and len(block) > _LONGEST_LINE:
+                raise InputError(f"{name}, line {number}", f"{len(block)} bytes and no end", "lines of cells")
+            lines, rest = block[:end], block[end:]
+            count = lines.count(b"\n")
+            if number < first:
+                skipped = min(first - number, count)
+                lines = lines.split(b"\n", skipped)[skipped] if skipped else lines
+                number += skipped
+                count -= skipped
+            if number >= first and lines.strip():
+                yield lines.removeprefix(codecs.BOM_UTF8), number, 1.0 - left / size
+            number += count
+
+
+def _with_lf(block: bytes, *, last: bool) -> bytes:
+    """Line ends of any kind as LF; a carriage return that ends the block waits for the next one."""
+    if b"\r" not in block:
+        return block
+    if block.endswith(b"\r") and not last:
+        return block[:-1].replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\r"
+    return block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def parsed(
+    lines: bytes,
+    names: Sequence[str],
+    types: Mapping[str, pa.DataType],
+    *,
+    delimiter: str = ",",
+    decimal: str = ".",
+    missing: Sequence[str] = ("",),
+) -> pa.Table:
+    """The columns that have a type, of lines without a header; NaN is a number, null stands for `missing`.
+
+    pyarrow's own streaming reader reads ahead in threads of its own, which outlive a file given up half-way.
+
+    Args:
+        names: Of all columns; they differ.
+
+    Raises:
+        pa.ArrowInvalid: A line has another number of cells, or a cell is no value of its type.
+    """
+    return pacsv.read_csv(
+        pa.BufferReader(lines),
+        pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=list(names)),
+        pacsv.ParseOptions(delimiter=delimiter),
+        pacsv.ConvertOptions(
+            column_types=dict(types),
+            include_columns=list(types),
+            null_values=list(missing),
+            strings_can_be_null=True,
+            decimal_point=decimal,
+            check_utf8=False,
+        ),
+    )
 
 
 class CsvFile(Source):
@@ -58,32 +144,23 @@ class CsvFile(Source):
                 head = io.BytesIO(file.read(min(size, _LONGEST_LINE))).readline()
             self.names = _header(name, head)
             refuse_above("columns", len(self.names), f"{name}, line 1", "columns")
-            self._head = len(head)
             self.size, self.torn = _without_torn_line(path, size, len(head), len(self.names))
             self.keep_as_read()
         except OSError as error:
             raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
 
     def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
-        """As `Source.read`, fast: by pyarrow, a few lines at a time.
-
-        pyarrow's own streaming reader reads ahead in threads of its own, which outlive a file given up half-way.
-        """
+        """As `Source.read`, fast."""
         unique = [f"{index} {name}" for index, name in enumerate(self.names)]
-        options = pacsv.ConvertOptions(
-            column_types=dict.fromkeys(unique, pa.float64()),
-            include_columns=[unique[self.names.index(name)] for name in columns],
-            null_values=[""],  # NaN is a number that is missing, read as such
-        )
-        at_once = pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=unique)
+        wanted = {unique[self.names.index(name)]: pa.float64() for name in columns}
         most = self._most_rows()
         refuse_above("rows", most, self.name, "rows")
         need_memory(_COPIES * 8.0 * most * len(columns), self.name, f"{most} rows of {len(columns)} columns")
         read = {name: np.empty(most) for name in columns}
         at = 0
         try:
-            for lines in self._blocks_of_lines():
-                table = pacsv.read_csv(pa.BufferReader(lines), at_once, convert_options=options)
+            for lines, _, _ in blocks_of_lines(self.path, self.size, self.name):
+                table = parsed(lines, unique, wanted)
                 for column, values in zip(read.values(), table.columns, strict=True):
                     if values.null_count:
                         return None
@@ -102,26 +179,6 @@ class CsvFile(Source):
             while block := prefix.read(_BLOCK_BYTES):
                 ends += block.count(b"\n") + block.count(b"\r")
         return min(ends, self.size // (2 * len(self.names))) + 1
-
-    def _blocks_of_lines(self) -> Iterator[bytes]:
-        """Whole lines below the header, about `_BLOCK_BYTES` at a time.
-
-        Raises:
-            pa.ArrowInvalid: A line is far too long.
-        """
-        with Prefix(self.path, self.size) as prefix:
-            prefix.read(self._head)
-            rest = b""
-            while block := prefix.read(_BLOCK_BYTES):
-                block = rest + block
-                end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
-                if end == 0 and len(block) > _LONGEST_LINE:
-                    raise pa.ArrowInvalid("no line end")
-                if block[:end].strip():
-                    yield block[:end]
-                rest = block[end:]
-            if rest.strip():
-                yield rest
 
     def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
         """As `Source.scan`, line by line."""

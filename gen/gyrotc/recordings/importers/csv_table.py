@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pacsv
 
 from ...common.errors import InputError
+from ..csv_file import blocks_of_lines, parsed
 from .csv_dialect import (
     HEXADECIMAL,
     MISSING,
@@ -26,61 +26,10 @@ from .csv_dialect import (
 )
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
-__all__ = ["CsvTable", "blocks_of", "lines_of", "open_csv"]
-
-_BLOCK_BYTES = 2**23  # of a read: bounds memory; its whole lines are parsed at once
-_LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
+__all__ = ["CsvTable", "open_csv"]
 
 
-def blocks_of(path: Path, dialect: Dialect, size: int) -> Iterator[tuple[bytes, int, float]]:
-    """Blocks of whole lines of rows in UTF-8 with LF, the number of their first line, and the share read.
-
-    Raises:
-        InputError: Bytes that the encoding does not know, or a line without end.
-    """
-    decoder = codecs.getincrementaldecoder(dialect.encoding)("strict")
-    plain = dialect.encoding in ("utf-8", "utf-8-sig", "ascii")
-    rest, number, left = b"", 1, size
-    with path.open("rb") as file:
-        while left:
-            block = file.read(min(_BLOCK_BYTES, left))
-            if not block:
-                break
-            left -= len(block)
-            try:
-                text = block if plain else decoder.decode(block, final=not left).encode()
-            except UnicodeDecodeError as error:
-                found = f"bytes that are no {dialect.encoding}"
-                place = f"{path.name}, after line {number + rest.count(10)}"
-                raise InputError(place, found, "another --csv encoding=...") from error
-            block = _with_lf(rest + text, last=not left)
-            end = len(block) if not left else block.rfind(b"\n") + 1
-            if end == 0 and len(block) > _LONGEST_LINE:
-                raise InputError(
-                    f"{path.name}, line {number}", f"{len(block)} bytes and no end", "lines of cells"
-                )
-            lines, rest = block[:end], block[end:]
-            count = lines.count(b"\n")
-            if number < dialect.data_line:
-                skipped = min(dialect.data_line - number, count)
-                lines = lines.split(b"\n", skipped)[skipped] if skipped else lines
-                number += skipped
-                count -= skipped
-            if number >= dialect.data_line and lines:
-                yield lines.removeprefix(codecs.BOM_UTF8), number, 1.0 - left / size
-            number += count
-
-
-def _with_lf(block: bytes, *, last: bool) -> bytes:
-    """Line ends of any kind as LF; a carriage return that ends the block waits for the next one."""
-    if b"\r" not in block:
-        return block
-    if block.endswith(b"\r") and not last:
-        return block[:-1].replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\r"
-    return block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-
-
-def lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
+def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
     yield from enumerate(lines.decode("utf-8", "replace").split("\n"), start=number)
 
 
@@ -136,7 +85,7 @@ class CsvTable(LoggerTable):
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`: a chunk for each block of lines."""
         first = 0
-        for lines, number, done in blocks_of(self.path, self.dialect, self.size):
+        for lines, number, done in self._blocks():
             rows = self._rows(lines, number, names, last=done >= 1.0)
             if rows is not None and len(next(iter(rows.values()))):
                 yield Chunk(rows, first, done)
@@ -145,13 +94,19 @@ class CsvTable(LoggerTable):
     def place(self, row: int) -> str:
         """Number of the line of a row."""
         at = 0
-        for lines, number, _ in blocks_of(self.path, self.dialect, self.size):
-            for line, text in lines_of(lines, number):
+        for lines, number, _ in self._blocks():
+            for line, text in _lines_of(lines, number):
                 if self._is_row(text):
                     if at == row:
                         return f"line {line}"
                     at += 1
         return f"row {row + 1}"
+
+    def _blocks(self) -> Iterator[tuple[bytes, int, float]]:
+        one = self.dialect
+        return blocks_of_lines(
+            self.path, self.size, self.path.name, first=one.data_line, encoding=one.encoding
+        )
 
     def _is_row(self, text: str) -> bool:
         return bool(text.strip()) and not text.startswith(self.dialect.comment) and not self._is_header(text)
@@ -184,21 +139,13 @@ class CsvTable(LoggerTable):
     def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any]:
         if not lines.strip():
             return {name: np.empty(0) for name in names}
-        every = [column.name for column in self.columns]
-        delimiter = " " if self.dialect.delimiter == "whitespace" else self.dialect.delimiter
-        table = pacsv.read_csv(
-            pa.BufferReader(lines),
-            pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=every),
-            pacsv.ParseOptions(delimiter=delimiter, ignore_empty_lines=True),
-            pacsv.ConvertOptions(
-                column_types={name: self._type(name) for name in names},
-                include_columns=list(names),
-                null_values=list(self.dialect.missing),
-                strings_can_be_null=True,
-                quoted_strings_can_be_null=True,
-                decimal_point=self.dialect.decimal,
-                check_utf8=False,
-            ),
+        table = parsed(
+            lines,
+            [column.name for column in self.columns],
+            {name: self._type(name) for name in names},
+            delimiter=" " if self.dialect.delimiter == "whitespace" else self.dialect.delimiter,
+            decimal=self.dialect.decimal,
+            missing=self.dialect.missing,
         )
         return {name: _values(table.column(name)) for name in names}
 
@@ -219,7 +166,7 @@ class CsvTable(LoggerTable):
         """
         index = {column.name: k for k, column in enumerate(self.columns)}
         cells: dict[str, list[Any]] = {name: [] for name in names}
-        every = list(lines_of(lines, number))
+        every = list(_lines_of(lines, number))
         torn = last and not lines.endswith((b"\n", b"\r"))
         for k, (line, text) in enumerate(every):
             if not self._is_row(text):
