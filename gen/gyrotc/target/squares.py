@@ -48,15 +48,6 @@ class Squares(Protocol):
 
     def unsettled(self, width: Any, low: Numbers, high: Numbers, word: Any) -> Numbers: ...
 
-    def shared_out(self, square: Any, n: int) -> Any: ...
-
-    def share_of(self, a: Any, b: Any) -> Any:
-        """a / (a + b), 0 where both are"""
-
-    def part(self, share: Any, x: Any) -> Any: ...
-
-    def part_of_square(self, share: Any, x: Any) -> Any: ...
-
 
 class _F32:
     def squared(self, x: Numbers) -> Numbers:
@@ -104,18 +95,6 @@ class _F32:
         left = word * ((width + width) - (high - low))
         return np.asarray(np.where(left > 0, left, np.float32(0.0)))
 
-    def shared_out(self, square: Any, n: int) -> Any:
-        return square / np.float32(n)
-
-    def share_of(self, a: Any, b: Any) -> Any:
-        return a / (a + b) if a + b > 0 else np.float32(0.0)
-
-    def part(self, share: Any, x: Any) -> Any:
-        return share * x
-
-    def part_of_square(self, share: Any, x: Any) -> Any:
-        return share * x
-
 
 class _Q31:
     def squared(self, x: Numbers) -> Numbers:
@@ -161,21 +140,6 @@ class _Q31:
     def unsettled(self, width: Any, low: Numbers, high: Numbers, word: Any) -> Numbers:
         left = self.limited(2 * int(width) - (high - low))
         return np.asarray(np.where(left > 0, (left * int(word)) >> 16, 0))
-
-    def shared_out(self, square: Any, n: int) -> Any:
-        return int(square) // n
-
-    def share_of(self, a: Any, b: Any) -> Any:
-        part, whole = int(a), int(a) + int(b)
-        while whole > 0xFFFFFFFF:
-            part, whole = part >> 1, whole >> 1
-        return min((part << 31) // whole, 2**31) if whole else 0
-
-    def part(self, share: Any, x: Any) -> Any:
-        return (int(share) * int(x)) >> 31
-
-    def part_of_square(self, share: Any, x: Any) -> Any:
-        return (int(x) >> 31) * share + (((int(x) & 0x7FFFFFFF) * share) >> 31)
 
 
 SQUARES: dict[str, Squares] = {"f32": _F32(), "q31": _Q31()}
