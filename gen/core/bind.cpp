@@ -1,11 +1,13 @@
 // bind.cpp - the Python face of the C++ core: arrays in, arrays out. Types in gyrotc/_core.pyi.
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "evidence.hpp"
 #include "equal_gaussians.hpp"
+#include "fingerprints.hpp"
 #include "kohonen.hpp"
 #include "ols.hpp"
 #include "varpro.hpp"
@@ -36,6 +38,16 @@ Samples samples(VectorXd t, VectorXd r, VectorXd y, VectorXd weight) {
 VariableProjection projection(VectorXd t, VectorXd r, VectorXd weight, VectorXd target, double ridge) {
     same_length({t.size(), r.size(), weight.size(), target.size()});
     return VariableProjection({std::move(t), std::move(r), std::move(weight), std::move(target)}, ridge);
+}
+
+using Column = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// The numbers as an array that owns them.
+template <typename T>
+nb::ndarray<nb::numpy, T, nb::ndim<1>> array_of(std::vector<T> numbers) {
+    auto *kept = new std::vector<T>(std::move(numbers));
+    const nb::capsule owner(kept, [](void *p) noexcept { delete static_cast<std::vector<T> *>(p); });
+    return {kept->data(), {kept->size()}, owner};
 }
 
 }  // namespace
@@ -160,4 +172,22 @@ NB_MODULE(_core, m) {
         "in_order"_a = false);
     m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
     m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);
+    m.def(
+        "windows_of",
+        [](const Column &temperature, const std::vector<Column> &rates, std::vector<std::size_t> lengths, std::uint64_t mask,
+           double bits, std::size_t own) {
+            std::vector<const double *> columns;
+            for (const Column &rate : rates) {
+                same_length({static_cast<Eigen::Index>(temperature.size()), static_cast<Eigen::Index>(rate.size())});
+                columns.push_back(rate.data());
+            }
+            Windows found;
+            {
+                const nb::gil_scoped_release released;
+                found = windows_of(temperature.data(), columns, temperature.size(), {std::move(lengths), mask, bits, own});
+            }
+            return std::make_tuple(array_of(std::move(found.hash)), array_of(std::move(found.first)),
+                                   array_of(std::move(found.last)));
+        },
+        "temperature_c"_a, "rates"_a, "lengths"_a, "mask"_a, "bits"_a, "own"_a);
 }

@@ -1,5 +1,7 @@
 """Types of the C++ core (gen/core/bind.cpp). Arrays are float64; lengths that differ raise ValueError."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -125,3 +127,12 @@ def select_columns(
 ) -> OlsPath: ...
 def errors_along(path: OlsPath, dictionary: EqualGaussians, samples: Samples) -> _Floats: ...
 def least_squares(samples: Samples, gaussians: _Floats, ridge: float) -> _Floats: ...
+def windows_of(
+    temperature_c: _Floats,
+    rates: Sequence[_Floats],
+    lengths: Sequence[int],
+    mask: int,
+    bits: float,
+    own: int,
+) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
+    """Hash, first and last row of the windows that are kept; arrays must be contiguous."""

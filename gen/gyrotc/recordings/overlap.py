@@ -13,7 +13,7 @@ from ..common.errors import InputError
 from .description import FILE, Problems, exclude_line
 from .reading import Reader, Recording
 from .records import Run, SharedRows
-from .shared_rows import windows_in_common, windows_that_repeat
+from .shared_rows import windows_in_common
 
 __all__ = ["shared_rows"]
 
@@ -42,15 +42,13 @@ def shared_rows(
     """
     found: list[SharedRows] = []
     prints = [recordings[run.file].fingerprints.within(run) for run in runs]
-    for j, other in enumerate(runs):
-        for i, one in enumerate(runs[: j + 1]):
-            windows = windows_that_repeat(prints[j]) if i == j else windows_in_common(prints[j], prints[i])
-            for shared in _stretches(other, one, windows) if len(windows) else ():
-                if one.role == other.role:
-                    found.append(shared)
-                else:
-                    of_exam = shared if other.role == "exam" else _turned(shared)
-                    problems.add(_refused(of_exam), *of_exam.marks)
+    for (j, i), windows in windows_in_common(prints).items():
+        for shared in _stretches(runs[j], runs[i], windows):
+            if runs[i].role == runs[j].role:
+                found.append(shared)
+            else:
+                of_exam = shared if runs[j].role == "exam" else _turned(shared)
+                problems.add(_refused(of_exam), *of_exam.marks)
     return tuple(found)
 
 

@@ -11,12 +11,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.fleet.outliers import copies
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
-from gyrotc.recordings.shared_rows import (
-    _occurrences,
-    fingerprints_of,
-    windows_in_common,
-    windows_that_repeat,
-)
+from gyrotc.recordings.shared_rows import fingerprints_of, windows_in_common
 from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
@@ -76,7 +71,7 @@ def alike(rate: Callable[[np.random.Generator], Floats], n: int = 60_000) -> int
     t = np.arange(n) * 1.0
     temperature = np.round(20.0 + 30.0 * np.sin(t / 9000.0), 1)
     one, two = (fingerprints_of(t, temperature, [rate(np.random.default_rng(k))]) for k in (1, 2))
-    return len(windows_in_common(one, two)) + len(windows_that_repeat(one))
+    return sum(map(len, windows_in_common([one, two]).values()))
 
 
 INNOCENT: dict[str, Callable[[np.random.Generator, int], Floats]] = {
@@ -105,9 +100,31 @@ def test_a_shared_stretch_is_found_also_where_the_rate_is_coarse(step: float) ->
     second[7000:10_000] = first[1000:4000]
     coarse = [np.round(r / step) if step else r for r in (first, second)]
     one, two = (fingerprints_of(t, np.full(n, 20.0), [r]) for r in coarse)
-    found = windows_in_common(one, two)
-    assert len(found)
-    assert {b - a for a, b, _ in found} == {6000}
+    found = windows_in_common([two, one])
+    assert list(found) == [(1, 0)]
+    assert {b - a for a, b, _ in found[1, 0]} == {6000}
+
+
+def test_every_pair_of_runs_and_a_run_with_itself_is_looked_at() -> None:
+    g, n = np.random.default_rng(6), 3000
+    t, own = np.arange(n) * 1.0, [g.normal(size=n) for _ in range(4)]
+    own[3][:1000] = own[1][2000:]  # runs 1 and 3
+    own[2][1500:] = own[2][:1500]  # run 2 with itself
+    found = windows_in_common([fingerprints_of(t, np.full(n, 20.0), [r]) for r in own])
+    assert {pair: {b - a for a, b, _ in windows} for pair, windows in found.items()} == {
+        (2, 2): {-1500},
+        (3, 1): {2000},
+    }
+    assert windows_in_common([]) == {}
+
+
+def test_long_recordings_keep_fewer_windows_and_still_show_a_copy() -> None:
+    g, n = np.random.default_rng(7), 2**21 + 1000
+    one, two = g.normal(size=n), g.normal(size=20_000)
+    two[4000:8000] = one[-5000:-1000]
+    prints = [fingerprints_of(np.arange(len(r)) * 1.0, np.full(len(r), 20.0), [r]) for r in (one, two)]
+    assert len(prints[0].hash) < 2**17.2
+    assert {b - a for a, b, _ in windows_in_common(prints)[1, 0]} == {n - 9000}
 
 
 def test_a_copy_under_another_serial_is_named() -> None:
@@ -127,9 +144,3 @@ def test_values_beyond_float32_are_no_trouble() -> None:
     time = np.arange(2048.0)
     wild = np.full(2048, 1e276)
     fingerprints_of(time, wild, [wild])
-
-
-def test_occurrences_start_from_none_each_time() -> None:
-    for _ in range(2):
-        found = _occurrences(np.array([7, 3, 7, 2**20 - 1, 7]))
-        np.testing.assert_array_equal(found, [3.0, 1.0, 3.0, 1.0, 3.0])
