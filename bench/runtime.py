@@ -23,7 +23,7 @@ from gyrotc.target.history import answers
 from gyrotc.target.maps import evaluate_map
 from gyrotc.target.table import Table
 from gyrotc.verify.board import Job, board_entries
-from gyrotc.verify.exhaustive import visit_all
+from gyrotc.verify.job import visit_all
 from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compiler_version, symbols
 from numpy.typing import NDArray
 from results import table

@@ -140,8 +140,7 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
 
 def format_page() -> str:
     """docs/FORMAT.md with the tables of fields."""
-    from gyrotc.cli.schemas import KINDS
-    from gyrotc.results.describe import tables
+    from gyrotc.cli.schemas import KINDS, tables
 
     def table(place: re.Match[str]) -> str:
         other = TOLD_BY.get(place[1])

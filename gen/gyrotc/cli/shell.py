@@ -24,8 +24,7 @@ def schema(
 
     Example: gyrotc schema limits
     """
-    from ..results.describe import schema_text, tables
-    from .schemas import KINDS
+    from .schemas import KINDS, schema_text, tables
 
     if name is not None and name not in KINDS:
         raise InputError("schema", repr(name), ", ".join(KINDS))

@@ -13,10 +13,9 @@ from ..model import Model, load_model
 from ..store.files import check_replaceable, json_text, write_atomically
 from ..store.marker import check_intact
 from ..tables.record import RECORD, read_options
-from .asam import a2l_text, cdf_text
 from .autopilots import AXES, Autopilot, best_cubic, parameters
 from .fmu import fmu
-from .grid import GRID, MapGrid, csv_text, grid_of, map_result
+from .grid import GRID, MapGrid, a2l_text, cdf_text, csv_text, grid_of, map_result
 
 __all__ = ["Exporting", "Format", "export"]
 

@@ -21,8 +21,7 @@ from ..common.errors import InputError
 from ..model import Model
 from ..results.lot import Lot
 from ..results.planned import ChamberStep, LotPlan, LotProgramme, NextRun, ProposedRun
-from ..simulate import chamber
-from ..simulate.instrument import thermal_network
+from ..simulate.instrument import chamber_air, thermal_network
 from ..simulate.profile import corners
 from ..simulate.scenario import Scenario, read
 from .basis import CONSTANT, PRIOR_LOG, LotBasis
@@ -189,7 +188,7 @@ def inputs_of(
     corner_min, corner_c = _corners(start_c, steps)
     time_s = np.arange(0.0, 60.0 * corner_min[-1], _GRID_S)
     programmed = np.interp(time_s, 60.0 * np.array(corner_min), corner_c)
-    air = chamber.air(plan.chamber, programmed, _GRID_S, np.random.default_rng(0))
+    air = chamber_air(plan.chamber, programmed, _GRID_S, np.random.default_rng(0))
     network = thermal_network(plan.gyro)
     nodes = network.respond(air, np.ones(len(time_s)), _GRID_S)
     t = nodes[network.names.index(plan.sensor.node)]

@@ -39,8 +39,7 @@ from ..results.planned import (
     TriedRun,
 )
 from ..simulate.campaign import Noise
-from .programme import node_temperatures, programme_of
-from .sensitivity import Row, Sensitivity, additions, separability
+from .sensitivity import Row, Sensitivity, additions, node_temperatures, programme_of, separability
 
 __all__ = ["FoundProfile", "Place", "places", "plan", "shortest"]
 

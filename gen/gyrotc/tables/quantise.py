@@ -31,7 +31,7 @@ from ..model import Model
 from ..target.f32 import FUSIBLE
 from ..target.maps import evaluate_map
 from ..target.recursions import TableKind
-from ..target.squares import RULES
+from ..target.sigma import RULES
 from ..target.table import ARRAYS, Numeric, Table, Words
 from . import f32, q31
 from .error_bounds import channel_error_dph, with_authority

@@ -34,8 +34,8 @@ from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
 from ..target.arithmetic import F32
-from ..target.channels import channel_at
 from ..target.front_end import with_missing
+from ..target.history import channel_at
 from ..target.recursions import CourseChannel, TableKind
 from ..target.samples import Guarded
 from .data import Scaling, TrainingData, scaling_of

@@ -13,8 +13,7 @@ from conftest import Command, invoked
 from gyrotc.cli.plan import limits_of, pair_of
 from gyrotc.common.errors import InputError
 from gyrotc.plan.plan import plan, shortest
-from gyrotc.plan.programme import programme_of
-from gyrotc.plan.sensitivity import Sensitivity
+from gyrotc.plan.sensitivity import Sensitivity, programme_of
 
 
 @pytest.fixture(scope="module")

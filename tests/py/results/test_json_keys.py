@@ -14,11 +14,10 @@ import pytest
 from conftest import Command
 from gyrotc import results
 from gyrotc.cli.commands import app
-from gyrotc.cli.schemas import KINDS
+from gyrotc.cli.schemas import KINDS, tables
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.results.base import Numbered, checked_result
-from gyrotc.results.describe import tables
 from gyrotc.results.evaluation import Apart, At
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.folder import Marker

@@ -15,10 +15,9 @@ from gyrotc.causes import CATALOGUE
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.simulate import noise
-from gyrotc.simulate.campaign import NOISE, campaign, gyro_map, simulate
+from gyrotc.simulate.campaign import NOISE, RowLength, campaign, gyro_map, rows, simulate
 from gyrotc.simulate.instrument import SimulatedRecord
 from gyrotc.simulate.noise import CELL_S, cell_noise
-from gyrotc.simulate.recording import RowLength, rows
 from gyrotc.simulate.scenario import NoiseLevels, names, read
 from gyrotc.simulate.truth import read_truth, simulated_floor
 from numpy.typing import NDArray

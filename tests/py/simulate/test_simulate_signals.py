@@ -11,11 +11,10 @@ import pytest
 from conftest import invoked
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
-from gyrotc.simulate import chamber, profile
+from gyrotc.simulate import profile
 from gyrotc.simulate.campaign import campaign, simulate
-from gyrotc.simulate.chamber import ThermalNetwork
 from gyrotc.simulate.gyro import laser_bias, laser_readings, laser_states, thermometer_readings
-from gyrotc.simulate.instrument import thermal_network
+from gyrotc.simulate.instrument import ThermalNetwork, chamber_air, thermal_network
 from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
 from gyrotc.simulate.scenario import Chamber, Gyro, Laser, Scenario, Thermometer, read
 from gyrotc.simulate.truth import read_truth
@@ -327,7 +326,7 @@ def test_an_unknown_step_is_refused_with_the_known_ones() -> None:
 
 
 def follow(settings: Chamber, programmed: Array, seed: int = 0) -> Array:
-    return chamber.air(settings, programmed, 1.0, np.random.default_rng(seed))
+    return chamber_air(settings, programmed, 1.0, np.random.default_rng(seed))
 
 
 QUIET = Chamber(ripple_c=0.0, setpoint_sigma_c=0.0)
