@@ -9,8 +9,8 @@ row can do to a mean is bounded: Hampel's rejection, see Rousseeuw and Croux, J.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -61,10 +61,9 @@ def outliers_of(stretches: Sequence[LeftOutRows], kept: float) -> Outliers:
     return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))
 
 
-T = TypeVar("T", bound=np.generic)
-
 _SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
 _AROUND = 5  # blocks of a running median
+_PART = 2**18  # rows that are looked at together: bounds memory
 _GROUP = 200  # rows, at least, of one scale
 _GROUP_BLOCKS = 10  # blocks, at least, of one scale: the same where rows are few to a block
 _BURST = 0.1  # share of departing rows from which a block is left out whole
@@ -86,24 +85,42 @@ def departing(rate: FloatArray, rows_per_block: int) -> BoolArray:
     """Which rows of a rate (finite, in order of time, shape (n,)) are spikes or parts of bursts."""
     n = min(rows_per_block, max(len(rate) // (2 * _AROUND), 1))
     whole = len(rate) // n * n
+    wild = np.zeros(len(rate), dtype=bool)
     if whole < _AROUND * n or len(rate) < 2 * _AROUND:
-        return np.zeros(len(rate), dtype=bool)
-    blocks = rate[:whole].reshape(-1, n)
-    level = _running(np.median(blocks, axis=1))
+        return wild
+    level = _running(_medians(lambda a, b: rate[a:b], whole, n))
     slack = _SLACK * _largest_around(np.abs(np.gradient(level)))
-    rest = np.abs(rate - _spread(level, n, len(rate)))
-    limit = _SIGMAS * _scale(rate, rest, n) + _spread(slack, n, len(rate))
-    wild = rest > limit
-    if not wild.any():
-        return np.asarray(wild)
-    alone = _beyond_neighbours(rate) > limit
-    if n < _FEW:
-        return np.asarray(wild & alone)
-    ends = 2 * n  # a level that only one side shows: the start of a warm-up is no burst
-    wild[:ends] &= alone[:ends]
-    wild[-ends:] &= alone[-ends:]
-    share = wild[:whole].reshape(-1, n).mean(axis=1)
-    return np.asarray(wild | _spread((share > _BURST) & (n >= _BURST_ROWS), n, len(rate)))
+    sigma, group = _scale(rate, level, n)
+
+    def limit(rows: NDArray[np.int64]) -> FloatArray:
+        return np.asarray(_SIGMAS * _of_rows(sigma, group, rows) + _of_rows(slack, n, rows))
+
+    for a in range(0, len(rate), _PART):
+        part = rate[a : a + _PART]
+        rows = np.arange(a, a + len(part))
+        wild[a : a + len(part)] = np.abs(part - _of_rows(level, n, rows)) > limit(rows)
+    at = np.flatnonzero(wild)
+    # With few rows to a block, and where only one side shows the level: the start of a warm-up is no burst
+    alone = at if n < _FEW else at[(at < 2 * n) | (at >= len(rate) - 2 * n)]
+    wild[alone] = _beyond_neighbours(rate, alone) > limit(alone)
+    if n < _BURST_ROWS or len(at) == 0:
+        return wild
+    bursts = np.flatnonzero(wild[:whole].reshape(-1, n).mean(axis=1) > _BURST)
+    for k in bursts.tolist():
+        wild[k * n : len(rate) if (k + 1) * n == whole else (k + 1) * n] = True
+    return wild
+
+
+def _medians(values: Callable[[int, int], FloatArray], rows: int, n: int) -> FloatArray:
+    """Medians of every n of so many rows, whose values from a row to another are given."""
+    step = n * max(1, _PART // n)
+    parts = (values(a, min(a + step, rows)).reshape(-1, n) for a in range(0, rows, step))
+    return np.concatenate([np.median(part, axis=1) for part in parts])
+
+
+def _of_rows(of_blocks: FloatArray, n: int, rows: NDArray[np.int64]) -> FloatArray:
+    """The value of each row's block of n; rows behind the last whole block have its value."""
+    return np.asarray(of_blocks[np.minimum(rows // n, len(of_blocks) - 1)])
 
 
 def _running(values: FloatArray) -> FloatArray:
@@ -121,29 +138,33 @@ def _largest_around(values: FloatArray) -> FloatArray:
     return np.asarray(windows.max(axis=1))
 
 
-def _spread(of_blocks: NDArray[T], n: int, rows: int) -> NDArray[T]:
-    """A value for each block as one for each row; rows behind the last whole block have its value."""
-    each = np.repeat(of_blocks, n)
-    return np.concatenate([each, np.repeat(of_blocks[-1:], rows - len(each))]) if rows > len(each) else each
+def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int]:
+    """Standard deviation of a row about the level, for every so many rows; never far below that of the whole."""
 
+    def steps(a: int, b: int) -> FloatArray:
+        return np.abs(np.diff(rate[max(a - 1, 0) : b], prepend=rate[:1] if a == 0 else np.zeros(0)))
 
-def _scale(rate: FloatArray, rest: FloatArray, n: int) -> FloatArray:
-    """Standard deviation of a row about the level, for each row; robust, and never far below that of the whole."""
-    step = np.abs(np.diff(rate, prepend=rate[:1]))
-    moved = step[step > 0.0]
-    if len(moved) == 0:
-        return np.full(len(rate), np.inf)
-    least = MAD_TO_SIGMA * median(moved) / np.sqrt(2.0)
+    def rest(a: int, b: int) -> FloatArray:
+        return np.abs(rate[a:b] - _of_rows(level, n, np.arange(a, b)))
+
+    moved, count = np.empty(len(rate)), 0
+    for a in range(0, len(rate), _PART):
+        part = steps(a, min(a + _PART, len(rate)))
+        part = part[part > 0.0]
+        moved[count : count + len(part)] = part
+        count += len(part)
     group = min(max(_GROUP, _GROUP_BLOCKS * n), len(rate))
     whole = len(rate) // group * group
-    of_steps = np.median(step[:whole].reshape(-1, group), axis=1) / np.sqrt(2.0)
-    of_rest = np.median(rest[:whole].reshape(-1, group), axis=1)
-    sigma = np.maximum(MAD_TO_SIGMA * _running(np.maximum(of_steps, of_rest)), 0.5 * least)
-    return np.asarray(_spread(sigma, group, len(rate)), dtype=np.float64)
+    if count == 0:
+        return np.full(whole // group, np.inf), group
+    least = MAD_TO_SIGMA * median(moved[:count], overwrite_input=True) / np.sqrt(2.0)
+    of_steps = _medians(steps, whole, group) / np.sqrt(2.0)
+    sigma = MAD_TO_SIGMA * _running(np.maximum(of_steps, _medians(rest, whole, group)))
+    return np.maximum(sigma, 0.5 * least), group
 
 
-def _beyond_neighbours(rate: FloatArray) -> FloatArray:
-    """How far each row lies outside the range of the two rows before and the two after."""
-    padded = np.pad(rate, 2, mode="reflect")
-    around = np.delete(sliding_window_view(padded, 5), 2, axis=1)
-    return np.asarray(np.abs(rate - np.clip(rate, around.min(axis=1), around.max(axis=1))))
+def _beyond_neighbours(rate: FloatArray, at: NDArray[np.int64]) -> FloatArray:
+    """How far these rows lie outside the range of the two rows before and the two after, mirrored at the ends."""
+    around = np.abs(at[:, None] + np.array([-2, -1, 1, 2]))
+    near = rate[np.minimum(around, 2 * (len(rate) - 1) - around)]
+    return np.asarray(np.abs(rate[at] - np.clip(rate[at], near.min(axis=1), near.max(axis=1))))

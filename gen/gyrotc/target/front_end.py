@@ -86,7 +86,7 @@ class Steps:
             temperature = np.clip(temperature, -_LARGEST, _LARGEST)
         return replace(self, temperature=temperature)
 
-    def in_force(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
+    def in_force(self, samples: NDArray[np.integer]) -> NDArray[np.int64]:
         """Index of the correction in force at each of the ascending `samples`; -1 before the first."""
         first = np.searchsorted(samples, self.at, side="left")
         count = np.bincount(first, minlength=samples.size + 1)[: samples.size]
@@ -100,25 +100,28 @@ def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.i
     n = settings.samples_per_block
     most = settings.longest_blocks + 2
     many = np.flatnonzero(missed >= (most + 1) * n)
-    shortened = missed.copy() if many.size else missed
+    if many.size == 0:
+        return missed
+    shortened = missed.copy()
     shortened[many] -= (missed[many] // n - most) * n
-    return shortened
+    return np.asarray(shortened)
 
 
-def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.int64]:
+def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.integer]:
     """Number of each row's sample where `missed` samples come before the row.
 
     Raises:
         InputError: Rows and gaps together are more samples than memory is granted for.
     """
     need_memory(_SAMPLE_BYTES * float(missed.size + missed.sum()), where, "its rows and gaps as samples")
-    position = np.arange(missed.size)
-    if missed.any():
-        position += np.cumsum(missed)
+    samples = missed.size + int(missed.sum())
+    position = np.arange(missed.size, dtype=np.int32 if samples < 2**31 else np.int64)
+    if samples > missed.size:
+        position += np.cumsum(missed, dtype=position.dtype)
     return position
 
 
-def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.int64]) -> Numbers:
+def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.integer]) -> Numbers:
     """Samples at their positions, missing ones between them."""
     n = int(position[-1]) + 1 if position.size else 0
     if n == x.size:
@@ -227,7 +230,9 @@ def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
     n = settings.samples_per_block
     used = _used(verdict, n)
     blocks = max(1, -(-verdict.size // n))
-    valid = 2 * np.bincount(np.flatnonzero(used) // n, minlength=blocks) >= n
+    whole = used.size // n * n
+    count = np.count_nonzero(used[:whole].reshape(-1, n), axis=1)
+    valid = 2 * np.append(count, np.count_nonzero(used[whole:]))[:blocks] >= n
     restarted = np.zeros(blocks, dtype=np.bool_)
     restarted[np.flatnonzero(verdict == RESTART) // n] = True
     fallback = np.zeros(blocks, dtype=np.bool_)
@@ -308,7 +313,7 @@ class Stream:
     """
 
     samples: Numbers
-    position: NDArray[np.int64]
+    position: NDArray[np.integer]
     missed: NDArray[np.int64]
     dropped: NDArray[np.int64]
 
@@ -328,7 +333,9 @@ class Stream:
         shortened = expand_missed(missed, settings)
         position = positions(shortened, where)
         samples = with_missing(arithmetic, temperature, position)
-        dropped = (missed - shortened) // settings.samples_per_block
+        dropped = np.broadcast_to(np.int64(0), missed.shape)  # takes no memory
+        if shortened is not missed:
+            dropped = (missed - shortened) // settings.samples_per_block
         return Stream(samples, position, shortened, dropped)
 
     def course(self, steps: Steps, samples_per_block: int, blocks_before: int = 0) -> Course:

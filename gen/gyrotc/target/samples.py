@@ -18,6 +18,7 @@ from .arithmetic import Arithmetic, Numbers
 __all__ = ["BELIEVED", "HELD", "RESTART", "Guarded", "believe"]
 
 HELD, BELIEVED, RESTART = 0, 1, 2  # any three numbers
+_PART = 2**18  # readings that are looked at together: bounds memory
 _LONGEST_US = 2**32 - 1  # that the target counts
 
 
@@ -93,10 +94,10 @@ def _events(
 ) -> NDArray[np.intp]:
     """Readings that are not believed just because their predecessor is."""
     regular = np.zeros(x.size, dtype=np.bool_)
-    if x.size > 1:
-        pair = sound[1:] & sound[:-1]
+    for a in range(1, x.size, _PART):
+        now, before = slice(a, a + _PART), slice(a - 1, min(a + _PART, x.size) - 1)
         with np.errstate(invalid="ignore", over="ignore"):
-            regular[1:] = pair & arithmetic.is_near(x[1:], x[:-1], near)
+            regular[now] = sound[now] & sound[before] & arithmetic.is_near(x[now], x[before], near)
     regular[list(lost)] = False
     return np.flatnonzero(~regular)
 
@@ -107,13 +108,15 @@ def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -
     with np.errstate(invalid="ignore"):
         sound = there & (x >= guard.low) & (x <= guard.high) if not guard.takes_edge else there.copy()
     if guard.stuck_us:
-        received = np.flatnonzero(there)
-        bits = x[received].view(f"u{x.itemsize}")
-        index = np.arange(received.size)
-        fresh = np.ones(received.size, dtype=np.bool_)
-        fresh[1:] = bits[1:] != bits[:-1]
-        repeats = index - np.maximum.accumulate(np.where(fresh, index, 0))
-        sound[received[repeats * period_us >= guard.stuck_us]] = False
+        bits = (x if there.all() else x[there]).view(f"u{x.itemsize}")
+        repeats = np.zeros(bits.size + 1, dtype=np.bool_)
+        np.equal(bits[1:], bits[:-1], out=repeats[1:-1])
+        first, end = (np.flatnonzero(repeats[1:] != repeats[:-1]) + 1).reshape(-1, 2).T
+        most = -(-guard.stuck_us // period_us)  # readings that repeat one until it counts as stuck
+        stuck = np.flatnonzero(end - first >= most)
+        received = np.flatnonzero(there) if len(stuck) else first
+        for k in stuck.tolist():
+            sound[received[first[k] + most - 1 : end[k]]] = False
     return np.asarray(sound)
 
 

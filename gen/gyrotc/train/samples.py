@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks"]
 
 PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
+_PART = 2**18  # rows that are looked at together: bounds memory
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
 
@@ -73,6 +74,8 @@ def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[n
     gaps = np.diff(time_s)
     gaps /= row_period_s
     late = np.flatnonzero(gaps > _GAP)
+    if len(late) == 0:
+        return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
     missed = np.zeros(time_s.size, dtype=np.int64)
     missed[late + 1] = np.minimum(np.rint(gaps[late]) - 1.0, _MAX_MISSED).astype(np.int64)
     return missed
@@ -138,9 +141,11 @@ def run_blocks(
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)
     temperature, slope, status = _in_force(steps, k)
-    rate, count, left_out = _mean_rate(rows, run, stream.position // n, n_blocks, n)
+    starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size).astype(stream.position.dtype)
+    first_row = np.searchsorted(stream.position, starts)
+    rate, count, left_out = _mean_rate(rows, run, first_row, n)
     return Blocks(
-        start_s=np.interp(np.arange(n_blocks) * n, stream.position, rows.time_s) if n_blocks else np.empty(0),
+        start_s=_time_of(starts[:-1], stream.position, rows.time_s),
         valid=steps.valid,
         temperature_c=temperature,
         slope_c=slope,
@@ -181,18 +186,38 @@ def _in_force(
     return temperature, slope, status
 
 
+def _time_of(
+    samples: NDArray[np.integer], position: NDArray[np.integer], time_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Times of samples, shape (k,), between the rows beside them, whose samples are given."""
+    if len(time_s) == 0:
+        return np.empty(0)
+    after = np.minimum(np.searchsorted(position, samples), len(position) - 1)
+    near = np.unique(np.r_[np.maximum(after - 1, 0), after])
+    return np.asarray(np.interp(samples, position[near], time_s[near]))
+
+
 def _mean_rate(
-    rows: Rows, run: Run, block: NDArray[np.int64], n_blocks: int, rows_per_block: int
+    rows: Rows, run: Run, first_row: NDArray[np.int64], rows_per_block: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Mean measured rate and number of rows in the span, for each block, and the rows that were left out."""
+    """Mean measured rate and number of rows in the span, for each block, and the rows that were left out.
+
+    Args:
+        first_row: Of each block, and that behind the last block's; shape (blocks + 1,).
+    """
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
     left_out = departing_rows(rows, run, rows_per_block)
     counted[left_out] = False
-    rate = rows.rate_dph
-    if not counted.all():
-        block, rate = block[counted], rate[counted]
-    count = np.bincount(block, minlength=n_blocks)
-    total = np.bincount(block, weights=rate, minlength=n_blocks)
+    n_blocks, together = len(first_row) - 1, max(1, _PART // rows_per_block)
+    count, total = np.zeros(n_blocks), np.zeros(n_blocks)
+    for start in range(0, n_blocks, together):
+        of_blocks = first_row[start : start + together + 1]
+        part = slice(of_blocks[0], of_blocks[-1])
+        block = np.repeat(np.arange(len(of_blocks) - 1), np.diff(of_blocks))
+        here, blocks = counted[part], slice(start, start + len(of_blocks) - 1)
+        rate = np.where(here, rows.rate_dph[part], 0.0)
+        count[blocks] = np.bincount(block, weights=here, minlength=len(of_blocks) - 1)
+        total[blocks] = np.bincount(block, weights=rate, minlength=len(of_blocks) - 1)
     with np.errstate(invalid="ignore"):
         mean = total / count
     return mean, count.astype(np.int64), left_out

@@ -82,7 +82,7 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
         if before > _MOST_MISSED:
             found = f"power-on {before * run.row_period_s:.4g} s before the first row"
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
-        missed[0] = before
+        missed = np.append(before, missed[1:])
     answers = replay(table, channels, missed=missed, samples_per_block=per_block)
     return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
 
