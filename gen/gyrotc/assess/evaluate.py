@@ -239,6 +239,7 @@ def evaluate(
     numeric: str | None = None,
     average_s: float | None = None,
     trace: Path | None = None,
+    trace_rows: int | None = None,
     training: Training | None = None,
     compiled: bool = True,
     trust_code: bool = False,
@@ -251,6 +252,7 @@ def evaluate(
         numeric: Arithmetic to run; default the first emitted one.
         average_s: Averaging of all RMS figures; default the model's.
         trace: Folder for one CSV per run.
+        trace_rows: Most rows of it: a longer run's are means of as few rows as that takes; None: every row.
         training: What `training.json` says; default that of `folder`, where it was made from these
             recordings. Without an exam run its figures of spans left out count.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
@@ -275,7 +277,16 @@ def evaluate(
             if progress:
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")
             parts.append(
-                _one_run(run, model, table, program, average_s=window, trace=trace, all_runs=dataset.runs)
+                _one_run(
+                    run,
+                    model,
+                    table,
+                    program,
+                    average_s=window,
+                    trace=trace,
+                    trace_rows=trace_rows,
+                    all_runs=dataset.runs,
+                )
             )
             if watch:
                 watch(run, parts[-1].averages)
@@ -370,6 +381,7 @@ def _one_run(
     *,
     average_s: float,
     trace: Path | None,
+    trace_rows: int | None,
     all_runs: Sequence[Run],
 ) -> _Part:
     rows = run.rows()
@@ -385,7 +397,8 @@ def _one_run(
         average_s=average_s,
     )
     if trace is not None:
-        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span)
+        each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
+        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span, each)
     plain = (replayed.status[span] == 0) & replayed.scored[span]
     squares = squares_of(None if replayed.sigma_dph is None else replayed.sigma_dph[span][plain])
     return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares)
@@ -400,19 +413,36 @@ def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
     return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
 
 
-def _write_trace(path: Path, rows: Rows, replayed: ReplayedRun, span: slice | NDArray[np.bool_]) -> None:
+def _write_trace(
+    path: Path, rows: Rows, replayed: ReplayedRun, span: slice | NDArray[np.bool_], each: int
+) -> None:
+    """Writes means of every `each` rows of a span; those of rows with a rate, where there is one."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    time, temperature = rows.time_s[span], rows.temperature_c[span]
-    rate, bias, status = rows.rate_dph[span], replayed.bias_dph[span], replayed.status[span]
+    columns = (rows.time_s[span], rows.temperature_c[span], rows.rate_dph[span], replayed.bias_dph[span])
+    status = replayed.status[span]
     options = pacsv.WriteOptions(include_header=False, quoting_style="none")
     part = path.with_name(f".{path.name}.part")
+    step = each * max(1, _TRACE_ROWS // each)
     with create(part) as stream:
         stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
-        for start in range(0, time.size, _TRACE_ROWS):
-            k = slice(start, start + _TRACE_ROWS)
-            columns = (time[k], temperature[k], rate[k], bias[k], rate[k] - bias[k], status[k])
-            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, columns, strict=True))), stream, options)
+        for start in range(0, status.size, step):
+            k = slice(start, start + step)
+            time, temperature, rate, bias = _means([values[k] for values in columns], each)
+            bits = np.bitwise_or.reduceat(status[k], np.arange(0, status[k].size, each))
+            written = (time, temperature, rate, bias, rate - bias, bits)
+            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, written, strict=True))), stream, options)
     part.replace(path)
+
+
+def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:
+    """Means of every `each` rows of columns, of which the third counts most: rows in which it is NaN do not."""
+    if each == 1:
+        return columns
+    starts = np.arange(0, columns[0].size, each)
+    known = np.isfinite(columns[2])
+    used = known | np.repeat(np.add.reduceat(known, starts, dtype=np.int64) == 0, each)[: known.size]
+    count = np.add.reduceat(used, starts, dtype=np.int64)
+    return [np.add.reduceat(np.where(used, values, 0.0), starts) / count for values in columns]
 
 
 def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:

@@ -39,6 +39,7 @@ from .recalibration import refuse_together, with_prior
 
 __all__ = ["Built", "build", "build_into"]
 
+_TRACE_ROWS = 2**18  # of a run: thousands for each point of a picture
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 
 
@@ -202,6 +203,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         dataset,
         average_s=options.average_s,
         trace=work / "trace" if order.compiled else None,
+        trace_rows=_TRACE_ROWS,
         training=fitted.training,
         compiled=order.compiled,
         progress=lambda file: say(f"replaying {file}"),

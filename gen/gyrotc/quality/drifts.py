@@ -55,8 +55,8 @@ def drifts_of(runs: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> list
     Args:
         runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
     """
-    tried = [_Kinks.of(k, *rows, half) for half in _HALVES_S for k, rows in enumerate(runs)]
-    kinks = [k for k in tried if k is not None]
+    tried = [_Kinks.of(k, *rows, half) for k, rows in enumerate(runs) for half in _HALVES_S]
+    kinks = sorted((k for k in tried if k is not None), key=lambda k: (_HALVES_S.index(k.half_s), k.run))
     places = sum(k.places for k in kinks)
     found: list[Drift] = []
     for half in _HALVES_S:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,26 +81,51 @@ def events_of(dataset: Dataset) -> list[Event]:
     """Events of the training runs, by run in order of time."""
     runs = [run for run in dataset.runs if run.role == "train"]
     found: list[Event] = []
-    series = []
+    departing: list[NDArray[np.int64]] = []
     for number, run in enumerate(runs):
         rows = run.rows()
-        good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
-        wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
-        found += _bursts(number, run, rows, wild)
+        departing.append(departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s)))
+        found += _bursts(number, run, rows, departing[-1])
         found += _thermometer(number, run, rows)
         found += _dropouts(number, run, rows)
-        good[wild] = False
-        series.append((rows.time_s[good], rows.temperature_c[good], rows.rate_dph[good]))
-    judged = [part if len(part[0]) > 1 else (np.zeros(2),) * 3 for part in series]
+    judged = _Judged(runs, departing)
     steps, drifts = _told_once(steps_of(judged), drifts_of(judged))
     for number, run in enumerate(runs):
-        found += [_drift(run, drift, float(series[number][0][-1])) for drift in drifts if drift.run == number]
+        found += [_drift(run, drift, float(judged[number][0][-1])) for drift in drifts if drift.run == number]
         of_run = [step for step in steps if step.run == number]
         if of_run:
-            found += _steps(run, of_run, float(series[number][0][0]), float(series[number][0][-1]))
+            time = judged[number][0]
+            found += _steps(run, of_run, float(time[0]), float(time[-1]))
     again = {(e.run, e.time_s[1]) for e in found if e.id == "restart"}
     found = [e for e in found if e.id != "dropout" or (e.run, e.time_s[0]) not in again]
     return sorted(found, key=lambda event: (event.run, event.time_s[0]))
+
+
+class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
+    """Time, temperature and rate of the rows of each run that count; one run is in memory at a time."""
+
+    def __init__(self, runs: Sequence[Run], departing: Sequence[NDArray[np.int64]]) -> None:
+        self._runs, self._departing = runs, departing
+        self._read: tuple[int, tuple[FloatArray, FloatArray, FloatArray]] | None = None
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    def __getitem__(self, number: Any) -> Any:
+        if not 0 <= number < len(self._runs):
+            raise IndexError(number)
+        if self._read is None or self._read[0] != number:
+            self._read = None
+            rows = self._runs[number].rows()
+            good = self._runs[number].in_span(rows.time_s)
+            good &= np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
+            good[self._departing[number]] = False
+            part = tuple(
+                column if good.all() else column[good]
+                for column in (rows.time_s, rows.temperature_c, rows.rate_dph)
+            )
+            self._read = number, part if len(part[0]) > 1 else (np.zeros(2),) * 3
+        return self._read[1]
 
 
 def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:

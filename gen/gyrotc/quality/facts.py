@@ -126,10 +126,13 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
     gaps = step > _GAP_PERIODS * run.row_period_s
     if not inside.all():
         gaps &= np.diff(np.flatnonzero(inside)) == 1  # what was excluded is no gap
-    levels = np.unique(temperature[_changes(temperature)])
-    resolution = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
-    measured = np.where(np.isfinite(rows.rate_dph), rows.rate_dph, rate.mean() if len(rate) else 0.0)
-    cells_t, slopes, cells_rate = _cells(time, temperature, _those(measured, inside), run.row_period_s)
+    n_gaps, missing = int(gaps.sum()), int(np.sum(np.round(step[gaps] / run.row_period_s) - 1.0))
+    del step, gaps  # a file of 100 Hz fills memory
+    low_c, high_c, resolution = _levels(temperature)
+    measured = _those(rows.rate_dph, inside)
+    if not np.isfinite(measured).all():
+        measured = np.where(np.isfinite(measured), measured, rate.mean() if len(rate) else 0.0)
+    cells_t, slopes, cells_rate = _cells(time, temperature, measured, run.row_period_s)
     count, outlier = _outliers(_those(rows.time_s, finite), rate)
     noise = _robust_sigma(np.diff(rate)) / np.sqrt(2.0)
     return RunFacts(
@@ -143,9 +146,9 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         first_s=float(time[0]),
         last_s=float(time[-1]),
         row_period_s=run.row_period_s,
-        gaps=int(gaps.sum()),
-        missing_rows=int(np.sum(np.round(step[gaps] / run.row_period_s) - 1.0)),
-        temperature_c=(float(levels[0]), float(levels[-1])),
+        gaps=n_gaps,
+        missing_rows=missing,
+        temperature_c=(low_c, high_c),
         temperature_step_c=resolution,
         jumps=_jumps(time, temperature, resolution),
         slopes_c_per_min=slopes,
@@ -167,6 +170,17 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
 def _those(values: FloatArray, chosen: BoolArray) -> FloatArray:
     """The chosen values; the same array where that is all of them."""
     return values if chosen.all() else values[chosen]
+
+
+def _levels(temperature: FloatArray) -> tuple[float, float, float]:
+    """Lowest and highest of the values, and the least difference of two of them; 0 where there is one."""
+    values = temperature[np.r_[True, temperature[1:] != temperature[:-1]]]
+    values.sort()
+    least = np.inf
+    for start in range(0, len(values), _PART):
+        step = np.diff(values[start : start + _PART + 1])
+        least = min(least, float(step[step > 0.0].min(initial=np.inf)))
+    return float(values[0]), float(values[-1]), least if np.isfinite(least) else 0.0
 
 
 def _changes(values: FloatArray) -> NDArray[np.int64]:
@@ -225,12 +239,14 @@ def _jumps(time: FloatArray, temperature: FloatArray, resolution: float) -> tupl
 
 def _departures(step: FloatArray) -> FloatArray:
     """Magnitudes of the differences from the median of the two before, the value itself, and the two after."""
-    padded = np.pad(step, 2, mode="reflect")
     result = np.empty_like(step)
     for start in range(0, len(step), _PART):
-        around = sliding_window_view(padded[start : start + _PART + 4], 5)
-        part = slice(start, start + len(around))
-        result[part] = np.abs(step[part] - middle_of_five(*around.T))
+        part = step[start : start + _PART]
+        before = step[2:0:-1] if start == 0 else step[start - 2 : start]
+        after = step[start + len(part) : start + len(part) + 2]
+        after = np.r_[after, step[-2 : len(after) - 4 : -1]]  # mirrored at both ends
+        around = sliding_window_view(np.r_[before, part, after], 5)
+        result[start : start + len(part)] = np.abs(part - middle_of_five(*around.T))
     return result
 
 
@@ -242,10 +258,15 @@ def _outliers(time: FloatArray, rate: FloatArray) -> tuple[int, Outlier | None]:
     """
     if len(rate) < 3:
         return 0, None
-    step = np.diff(np.r_[rate[2], rate, rate[-3]])
-    moved = np.abs(step[step != 0.0])
-    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * median(moved) / np.sqrt(2.0) if len(moved) else np.inf
-    large = np.flatnonzero(np.abs(step) > limit)
+    step = np.empty(len(rate) + 1)
+    step[0], step[-1] = rate[0] - rate[2], rate[-3] - rate[-1]
+    np.subtract(rate[1:], rate[:-1], out=step[1:-1])
+    moved = step[step != 0.0]
+    np.abs(moved, out=moved)
+    scale = median(moved, overwrite_input=True) if len(moved) else np.inf
+    del moved
+    limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * scale / np.sqrt(2.0)
+    large = np.flatnonzero((step > limit) | (step < -limit))
     first, last = large[:-1], large[1:]
     pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
     pair[1:] &= ~_follows(pair)[1:]

@@ -113,7 +113,7 @@ def steps_of(runs: Sequence[Rows]) -> list[Step]:
     Args:
         runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
     """
-    tried = [_Windows.of(k, *rows, half) for half in _HALVES_S for k, rows in enumerate(runs)]
+    tried = [_Windows.of(k, *rows, half) for k, rows in enumerate(runs) for half in _HALVES_S]
     windows = [w for w in tried if w is not None]
     lengths = len({w.half_s for w in windows})
     found: dict[int, list[tuple[Step, float]]] = {}
@@ -146,7 +146,6 @@ class _Windows:
     Attributes:
         run: Number of the run.
         half_s: Half of a window, s.
-        rows: Time and rate of the run's rows.
         cells: Time (s), temperature and rate of the cells; `cell_s`: their length; `width`: cells in half a window.
         size, spread: Of the steps, and the error that white noise of size 1 makes of them, shape (n,).
         z: Sizes over spreads, less their median. Every one is a look of its own: so high up, neighbours that share all
@@ -156,7 +155,6 @@ class _Windows:
 
     run: int
     half_s: float
-    rows: tuple[FloatArray, FloatArray]
     cells: tuple[FloatArray, FloatArray, FloatArray]
     cell_s: float
     width: int
@@ -185,7 +183,7 @@ class _Windows:
             return None
         size, spread = _fitted(t, x, y, width)
         z = size / spread - float(np.median(size / spread))
-        return _Windows(run, half_s, (time, rate), (t, x, y), cell, width, size, spread, z, windows)
+        return _Windows(run, half_s, (t, x, y), cell, width, size, spread, z, windows)
 
     def beyond(self, limit: float, noise: float, runs: Sequence[Rows]) -> Iterator[Step]:
         """Steps of more than `limit` times what noise makes, of all such runs or of this one, the clearest first."""
@@ -203,7 +201,7 @@ class _Windows:
             if self._beside_map(k, runs) < least:
                 continue
             placed = self._behind_gap if over_gap[k] else self._placed
-            yield placed(at, scale, float(far[k]))
+            yield placed(runs[self.run], at, scale, float(far[k]))
 
     def _beside_map(self, k: int, runs: Sequence[Rows]) -> float:
         """Magnitude of z at place k beside what the other passages over the window's temperatures show."""
@@ -236,16 +234,16 @@ class _Windows:
         size, error = float(self.size[k]), NORMAL_95 * scale * float(self.spread[k])
         return size, size - error, size + error
 
-    def _behind_gap(self, at: int, scale: float, sigmas: float) -> Step:
+    def _behind_gap(self, rows: Rows, at: int, scale: float, sigmas: float) -> Step:
         """The step between the last row before a gap and the first behind it."""
-        time, edge = self.rows[0], 0.5 * float(self.t[at - 1] + self.t[at])
+        time, edge = rows[0], 0.5 * float(self.t[at - 1] + self.t[at])
         behind = int(np.searchsorted(time, edge))
         between = float(time[behind]), float(time[behind - 1]), float(time[behind])
         return Step(self.run, between, self._between(at, scale), sigmas, True)
 
-    def _placed(self, at: int, scale: float, sigmas: float) -> Step:
+    def _placed(self, of_run: Rows, at: int, scale: float, sigmas: float) -> Step:
         """The step among the rows: where two levels leave least, and the times between which it lies."""
-        time, rate = self.rows
+        time, _, rate = of_run
         fit = self._fit(at - self.width)
         edge = float(self.t[at] - 0.5 * self.cell_s)
         near = np.flatnonzero(np.abs(time - edge) <= min(_EDGE + 8, self.width) * self.cell_s)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,11 +33,14 @@ _HOUR_S = 3600.0  # a change of summer time
 
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """What is doubtful about the times of a run; `evidence` has the file, the rows as marks, and figures."""
-    at = np.flatnonzero(run.in_span(rows.time_s))
-    whole = len(at) == len(rows)
-    time, temperature = (v if whole else v[at] for v in (rows.time_s, rows.temperature_c))
+    inside = run.in_span(rows.time_s)
+    time, temperature, at = rows.time_s, rows.temperature_c, range(len(rows))
+    together: NDArray[np.bool_] = np.broadcast_to(np.True_, max(len(rows) - 1, 0))
+    if not inside.all():
+        rows_inside = np.flatnonzero(inside)
+        time, temperature, at = time[inside], temperature[inside], rows_inside.tolist()
+        together = np.diff(rows_inside) == 1  # what was excluded is no gap
     step = np.diff(time)
-    together = np.diff(at) == 1  # what was excluded is no gap
     if len(step) < _AROUND_ROWS:
         return
     coarse = _coarse(run, step[together])
@@ -51,18 +54,18 @@ def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
         yield _jumps(run, time, at, jumps)
     if len(missing):
         yield _gaps(run, time, at, missing)
-    usual = (step <= _GAP * run.row_period_s) & together
-    yield from _drift(run, time, at, np.where(usual, step, np.nan))
+    step[(step > _GAP * run.row_period_s) | ~together] = np.nan
+    yield from _drift(run, time, at, step)
 
 
-def _marks(run: Run, time: FloatArray, at: NDArray[np.int64], places: list[int]) -> tuple[Mark, ...]:
+def _marks(run: Run, time: FloatArray, at: Sequence[int], places: list[int]) -> tuple[Mark, ...]:
     return tuple(
         Mark(run.file, (int(at[k]) + 1, int(at[k + 1]) + 1), (float(time[k]), float(time[k + 1])))
         for k in places[:_TOLD]
     )
 
 
-def _gaps(run: Run, time: FloatArray, at: NDArray[np.int64], gaps: NDArray[np.int64]) -> Finding:
+def _gaps(run: Run, time: FloatArray, at: Sequence[int], gaps: NDArray[np.int64]) -> Finding:
     step = np.diff(time)[gaps]
     missing = int(np.sum(np.round(step / run.row_period_s) - 1.0))
     longest = int(gaps[np.argmax(step)])
@@ -78,7 +81,7 @@ def _gaps(run: Run, time: FloatArray, at: NDArray[np.int64], gaps: NDArray[np.in
     }
 
 
-def _jumps(run: Run, time: FloatArray, at: NDArray[np.int64], jumps: list[int]) -> Finding:
+def _jumps(run: Run, time: FloatArray, at: Sequence[int], jumps: list[int]) -> Finding:
     by = time[jumps[0] + 1] - time[jumps[0]] - run.row_period_s
     hours = round(by / _HOUR_S)
     whole = abs(by - hours * _HOUR_S) < 2.0 * run.row_period_s and hours
@@ -156,7 +159,7 @@ def _regular(step: FloatArray, unit: float) -> bool:
     return float(np.mean(np.abs(rest).max(axis=1) < _EVEN * unit)) > _EVEN_SHARE
 
 
-def _drift(run: Run, time: FloatArray, at: NDArray[np.int64], step: FloatArray) -> Iterator[Finding]:
+def _drift(run: Run, time: FloatArray, at: Sequence[int], step: FloatArray) -> Iterator[Finding]:
     """Rows that come ever faster or slower by the stamps: the clock of the rows or that of the stamps drifts.
 
     Args:
@@ -171,9 +174,10 @@ def _drift(run: Run, time: FloatArray, at: NDArray[np.int64], step: FloatArray) 
     kept = np.flatnonzero(count >= 0.5 * size)
     if len(kept) < 4:
         return
-    mean = np.nanmean(steps[kept], axis=1)
+    mean = np.array([np.nanmean(steps[k]) for k in kept])
     usual = float(np.median(mean))
-    scatter = float(np.nanstd(steps[kept] - mean[:, None]))
+    squares = sum(float(np.nansum((steps[k] - m) ** 2)) for k, m in zip(kept, mean, strict=True))
+    scatter = float(np.sqrt(squares / count[kept].sum()))
     apart = np.abs(mean / usual - 1.0)
     limit = _DRIFT + _DRIFT_SIGMAS * scatter / usual / np.sqrt(count[kept])
     if not (apart > limit).any():
@@ -187,7 +191,7 @@ def _drift(run: Run, time: FloatArray, at: NDArray[np.int64], step: FloatArray) 
 def _drifting(
     run: Run,
     time: FloatArray,
-    at: NDArray[np.int64],
+    at: Sequence[int],
     span: tuple[int, int],
     every: tuple[float, float],
     total: float,

@@ -83,6 +83,17 @@ def test_figures_follow_from_the_trace(demo: Path) -> None:
     assert entry["after"]["std_dph"] == pytest.approx(float(np.std(means)), rel=1e-9)
 
 
+def test_a_longer_trace_is_means_of_as_few_rows_as_it_takes(demo: Path, tmp_path: Path) -> None:
+    dataset = load(demo / "data")
+    evaluate(demo / "result", dataset, trace=tmp_path, trace_rows=700, compiled=False)
+    whole = np.genfromtxt(demo / "result" / "trace" / "run-07.csv", delimiter=",", names=True)
+    thin = np.genfromtxt(tmp_path / "run-07.csv", delimiter=",", names=True)
+    assert len(whole) == 2880 and len(thin) == 576
+    for name in ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph"):
+        np.testing.assert_allclose(thin[name], whole[name].reshape(-1, 5).mean(axis=1), rtol=1e-9, atol=1e-12)
+    assert thin["status"][0] == 8 | 1
+
+
 def test_the_simulated_floor_is_the_noise_that_was_added(demo: Path) -> None:
     evaluation = _json(demo / "result" / "evaluate.json")
     declared = 7e-4
