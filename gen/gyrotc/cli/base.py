@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from rich.console import Console
@@ -18,7 +20,7 @@ from rich.text import Text
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..train.options import flag_of, help_of
+from ..train.options import DEFAULTS, BuildOptions, flag_of, help_of
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
@@ -189,14 +191,8 @@ def _of_build(name: str) -> Any:
     return typer.Option(flag_of(name), help=help_of(name))
 
 
-AverageOption = Annotated[float, _of_build("average_s")]
 AnyAverageOption = Annotated[float | None, _of_build("average_s")]
-ChannelsOption = Annotated[bool, _of_build("channels")]
-MethodOption = Annotated[str, _of_build("method")]
 SeedOption = Annotated[int, _of_build("seed")]
-CentersOption = Annotated[int | None, _of_build("centers")]
-RhoOption = Annotated[float | None, _of_build("rho")]
-BlockOption = Annotated[float, _of_build("block_s")]
 NumericOption = Annotated[
     str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
 ]
@@ -235,6 +231,37 @@ AcceptOption = Annotated[
     typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL; says why."),
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
+
+
+def with_build_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Gives a command these options of `BuildOptions`: its parameter `options` gets their values by name."""
+
+    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def called(**given: Any) -> None:
+            options = {name: given.pop(name) for name in names}
+            command(**given, options=options)
+
+        # What typer makes options of: a parameter for each name in the place of `options`
+        own, types = inspect.signature(command, eval_str=True), get_type_hints(BuildOptions)
+        stated = [
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=getattr(DEFAULTS, name),
+                annotation=Annotated[types[name], _of_build(name)],
+            )
+            for name in names
+        ]
+        parameters: list[inspect.Parameter] = []
+        for parameter in own.parameters.values():
+            named = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            parameters += stated if parameter.name == "options" else [named]
+        called.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        vars(called)["__signature__"] = own.replace(parameters=parameters)
+        return called
+
+    return decorated
 
 
 @contextmanager
@@ -315,10 +342,6 @@ def numerics_of(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",")]
 
 
-def _ceilings(texts: list[str] | None) -> None:
-    set_ceilings(texts or [])
-
-
 def _version(value: bool) -> None:
     if value:
         typer.echo(f"gyrotc {__version__}")
@@ -335,7 +358,7 @@ def _main(
         typer.Option(
             "--max",
             metavar="NAME=VALUE",
-            callback=_ceilings,
+            callback=lambda texts: set_ceilings(texts or []),
             help="Move a ceiling of inputs, before the command; may be repeated: "
             + ", ".join(CEILINGS)
             + ".",

@@ -5,32 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..train.options import DEFAULTS, BuildOptions
+from ..train.options import BuildOptions
 from .base import (
     BUILD,
     COMPARE,
     DIAGNOSE,
     AgeingOption,
     AppliedOption,
-    AverageOption,
     AxisOption,
-    BlockOption,
-    CentersOption,
-    ChannelsOption,
     DatasetArg,
     JsonOption,
     LotOption,
-    MethodOption,
     NumericOption,
     OutOption,
     PriorOption,
-    RhoOption,
-    SeedOption,
     TargetOption,
     TrustUnitsOption,
     app,
@@ -40,6 +33,7 @@ from .base import (
     progress,
     show,
     tell,
+    with_build_options,
     write_json,
 )
 from .results import (
@@ -163,17 +157,13 @@ def _gain_lines(gain: GainOnUnseen) -> Iterator[str]:
 
 
 @app.command()
+@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s", "channels")
 def build(
     dataset: DatasetArg,
     out: OutOption = Path("build"),
-    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = DEFAULTS.seed,
-    centers: CentersOption = DEFAULTS.centers,
-    rho: RhoOption = DEFAULTS.rho,
-    block_s: BlockOption = DEFAULTS.block_s,
-    average_s: AverageOption = DEFAULTS.average_s,
-    channels: ChannelsOption = DEFAULTS.channels,
+    *,
+    options: dict[str, Any],
     numeric: NumericOption = None,
     target: TargetOption = None,
     applied: AppliedOption = None,
@@ -202,16 +192,11 @@ def build(
     from ..jobs.build import build as run
     from ..train.fitting import FitOptions
 
-    shared = lot_in(lot)
-    options = FitOptions(
-        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s,
-        channels=channels, prior=shared,
-    )  # fmt: skip
     with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
         results = run(
             dataset,
             out,
-            options,
+            FitOptions(**options, prior=lot_in(lot)),
             axis=axis,
             numerics=numerics_of(numeric),
             targets=target or (),
@@ -268,15 +253,15 @@ def _print_built(result: Built) -> None:
 
 
 @app.command()
+@with_build_options("seed", "block_s", "average_s")
 def compare(
     dataset: DatasetArg,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
     ] = None,
     axis: AxisOption = None,
-    seed: SeedOption = DEFAULTS.seed,
-    block_s: BlockOption = DEFAULTS.block_s,
-    average_s: AverageOption = DEFAULTS.average_s,
+    *,
+    options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
@@ -291,7 +276,7 @@ def compare(
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
 
-    options = BuildOptions(seed=seed, block_s=block_s, average_s=average_s)
+    trained = BuildOptions(**options)
     with (
         result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
         progress(COMPARE) as say,
@@ -300,7 +285,7 @@ def compare(
         recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
         if stage:
             stage.of(recordings.serial, axis)
-        result = with_published(run(recordings, options, progress=say))
+        result = with_published(run(recordings, trained, progress=say))
         if stage:
             write_atomically(stage.folder / "compare.json", json_text(result.content()))
             write_atomically(stage.folder / "compare.svg", comparison_picture(result))
@@ -310,6 +295,7 @@ def compare(
 
 
 @app.command()
+@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s")
 def diagnose(
     dataset: DatasetArg,
     model: Annotated[
@@ -321,13 +307,9 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
-    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = DEFAULTS.seed,
-    centers: CentersOption = DEFAULTS.centers,
-    rho: RhoOption = DEFAULTS.rho,
-    block_s: BlockOption = DEFAULTS.block_s,
-    average_s: AverageOption = DEFAULTS.average_s,
+    *,
+    options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
@@ -354,10 +336,7 @@ def diagnose(
     if lot is not None and model is not None:
         raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
-    shared = lot_in(lot)
-    options = FitOptions(
-        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s, prior=shared
-    )
+    fitting = FitOptions(**options, prior=lot_in(lot))
     subtracted = applied_in(applied)
     axes = axes_of(dataset) if axis == "all" else (axis,)
     if not axes:
@@ -371,7 +350,7 @@ def diagnose(
                 recordings,
                 into,
                 model=known,
-                options=options if known is None else None,
+                options=fitting if known is None else None,
                 progress=say,
                 accept_events=accept_events,
                 fresh=fresh,

@@ -137,12 +137,8 @@ def _without_warnings() -> None:
 
 
 _COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`
-_ANYWHERE = (
-    "-q",
-    "--quiet",
-    "-v",
-    "--verbose",
-)  # options of the whole program, taken after the command as well
+# Options of the whole program, taken after the command as well
+_ANYWHERE = ("-q", "--quiet", "-v", "--verbose")
 
 
 def _hoisted(arguments: list[str]) -> list[str]:
@@ -166,9 +162,8 @@ def run(arguments: list[str]) -> int:
             completion_init()
         app(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
     except GyrotcError as error:
-        shown = (
-            terminal_line if isinstance(error, InputError) else terminal_text
-        )  # compilers say more than a line
+        # Compilers say more than a line
+        shown = terminal_line if isinstance(error, InputError) else terminal_text
         print(f"gyrotc: {shown(str(error))}", file=sys.stderr)
         return error.exit_status
     except OSError as error:
@@ -181,8 +176,6 @@ def run(arguments: list[str]) -> int:
         print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
         return GyrotcError.exit_status
     except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
-        pass
-
         print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
         return EXIT_STATUS
     return 0

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..train.options import DEFAULTS, BuildOptions
+from ..train.options import BuildOptions
 from .base import (
     EMIT,
     ERR,
@@ -20,21 +20,14 @@ from .base import (
     AgeingOption,
     AnyAverageOption,
     AppliedOption,
-    AverageOption,
     AxisOption,
-    BlockOption,
-    CentersOption,
-    ChannelsOption,
     DatasetArg,
     DirArg,
     JsonOption,
     LotOption,
-    MethodOption,
     NumericOption,
     OutOption,
     PriorOption,
-    RhoOption,
-    SeedOption,
     TargetOption,
     TrustOption,
     TrustUnitsOption,
@@ -45,6 +38,7 @@ from .base import (
     progress,
     show,
     tell,
+    with_build_options,
     write_json,
 )
 from .results import (
@@ -102,17 +96,13 @@ def _inside(folder: Path, trace: Path | None) -> Path | None:
 
 
 @app.command()
+@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s", "channels")
 def fit(
     dataset: DatasetArg,
     out: OutOption,
-    method: MethodOption = DEFAULTS.method,
     axis: AxisOption = None,
-    seed: SeedOption = DEFAULTS.seed,
-    centers: CentersOption = DEFAULTS.centers,
-    rho: RhoOption = DEFAULTS.rho,
-    block_s: BlockOption = DEFAULTS.block_s,
-    average_s: AverageOption = DEFAULTS.average_s,
-    channels: ChannelsOption = DEFAULTS.channels,
+    *,
+    options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
@@ -130,17 +120,13 @@ def fit(
     from ..store.folder import result_folder
     from ..train.fitting import FitOptions, fit_dataset
 
-    shared = lot_in(lot)
-    options = FitOptions(
-        method=method, seed=seed, centers=centers, rho=rho, block_s=block_s, average_s=average_s,
-        channels=channels, prior=shared,
-    )  # fmt: skip
+    fitting = FitOptions(**options, prior=lot_in(lot))
     known = applied_in(applied)
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
-        options = with_prior(options, recordings, prior, ageing)
-        fitted = fit_dataset(recordings, options, progress=say)
+        fitting = with_prior(fitting, recordings, prior, ageing)
+        fitted = fit_dataset(recordings, fitting, progress=say)
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
     write_json(json_file, fitted.training.content())
