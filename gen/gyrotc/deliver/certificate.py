@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -105,15 +105,12 @@ def _row(limit: Limit) -> CertifiedRow:
     if not unit or not known or not math.isfinite(known) or not isinstance(limit.measured, float):
         return plain
     found = digits_of(limit.measured, known)
-    return CertifiedRow(
-        text=plain.text,
-        page=plain.page,
+    return replace(
+        plain,
         value=found.decimal(found.value),
         spread=found.decimal(found.spread),
         factor=f"{limit.coverage_factor or 2.0:.2f}",
         unit=unit,
-        bound=plain.bound,
-        verdict=verdict,
     )
 
 
@@ -274,9 +271,9 @@ def certificate(
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
             built, the verdict is FAIL and not accepted, or `out` cannot be replaced.
     """
-    units = [unit_of(folder / axis) for axis in axes_in(folder)] or [unit_of(folder)]
-    why = accepted(folder, units, accept_fail)
     places = [folder / axis for axis in axes_in(folder)] or [folder]
+    units = [unit_of(place) for place in places]
+    why = accepted(folder, units, accept_fail)
     first = units[0]
     stated = facts_of(first.model.meta, facts, number)
     missing = list(_missing(stated, units))
@@ -295,12 +292,8 @@ def certificate(
         if not missing:
             write_atomically(stage.folder / "dcc.xml", dcc_text(units, told, why))
         printed = print_to_pdf(stage.folder / "certificate.html", stage.folder / "certificate.pdf")
-    names = (
-        "certificate.html",
-        *(("dcc.xml",) if not missing else ()),
-        *(("certificate.pdf",) if printed else ()),
-    )
-    return Certified(tuple(out / name for name in names), printed)
+    written = {"certificate.html": True, "dcc.xml": not missing, "certificate.pdf": printed}
+    return Certified(tuple(out / name for name, there in written.items() if there), printed)
 
 
 def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:

@@ -7,7 +7,7 @@ were left out in turn. Corrections are the maps in float64, with the input in fo
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -134,14 +134,25 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
     began = time.process_time()
     whole = _fit(method, data, options)
     seconds = time.process_time() - began
-    judged = [
-        (h.environment, _averages(h, fitted, options)) for h, fitted in _fits(whole, data, held, options)
-    ]
-    environments = list(dict.fromkeys(name for name, _ in judged))
-    total = Pooled.of([a for _, a in judged])
+    judged: dict[str, list[Averages]] = {}
+    for part in held:
+        unseen = whole if part.seen.all() else _fit(method, data.select(part.seen), options)
+        s = part.samples
+        after = s.bias_dph - predict(unseen, s.temperature_c, s.slope_c_per_min)
+        means = average(
+            s.time_s,
+            s.temperature_c,
+            s.bias_dph,
+            after,
+            scored=np.ones(len(s), dtype=bool),
+            average_s=options.average_s,
+            from_s=part.from_s,
+        )
+        judged.setdefault(part.environment, []).append(means)
+    total = Pooled.of([means for parts in judged.values() for means in parts])
     return Method(
         id=method,
-        groups=tuple(_group(name, Pooled.of([a for n, a in judged if n == name])) for name in environments),
+        groups=tuple(_group(name, Pooled.of(parts)) for name, parts in judged.items()),
         exam_rms_dph=total.after.rms_dph,
         exam_std_dph=total.after.std_dph,
         before_rms_dph=total.before.rms_dph,
@@ -156,29 +167,6 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
 
 def _fit(method: str, data: TrainingData, options: BuildOptions) -> Fit:
     return fit(data, method=method, seed=options.seed, average_s=options.average_s)
-
-
-def _fits(
-    whole: Fit, data: TrainingData, held: Sequence[_Held], options: BuildOptions
-) -> Iterator[tuple[_Held, Fit]]:
-    """Each part to judge with a fit that has not seen it."""
-    for part in held:
-        yield part, whole if part.seen.all() else _fit(whole.method, data.select(part.seen), options)
-
-
-def _averages(held: _Held, fitted: Fit, options: BuildOptions) -> Averages:
-    s = held.samples
-    after = s.bias_dph - predict(fitted, s.temperature_c, s.slope_c_per_min)
-    scored = np.ones(len(s), dtype=bool)
-    return average(
-        s.time_s,
-        s.temperature_c,
-        s.bias_dph,
-        after,
-        scored=scored,
-        average_s=options.average_s,
-        from_s=held.from_s,
-    )
 
 
 def _group(environment: str, part: Pooled) -> Group:

@@ -14,6 +14,7 @@ import json
 import math
 import platform
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path, PurePosixPath
@@ -36,36 +37,12 @@ from ..train.fitting import FitOptions
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
-__all__ = ["Kept", "diagnose_into", "diagnosed", "extended_scenario", "save"]
+__all__ = ["Kept", "diagnosed", "extended_scenario"]
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
 
-def diagnose_into(
-    out: Path,
-    dataset: Dataset,
-    *,
-    model: Model | None = None,
-    options: FitOptions | None = None,
-    progress: Progress | None = None,
-    accept_events: bool = False,
-) -> Diagnosis:
-    """Diagnoses a data set and fills `out`: `diagnose.json`, `report.html`, pictures, the extended model.
-
-    Raises:
-        InputError: As `diagnose` and `result_folder`.
-    """
-    from ..diagnose.diagnosis import diagnose
-
-    with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
-        stage.of(dataset.serial, dataset.axis)
-        found = diagnose(
-            dataset, model=model, options=options, progress=progress, accept_events=accept_events
-        )
-        return save(stage.folder, found, progress)
-
-
-def save(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
+def _saved(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
     from ..diagnose.series import series_of
     from ..pages.diagnosis import PICTURES, SERIES, draw, write_diagnosis_page
@@ -165,7 +142,7 @@ def diagnosed(
     """Diagnoses a data set, or takes what an earlier call found of the same.
 
     Args:
-        out: Folder that is filled as by `diagnose_into`; None: no files.
+        out: Folder that gets `diagnose.json`, `report.html`, pictures and the extended model; None: no files.
         options: As for `fit`, without an earlier model.
         fresh: Diagnoses anew in any case.
 
@@ -175,8 +152,17 @@ def diagnosed(
     name = _name(dataset, model, options, accept_events=accept_events, files=out is not None)
     found = None if fresh else cache.kept(name, _unpacked)
     if found is None:
-        made = _anew(dataset, out, model, options, progress, accept_events)
-        files = {} if out is None else {path: _text(out / path) for path in _written(made.result)}
+        from ..diagnose.diagnosis import diagnose
+
+        with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
+            if stage:
+                stage.of(dataset.serial, dataset.axis)
+            made = diagnose(
+                dataset, model=model, options=options, progress=progress, accept_events=accept_events
+            )
+            made = _saved(stage.folder, made, progress) if stage else made
+        names = _written(made.result) if out else ()
+        files = {path: (out / path).read_bytes().decode("utf-8") for path in names} if out else {}
         found = Kept(made.result, files, made.training)
         cache.keep(name, _packed(found))
         return found
@@ -187,22 +173,8 @@ def diagnosed(
     return found
 
 
-def _anew(
-    dataset: Dataset,
-    out: Path | None,
-    model: Model | None,
-    options: FitOptions | None,
-    progress: Progress | None,
-    accept_events: bool,
-) -> Diagnosis:
-    from ..diagnose.diagnosis import diagnose
-
-    into = diagnose if out is None else functools.partial(diagnose_into, out)
-    return into(dataset, model=model, options=options, progress=progress, accept_events=accept_events)
-
-
 def _write(out: Path, dataset: Dataset, files: dict[str, str]) -> None:
-    """The folder as `diagnose_into` leaves it."""
+    """The folder as a diagnosis leaves it."""
     with result_folder(out, "diagnose", inputs=[dataset.folder]) as stage:
         stage.of(dataset.serial, dataset.axis)
         for path, text in files.items():
@@ -217,10 +189,6 @@ def _written(result: Diagnosed) -> Sequence[str]:
     extended = result.extended.model if result.extended is not None else None
     more = (*(result.pictures or ()), result.series, extended, result.scenario)
     return (_RESULT, _REPORT, *(path for path in more if path is not None))
-
-
-def _text(path: Path) -> str:
-    return path.read_bytes().decode("utf-8")
 
 
 def _packed(found: Kept) -> bytes:

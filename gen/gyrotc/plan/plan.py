@@ -10,7 +10,6 @@ make on them: detection limits, separability, how well the map will be known aft
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -41,23 +40,14 @@ from ..results.planned import (
 from ..simulate.campaign import Noise
 from .sensitivity import Row, Sensitivity, additions, node_temperatures, programme_of, separability
 
-__all__ = ["FoundProfile", "Place", "places", "plan", "shortest"]
+__all__ = ["places", "plan", "shortest"]
 
 _MOST_RUNS = 60  # bounds the search
 _UNSEEN = 1e3  # times the required limit: what counts for a cause that would not be seen at all
 
 
-@dataclass(frozen=True)
-class FoundProfile:
-    """Runs by name (with repetitions) and their hours; None where no number of these runs reaches the limits."""
-
-    runs: tuple[str, ...] | None
-    hours: float | None
-    reached: dict[str, float | None]
-
-
-def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> FoundProfile:
-    """Adds the run that helps most for its hours, until every limit is reached.
+def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortest:
+    """Adds the run that helps most for its hours, until every limit is reached; no runs where no number of them does.
 
     Args:
         sensitivity: Belongs to the programme whose runs may be used, each as often as needed.
@@ -79,7 +69,8 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> FoundPr
         chosen.append(best)
         now = after[best]
     if now > 0.0:
-        return FoundProfile(None, None, _values(sensitivity, chosen, required))
+        reached = _values(sensitivity, chosen, required)
+        return Shortest(required=dict(required), runs=None, hours=None, reached=reached)
     for k in sorted(chosen, key=lambda k: -hours[k]):
         rest = [*chosen]
         rest.remove(k)
@@ -87,7 +78,12 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> FoundPr
             chosen = rest
     reached = _values(sensitivity, chosen, required)
     names = [run.name for run in sensitivity.programme.records.runs]
-    return FoundProfile(tuple(names[k] for k in chosen), sum(hours[k] for k in chosen), reached)
+    return Shortest(
+        required=dict(required),
+        runs=tuple(names[k] for k in chosen),
+        hours=sum(hours[k] for k in chosen),
+        reached=reached,
+    )
 
 
 def _values(
@@ -111,26 +107,9 @@ _D_FOUND = 6.0  # about where most causes are found, as in `sensitivity`
 _LEAST_C = 1e-4  # no thermometer tells less than this
 
 
-@dataclass(frozen=True)
-class Place:
-    """A node of the gyro as a place for a thermometer.
-
-    Attributes:
-        node: Its name.
-        there: Whether a thermometer is there.
-        apart_c: RMS of its temperature less that of the sensor, about the mean, C.
-        unseen_c: RMS of what neither the map nor the thermometers that are there hold of it, C.
-        limit_dph_per_c: Amplitude of a part of the bias that follows it from which these runs show it; None: never.
-    """
-
-    node: str
-    there: bool
-    apart_c: float
-    unseen_c: float
-    limit_dph_per_c: float | None
-
-
-def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int) -> list[Place]:
+def places(
+    scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int
+) -> list[ThermometerPlace]:
     """Every node but the sensor's own, the most telling first.
 
     Raises:
@@ -158,7 +137,15 @@ def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed
         unseen = float(np.sqrt(np.mean(rest**2)))
         norm = float(np.linalg.norm(own)) / gains.scale
         limit = _D_FOUND / norm if unseen > _LEAST_C else None
-        ranked.append(Place(node, node in there, float(np.sqrt(np.mean(plain**2))), unseen, limit))
+        ranked.append(
+            ThermometerPlace(
+                node=node,
+                there=node in there,
+                apart_c=float(np.sqrt(np.mean(plain**2))),
+                unseen_c=unseen,
+                limit_dph_per_c=limit,
+            )
+        )
     return sorted(ranked, key=lambda place: (place.there, place.limit_dph_per_c or np.inf))
 
 
@@ -198,7 +185,17 @@ def plan(
     sensitivity = Sensitivity(programme)
     say("comparing causes")
     rows = separability(sensitivity)
-    shown = [Separability.of_object(r) for r in rows]
+    profile = ranked = found = None
+    if required:
+        say("looking for the shortest profile")
+        profile = shortest(sensitivity, required)
+    if pair:
+        say("trying further runs")
+        tried = additions(scenario, pair, noise=noise, seed=seed)
+        ranked = Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=h, d=d) for n, h, d in tried))
+    if add_thermometer:
+        say("trying further thermometers")
+        found = tuple(places(scenario, sensitivity, noise=noise, seed=seed))
     result = Plan(
         gyrotc_version=__version__,
         serial=None,
@@ -213,40 +210,13 @@ def plan(
         ),
         limits=_limits(sensitivity),
         not_testable=dict(sensitivity.bank.untestable),
-        separability=tuple(shown),
+        separability=tuple(Separability.of_object(row) for row in rows),
         hard_to_separate=_hard(rows),
         accuracy=tuple(_accuracy(sensitivity)),
-        shortest=_shortest(sensitivity, required, say) if required else None,
-        additions=_additions(scenario, pair, noise, seed, say) if pair else None,
+        shortest=profile,
+        additions=ranked,
     )
-    if not add_thermometer:
-        return result
-    found = _places(scenario, sensitivity, noise, seed, say)
-    return result.model_copy(update={"thermometers": found})
-
-
-def _places(
-    scenario: str | Path, sensitivity: Sensitivity, noise: Noise, seed: int, say: Callable[[str], None]
-) -> tuple[ThermometerPlace, ...]:
-    say("trying further thermometers")
-    found = places(scenario, sensitivity, noise=noise, seed=seed)
-    return tuple(ThermometerPlace(**asdict(place)) for place in found)
-
-
-def _shortest(
-    sensitivity: Sensitivity, required: Mapping[str, float], say: Callable[[str], None]
-) -> Shortest:
-    say("looking for the shortest profile")
-    found = shortest(sensitivity, required)
-    return Shortest(required=dict(required), runs=found.runs, hours=found.hours, reached=found.reached)
-
-
-def _additions(
-    scenario: str | Path, pair: tuple[str, str], noise: Noise, seed: int, say: Callable[[str], None]
-) -> Additions:
-    say("trying further runs")
-    ranked = additions(scenario, pair, noise=noise, seed=seed)
-    return Additions(pair=pair, runs=tuple(TriedRun(profile=n, hours=hours, d=d) for n, hours, d in ranked))
+    return result if found is None else result.model_copy(update={"thermometers": found})
 
 
 def _temperature(run: Record) -> Temperature:

@@ -37,11 +37,11 @@ Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
-class _Signal(BaseModel):
+class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Thermometer(_Signal):
+class Thermometer(_Strict):
     """A further thermometer, recorded as a column: its place, and what its reading makes of that temperature.
 
     From `loose_from_day` on its contact is loose: it shows `loose_share` of the way from its node to the air, with
@@ -59,7 +59,7 @@ class Thermometer(_Signal):
     loose_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
 
-class NodeDifference(_Signal):
+class NodeDifference(_Strict):
     """A part of the bias that follows the temperature difference of two nodes.
 
     bias += dph_per_c · x/√(1 + (x/saturation_c)²) · (1 + growth_per_c (T_cavity − 20)), x = T_node − T_against
@@ -72,7 +72,7 @@ class NodeDifference(_Signal):
     growth_per_c: float = 0.0
 
 
-class Laser(_Signal):
+class Laser(_Strict):
     """The discharge and the cavity as the gyro itself sees them: beam intensity and path-length voltage.
 
     Units stand in the names. Gain and losses are shares of the light of one round trip, 1e-6; `walk_ppm` is what the
@@ -112,10 +112,6 @@ Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
 
 _FOLDER = Path(__file__).parent / "scenarios"
 _OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Chamber(_Strict):

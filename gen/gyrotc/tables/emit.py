@@ -282,28 +282,24 @@ def _upwards(bound: float) -> str:
 
 def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
     """What a program needs of a table before it runs: name behind GTC_<ID>_, text, comment."""
-
-    def number(name: str, text: str, comment: str) -> dict[str, str]:
-        return {"name": name, "text": c_code(text), "comment": comment}
-
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    yield number("BLOCK_US", f"{round(model.block_s * 1e6)}UL", "block length, microseconds")
+    yield _macro("BLOCK_US", c_code(f"{round(model.block_s * 1e6)}UL"), "block length, microseconds")
     edges = (("T_MIN_C", t0), ("T_MAX_C", t1), ("SLOPE_MIN_C_PER_MIN", r0), ("SLOPE_MAX_C_PER_MIN", r1))
     for name, value in edges:
         text = CText(f"({c_code(f'{value:#.7g}F')})")
-        yield {"name": name, "text": text, "comment": "envelope: beyond it GTC_CLAMPED"}
+        yield _macro(name, text, "envelope: beyond it GTC_CLAMPED")
     yield from _time_macros(model)
     yield from _authority_macros(emission)
     names = channel_names(model)
-    yield number("N_CHANNELS", f"{1 + len(names)}", "numbers of a sample")
+    yield _macro("N_CHANNELS", c_code(f"{1 + len(names)}"), "numbers of a sample")
     channels = [("temperature_c", "C, of the gyro's own sensor"), *((n, "unit as recorded") for n in names)]
     for k, (name, unit) in enumerate(channels):
-        yield {"name": f"CHANNEL_{k}", "text": CText(f'"{c_literal(name)}"'), "comment": unit}
+        yield _macro(f"CHANNEL_{k}", CText(f'"{c_literal(name)}"'), unit)
     for numeric, table in emission.tables.items():
         if numeric == "q31":
-            yield number("Q31_BIAS_FRAC_BITS", f"{table.bias_frac_bits}", "bias in 2^-this deg/h")
-        size = f"{table.read_only_bytes}UL"
-        yield number(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
+            yield _macro("Q31_BIAS_FRAC_BITS", c_code(f"{table.bias_frac_bits}"), "bias in 2^-this deg/h")
+        size = c_code(f"{table.read_only_bytes}UL")
+        yield _macro(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
 
 
 def _macro(name: str, text: CText, comment: str) -> dict[str, str]:
