@@ -38,14 +38,11 @@ from .base import (
 )
 from .results import (
     change_lines,
-    channel_lines,
     evaluation_table,
-    ladder_lines,
     limit_lines,
-    lot_lines,
     not_installed_lines,
-    span_lines,
     summary,
+    training_lines,
     verify_table,
 )
 
@@ -219,13 +216,11 @@ def build(
             tell(f"axis {result.model.axis}")
         _print_built(result)
     tell(f"report: {out / 'report.html'}")
-    if failures := "; ".join(failure for result in results for failure in _failures(result)):
-        raise CheckFailed(failures)
-
-
-def _failures(result: Built) -> list[str]:
-    axis = result.model.axis
-    return [f"axis {axis}: {failure}" if axis else failure for failure in result.failures]
+    failures = [
+        (f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures
+    ]
+    if failures:
+        raise CheckFailed("; ".join(failures))
 
 
 def _print_built(result: Built) -> None:
@@ -233,23 +228,15 @@ def _print_built(result: Built) -> None:
     show(verify_table(result.verification))
     for line in (
         *not_installed_lines(result.verification),
-        *span_lines(result.training),
-        *ladder_lines(result.training),
-        *channel_lines(result.training),
-        *lot_lines(result.training),
+        *training_lines(result.training),
+        *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
+        *(extension_lines(result.diagnosis) if result.diagnosis else ()),
+        *(limit_lines(result.limits) if result.limits else ()),
+        *(change_lines(result.changes) if result.changes else ()),
+        *(f"finding {finding.id}: {finding.text}" for finding in result.evaluation.findings),
+        summary(result.evaluation),
     ):
         tell(line)
-    for name, reason in result.refused.items():
-        tell(f"{name} left out: {reason}")
-    for line in extension_lines(result.diagnosis) if result.diagnosis else ():
-        tell(line)
-    for line in limit_lines(result.limits) if result.limits else ():
-        tell(line)
-    for line in change_lines(result.changes) if result.changes else ():
-        tell(line)
-    for finding in result.evaluation.findings:
-        tell(f"finding {finding.id}: {finding.text}")
-    tell(summary(result.evaluation))
 
 
 @app.command()

@@ -42,7 +42,20 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
     return _e(part.before.rms_dph), _e(part.after.rms_dph), _e(part.after.std_dph)
 
 
-def span_lines(training: Training) -> Iterator[str]:
+def training_lines(training: Training) -> Iterator[str]:
+    """What training did: spans, the correction chosen, channels, and what came from a lot or an earlier model."""
+    yield from _span_lines(training)
+    if training.ladder:
+        yield f"correction {training.method}: {training.reason}"
+        tried = (
+            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.ladder if r.left_out_rms_dph is not None
+        )
+        yield f"  left-out RMS, deg/h: {', '.join(tried)}"
+    yield from _channel_lines(training)
+    yield from _lot_lines(training)
+
+
+def _span_lines(training: Training) -> Iterator[str]:
     """What was cut where there are fewer than three training runs."""
     spans = training.spans
     if spans:
@@ -51,7 +64,7 @@ def span_lines(training: Training) -> Iterator[str]:
             yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
 
 
-def lot_lines(training: Training) -> Iterator[str]:
+def _lot_lines(training: Training) -> Iterator[str]:
     """What came from the lot or an earlier model, and what from the unit's own runs."""
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
@@ -66,16 +79,6 @@ def lot_lines(training: Training) -> Iterator[str]:
                 )
 
 
-def ladder_lines(training: Training) -> Iterator[str]:
-    """Which correction was chosen, why, and what each leaves on history that it has not seen."""
-    if training.ladder:
-        yield f"correction {training.method}: {training.reason}"
-        tried = (
-            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.ladder if r.left_out_rms_dph is not None
-        )
-        yield f"  left-out RMS, deg/h: {', '.join(tried)}"
-
-
 _SHAPES = {
     "line": "",
     "product": " with a slope that depends on temperature",
@@ -83,7 +86,7 @@ _SHAPES = {
 }
 
 
-def channel_lines(training: Training) -> Iterator[str]:
+def _channel_lines(training: Training) -> Iterator[str]:
     """What became of every channel that was tried as an input."""
     for tried in training.channels or ():
         if tried.verdict != "taken":
@@ -260,14 +263,9 @@ def limit_lines(limits: HeldLimits) -> Iterator[str]:
     rule = f" ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)" if limits.decision_rule else ""
     yield f"limits{product}: {limits.decision}{rule}"
     for check in limits.limits:
-        name, bound = check.limit.replace("at_most.", "").replace("at_least.", ""), _plain(check.bound)
-        sign = (
-            "<= "
-            if check.limit.startswith("at_most.")
-            else ">= "
-            if check.limit.startswith("at_least.")
-            else ""
-        )
+        kind, _, figure = check.limit.partition(".")
+        sign = {"at_most": "<= ", "at_least": ">= "}.get(kind, "")
+        name, bound = figure if sign else check.limit, _plain(check.bound)
         known = check.expanded_uncertainty
         spread = f" +- {known:.2g}" if known else ""
         mark = "" if check.verdict in ("PASS", None) and check.met else f", {check.verdict or 'FAIL'}"

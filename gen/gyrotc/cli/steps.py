@@ -42,13 +42,10 @@ from .base import (
     write_json,
 )
 from .results import (
-    channel_lines,
     evaluation_table,
     file_notes,
-    ladder_lines,
-    lot_lines,
     prediction_line,
-    span_lines,
+    training_lines,
     verify_notes,
     verify_table,
 )
@@ -130,12 +127,7 @@ def fit(
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
     write_json(json_file, fitted.training.content())
-    for line in (
-        *span_lines(fitted.training),
-        *ladder_lines(fitted.training),
-        *channel_lines(fitted.training),
-        *lot_lines(fitted.training),
-    ):
+    for line in training_lines(fitted.training):
         tell(line)
     for finding in fitted.training.findings:
         tell(f"finding {finding.id}: {finding.text}")

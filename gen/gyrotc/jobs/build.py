@@ -141,11 +141,8 @@ def build(
             stage.of(dataset.serial, any_serial=any_serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
-                built.append(
-                    _build_axis(
-                        dataset, part.folder, options, order, _of_axis(f"{name} ({k} of {len(axes)})", say)
-                    )
-                )
+                told = _of_axis(f"{name} ({k} of {len(axes)})", say)
+                built.append(_build_axis(dataset, part.folder, options, order, told))
         join_axes(stage.folder, axes)
         return built
 
@@ -170,13 +167,8 @@ def build_into(
     Raises:
         CheckFailed: Every arithmetic is refused.
     """
-    return _build_axis(
-        dataset,
-        work,
-        options,
-        _Order(numerics, False, limits, None, compiled=compiled, watch=watch),
-        lambda _: None,
-    )
+    order = _Order(numerics, False, limits, None, compiled=compiled, watch=watch)
+    return _build_axis(dataset, work, options, order, lambda _: None)
 
 
 def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
@@ -215,12 +207,11 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         _write(work / "limits.json", held.content())
     manifest = _manifest(work, dataset, fitted.model, emission.refused)
     _write(work / "manifest.json", manifest.content())
-    changes = (
-        changes_since(earlier, fitted.model, evaluation, manifest, dataset=dataset, limits=order.limits)
-        if earlier
-        else None
-    )
-    if changes:
+    changes = None
+    if earlier:
+        changes = changes_since(
+            earlier, fitted.model, evaluation, manifest, dataset=dataset, limits=order.limits
+        )
         _write(work / "changes.json", changes.content())
     budget = budget_of(
         fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes

@@ -11,22 +11,19 @@ from ..store.files import write_atomically
 
 __all__ = ["keep", "recorded", "shortened"]
 
+_FILE = Path("results/summary.json")
 _WIDTH = 500  # of a line: most records are shorter
-
-
-def _path(docs: Path) -> Path:
-    return docs / "results" / "summary.json"
 
 
 def recorded(docs: Path, name: str) -> Any:
     """What a campaign left; None: nothing."""
-    path = _path(docs)
+    path = docs / _FILE
     return json.loads(path.read_text("utf-8")).get(name) if path.exists() else None
 
 
 def keep(docs: Path, name: str, record: Any) -> None:
     """Replaces what the campaign left before; everything else stays."""
-    path = _path(docs)
+    path = docs / _FILE
     before = json.loads(path.read_text("utf-8")) if path.exists() else {}
     path.parent.mkdir(parents=True, exist_ok=True)
     whole = dict(sorted({**before, name: record}.items()))
@@ -40,9 +37,8 @@ def _campaign(name: str, record: Any) -> str:
 def shortened(record: Any, section: Callable[[Any], str]) -> Any:
     """A record whose numbers have as few significant digits, three at least, as give the same section."""
     text = section(record)
-    return next(
-        short for n in range(3, 18) if section(short := _rounded(record, n)) == text
-    )  # 17: a float64 is itself
+    digits = range(3, 18)  # with 17 a float64 is itself
+    return next(short for n in digits if section(short := _rounded(record, n)) == text)
 
 
 def _rounded(value: Any, digits: int) -> Any:

@@ -18,9 +18,8 @@ __all__ = [
     "read_optional", "read_result",
 ]  # fmt: skip
 
-_LARGEST = (
-    1e300  # far above any figure, and products of two figures of pages still have a square root in float64
-)
+# Far above any figure, and products of two figures of pages still have a square root in float64
+_LARGEST = 1e300
 
 Figure = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)] | None
 """A number, or null where it was not measured."""

@@ -266,16 +266,13 @@ def _parsed(text: bytes) -> dict[str, object] | None:
 
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
+# How exports begin
 _EXPORTED = (
-    b"# gyrotc: ",
-    b"serial,axis,temperature_c,slope_c_per_min,bias_dph",
-    b"/* gyrotc: ",
+    b"# gyrotc: ", b"serial,axis,temperature_c,slope_c_per_min,bias_dph", b"/* gyrotc: ",
     b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- gyrotc: ',
-)  # fmt: skip; how exports begin
-_UNIT, _MADE_BY = (
-    b"PK\x03\x04",
-    b'generationTool="gyrotc"',
-)  # an FMU: a ZIP file, its description first and as it is
+)  # fmt: skip
+# An FMU: a ZIP file, its description first and as it is
+_UNIT, _MADE_BY = b"PK\x03\x04", b'generationTool="gyrotc"'
 
 unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""

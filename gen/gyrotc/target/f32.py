@@ -33,10 +33,7 @@ _H = np.float32(float.fromhex("0x1.71549ep+6"))
 _G = np.float32(float.fromhex("0x1.0a69ccp+13"))
 _C = Decimal(float.fromhex("0x1.ebfc21c077705p-15"))
 _ROUND = np.float32(1.5 * 2**23)  # added and subtracted again: rounds to an integer
-_ONE, _EIGHT = (
-    np.float32(1.0),
-    np.float32(8.0),
-)  # the largest normalised input is 8: docs/numerics.md, section 2
+_ONE, _EIGHT = np.float32(1.0), np.float32(8.0)  # the largest normalised input: docs/numerics.md, section 2
 
 
 def exp2_table() -> Words:

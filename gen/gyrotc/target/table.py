@@ -168,9 +168,8 @@ class Table:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
         pointers = len(ARRAYS) + 4  # arrays, code of terms
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
-        return 4 * (
-            len(self.header) - 1 + pointers + 2 + arrays
-        )  # not the length; CRC and number of stand-ins
+        # The header without its length, and CRC and number of stand-ins
+        return 4 * (len(self.header) - 1 + pointers + 2 + arrays)
 
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""

@@ -75,20 +75,15 @@ class Program:
     def hooks(self, numeric: str, slot: str) -> list[tuple[int, int]]:
         """Functions behind a pointer of a term's code: address, and how many terms of the table have it."""
         found: dict[int, int] = {}
+        twin = (
+            "q31" if numeric == "f32" else "f32"
+        )  # what is the same in both is linked by one of the two names
         for kind in self.text.counts.kinds:
-            names = [
-                f"gtc_{n}_{what}"
-                for what in (f"{TERM_CODES[kind - 1]}_{slot}", "nothing")
-                for n in (numeric, _twin(numeric))
-            ]
+            hooks = (f"{TERM_CODES[kind - 1]}_{slot}", "nothing")
+            names = [f"gtc_{n}_{what}" for what in hooks for n in (numeric, twin)]
             address = next(self.addresses[n] for n in names if n in self.addresses)
             found[address] = found.get(address, 0) + 1
         return list(found.items())
-
-
-def _twin(numeric: str) -> str:
-    """Functions that are the same in both arithmetics are linked once, by one of the two names."""
-    return "q31" if numeric == "f32" else "f32"
 
 
 @dataclass(slots=True)
@@ -111,18 +106,15 @@ class Paths:
     numeric: str
     cost: list[int] = field(default_factory=lambda: [0])
     edges: list[tuple[int, int]] = field(default_factory=list)
-    limits: list[tuple[dict[int, float], float]] = field(
-        default_factory=list
-    )  # sum of factors x edges <= limit
+    # Sum of factors x edges <= limit
+    limits: list[tuple[dict[int, float], float]] = field(default_factory=list)
     entered: list[tuple[str, str, int]] = field(default_factory=list)  # caller, function, edge into it
     turns: dict[str, list[dict[int, float]]] = field(default_factory=dict)  # of loops, by text
     begun: dict[str, list[int]] = field(default_factory=dict)  # edges into loops from outside, by text
     stored: dict[str, list[int]] = field(
         default_factory=dict
     )  # nodes that write to memory for a line, by text
-    long_quotients: list[int] = field(
-        default_factory=list
-    )  # edges into the way of libgcc's division for these
+    long_quotients: list[int] = field(default_factory=list)  # edges into libgcc's way of dividing for these
 
     def whole(self, address: int) -> None:
         """Makes the graph of a function from its first instruction (edge 0) to its end (node 0)."""
@@ -422,9 +414,8 @@ def _linked(
 ) -> Path:
     """A program with every public function and the tables."""
     source = work / "bound.c"
-    names = [f"&gtc_{symbol}_{n}" for n in numerics] + [
-        f"(void *)gtc_{n}_{f}" for n in numerics for f in PUBLIC
-    ]
+    names = [f"&gtc_{symbol}_{n}" for n in numerics]
+    names += [f"(void *)gtc_{n}_{f}" for n in numerics for f in PUBLIC]
     rows = "\n".join(f"    {name}," for name in names)
     write_own(source, _ALL.format(symbol=symbol, rows=rows))
     lax = target.model_copy(update={"flags": (*target.flags, "-Wno-pedantic")})  # functions as addresses

@@ -277,11 +277,8 @@ class Object:
         return path
 
 
-_GRAPH = (
-    "-g",
-    "-fstack-usage",
-    "-fcallgraph-info=su",
-)  # debug information does not change code: gcc's manual, 3.10
+# Debug information does not change code: gcc's manual, 3.10
+_GRAPH = ("-g", "-fstack-usage", "-fcallgraph-info=su")
 _made: dict[str, Object] = {}  # by name, of this process
 
 
@@ -357,9 +354,8 @@ def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
 @functools.cache
 def _identity(compiler: str) -> list[str]:
     """What tells one installed compiler from another: its version, and the programs that it consists of."""
-    programs = (
-        [compiler] if "clang" in compiler else [compiler, _tool(compiler, "cc1"), _tool(compiler, "as")]
-    )
+    parts = () if "clang" in compiler else ("cc1", "as")
+    programs = [compiler, *(_tool(compiler, part) for part in parts)]
     found = [compiler_version(compiler)]
     for program in programs:
         path = shutil.which(program)
