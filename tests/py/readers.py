@@ -42,8 +42,7 @@ from gyrotc.tables.quantise import quantise
 from gyrotc.tables.record import RECORD, read_options
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.samples import run_blocks
-from gyrotc.verify.board import log_parts
-from gyrotc.verify.board_log import compared_words
+from gyrotc.verify.board import compared_words, log_parts
 from gyrotc.verify.job import verify
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet

@@ -73,11 +73,13 @@ def tables(kind: type[BaseModel], told: Collection[type[BaseModel]] = ()) -> str
     above = {inner for one in told for inner in _in_order({one: None})}
     parts = []
     for one in (one for one in _in_order(seen) if one not in above):
-        head = "" if one is kind else f"`{_name(one)}`: {_first_line(one)}\n\n"
-        rows = [
-            f"| `{_alias(one, name)}` | {_cell(one, name)} | {_told(one, name)} |"
-            for name in one.model_fields
-        ]
+        text = (one.__doc__ or "").strip().splitlines()[0]
+        head = "" if one is kind else f"`{_name(one)}`: {text[0].lower() + text[1:]}\n\n"
+        rows = []
+        for name, field in one.model_fields.items():
+            absent = "" if field.is_required() or name == "schema_" else "; may be absent"
+            meaning = (field.description or "").replace("|", "\\|")
+            rows.append(f"| `{field.alias or name}` | {_type(field.annotation)}{absent} | {meaning} |")
         parts.append(head + "\n".join(["| field | type | meaning |", "| --- | --- | --- |", *rows]) + "\n")
     return "\n".join(parts)
 
@@ -104,25 +106,6 @@ def _inside(kind: Any) -> Iterator[type[BaseModel]]:
 
 def _name(kind: type[BaseModel]) -> str:
     return kind.__name__.lstrip("_")
-
-
-def _first_line(kind: type[BaseModel]) -> str:
-    text = (kind.__doc__ or "").strip().splitlines()[0]
-    return text[0].lower() + text[1:]
-
-
-def _alias(kind: type[BaseModel], name: str) -> str:
-    return kind.model_fields[name].alias or name
-
-
-def _told(kind: type[BaseModel], name: str) -> str:
-    return (kind.model_fields[name].description or "").replace("|", "\\|")
-
-
-def _cell(kind: type[BaseModel], name: str) -> str:
-    field = kind.model_fields[name]
-    absent = "" if field.is_required() or name == "schema_" else "; may be absent"
-    return _type(field.annotation) + absent
 
 
 def _type(kind: Any) -> str:

@@ -28,8 +28,7 @@ from ..jobs.release import accepted, unit_of
 from ..pages.report import page_environment
 from ..pages.unit import UnitResults
 from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
-from ..results.release import Budget, Limit
-from ..results.training import Manifest
+from ..results.release import Limit
 from ..store.files import write_atomically, write_own
 from ..store.folder import result_folder
 from ..store.marker import read_marker, sha256
@@ -307,12 +306,9 @@ def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:
         if unit.manifest is None:
             yield f"manifest.json{of} (build the unit again)"
     budget = units[0].budget
-    if budget is not None and not _traceable(budget):
+    instruments = budget.instruments if budget else ()
+    if budget and not any(one.quantity == "temperature" and one.certificate for one in instruments):
         yield 'instrument (a thermometer with its certificate: [[meta.instrument]], quantity = "temperature")'
-
-
-def _traceable(budget: Budget) -> bool:
-    return any(one.quantity == "temperature" and one.certificate for one in budget.instruments)
 
 
 def _as_built(folder: Path, unit: UnitResults) -> None:
@@ -330,14 +326,10 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
         )
     marker = read_marker(folder)
     left_out = marker.left_out if marker is not None else {}  # the model gives them; no fleet keeps them
-    for name, known in _proven(manifest).items():
+    for name, known in manifest.files.items():
         path = folder / name
-        if known == left_out.get(name) and not path.exists():
+        own = name.endswith("main.c") or not (name in _NEVER_REWRITTEN or name.startswith("c/"))
+        if own or (known == left_out.get(name) and not path.exists()):
             continue
         if not path.is_file() or sha256(path) != known:
             raise InputError(str(path), "is not as it was built", "a folder as gyrotc build left it")
-
-
-def _proven(manifest: Manifest) -> dict[str, str]:
-    kept = (name for name in manifest.files if name in _NEVER_REWRITTEN or name.startswith("c/"))
-    return {name: manifest.files[name] for name in kept if not name.endswith("main.c")}

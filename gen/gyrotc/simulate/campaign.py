@@ -108,7 +108,8 @@ def simulate(
     name, plan = read(scenario)
     form = RowForm.of(row_s, raw_hz, pulses, format)
     plan = with_noise(plan, noise)
-    gyro = SimulatedGyro(plan, _serial(plan, seed), gyro_map(plan, seed), seed, _seeds(seed)[1], name)
+    serial = plan.gyro.serial.replace("{seed}", f"{seed:04d}")
+    gyro = SimulatedGyro(plan, serial, gyro_map(plan, seed), seed, _seeds(seed)[1], name)
     report = progress or (lambda share: None)
     with result_folder(Path(out), "simulate") as stage:
         stage.of(gyro.serial)
@@ -305,10 +306,6 @@ def _write_texts(
     )
     truth = truth.model_copy(update={"lot": gyro.lot}) if gyro.lot else truth
     write_own(folder / TRUTH_FILE, json_text(truth.content()))
-
-
-def _serial(plan: Scenario, seed: int) -> str:
-    return plan.gyro.serial.replace("{seed}", f"{seed:04d}")
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:

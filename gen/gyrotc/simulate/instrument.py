@@ -26,7 +26,7 @@ from ..target.recursions import first_order
 from . import noise, profile
 from .gyro import BiasMap, channel_readings, channel_values, internal_of, internal_readings, quantised_c
 from .noise import CELL_S
-from .scenario import Chamber, Gyro, Profile, Scenario, ScenarioCause
+from .scenario import Chamber, Gyro, Profile, Scenario
 
 __all__ = ["SimulatedRecord", "ThermalNetwork", "chamber_air", "record", "thermal_network"]
 
@@ -163,7 +163,8 @@ def record(
     """
     world, sensing, noisy, fine, causal, inner = seeds.spawn(6)
     first, cells = _cells(run.record_from_min), _cells(run.record_min)
-    _need_room(scenario, first, cells)
+    arrays = _ARRAYS + 3 * len(scenario.gyro.node) + 2 * len(scenario.columns())
+    need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
     inside = slice(first, first + cells + 1)
     air_c, nodes_c, scene, true_channels = _scene(scenario, run, first + cells + 1, day, world)
     scene, bias = _bias(scenario, scene, true_channels, bias_map, causal)
@@ -174,7 +175,8 @@ def record(
     of_channels = _channel_readings(scenario, true_channels, channel_seeds)
     cavity = scene.cavity_c[inside]
     rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], 60.0 * np.diff(cavity) / CELL_S)
-    true = _integral(bias[inside])
+    there = bias[inside]
+    true = np.concatenate(([0.0], np.cumsum(0.5 * CELL_S * (there[1:] + there[:-1]))))
     gathered = true + np.concatenate(([0.0], np.cumsum(rough.angle_arcsec)))
     return SimulatedRecord(
         reading_c=reading[inside][:-1],
@@ -182,7 +184,7 @@ def record(
         states=_of_record(internal.states, inside),
         air_c=air_c[inside],
         cavity_c=cavity,
-        bias_dph=bias[inside],
+        bias_dph=there,
         true_arcsec=true,
         rough_arcsec=gathered,
         angle_arcsec=_read_angle(gathered, scenario.noise.quantum_arcsec, noisy),
@@ -191,12 +193,6 @@ def record(
         power_on_s=CELL_S * (_cells(run.power_on_min) - first),
         seeds=fine,
     )
-
-
-def _need_room(scenario: Scenario, first: int, cells: int) -> None:
-    """Refuses a run that would not fit into memory."""
-    arrays = _ARRAYS + 3 * len(scenario.gyro.node) + 2 * len(scenario.columns())
-    need_memory(8.0 * arrays * (first + cells), "record_from_min and record_min of a profile", f"{cells} s")
 
 
 def _of_record(columns: dict[str, FloatArray], inside: slice) -> dict[str, FloatArray]:
@@ -224,11 +220,6 @@ def thermal_network(gyro: Gyro) -> ThermalNetwork:
 
 def _cells(minutes: float) -> int:
     return round(60.0 * minutes / CELL_S)
-
-
-def _integral(bias_dph: FloatArray) -> FloatArray:
-    steps = 0.5 * CELL_S * (bias_dph[1:] + bias_dph[:-1])
-    return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def _read_angle(angle: FloatArray, quantum_arcsec: float, seeds: np.random.SeedSequence) -> FloatArray:
@@ -287,13 +278,9 @@ def _bias(
     bias = bias_map(scene.cavity_c, slope)
     for (term, cause), child in zip(causes, seeds.spawn(len(causes)), strict=True):
         if term.bias is not None:
-            seen = _with_channel(scene, cause, true_channels)
+            seen = replace(scene, channel=true_channels[cause.channel]) if cause.channel else scene
             bias = bias + term.bias(seen, cause.values(), np.random.default_rng(child))
     return scene, bias
-
-
-def _with_channel(scene: Scene, cause: ScenarioCause, true_channels: dict[str, FloatArray]) -> Scene:
-    return scene if cause.channel is None else replace(scene, channel=true_channels[cause.channel])
 
 
 def _readings(scenario: Scenario, sensed_c: FloatArray, rng: np.random.Generator) -> FloatArray:

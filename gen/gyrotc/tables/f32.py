@@ -63,16 +63,14 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
-        stand_in_bounds_dph=tuple(_whole_bound(*one, scale, envelope, per_block) for one in stand_ins),
+        stand_in_bounds_dph=tuple(
+            math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins
+        ),
     )
 
 
 def _bound_parts(
-    model: Model,
-    scale: Words,
-    envelope: Words,
-    centers: Sequence[NDArray[np.float32]],
-    heads: Words,
+    model: Model, scale: Words, envelope: Words, centers: Sequence[NDArray[np.float32]], heads: Words
 ) -> dict[str, float]:
     """The error bound part by part, deg/h: of a bank the largest of its networks, and what the hand-over adds."""
     per_block = model.block_s / 60.0
@@ -86,12 +84,6 @@ def _bound_parts(
         parts["hand-over"] = handover_error_dph(model, "f32", axes, share_step=0.0, share_error=_SHARE)
         parts["blend"] = _blend(model, scale, envelope)
     return parts
-
-
-def _whole_bound(
-    network: Network, centers: NDArray[np.float32], scale: Words, envelope: Words, per_block: float
-) -> float:
-    return math.fsum(_bound(network, centers, scale, envelope, per_block).values())
 
 
 def _word(value: float) -> int:
@@ -112,11 +104,8 @@ def _lost(network: Network, largest: NDArray[np.float64]) -> float:
 
 def _record(network: Network, region: Envelope, per_block: float) -> Words:
     count = np.array([len(network.weights)], np.uint32)
-    return np.concatenate([count, _head(network), _region(region, per_block)])
-
-
-def _head(network: Network) -> Words:
-    return f32_words(_flushed(np.array([network.w0, *network.linear])))
+    head = f32_words(_flushed(np.array([network.w0, *network.linear])))
+    return np.concatenate([count, head, _region(region, per_block)])
 
 
 def _numbers(words: Words) -> NDArray[np.float64]:

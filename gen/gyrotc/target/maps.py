@@ -28,7 +28,7 @@ def evaluate_map(
         Statuses, shape (n,), and the bits of the biases (0 where the status is negative).
     """
     numbers = table.numbers(inputs)
-    missing = _is_missing(table, numbers)
+    missing = ~np.isfinite(numbers) if table.numeric == "f32" else numbers == MISSING_Q31
     usable = ~(missing[:, 0] | missing[:, 1])
     x = np.where(usable[:, None], numbers, table.numbers(table.envelope)[[0, 2]])
     low, high = table.numbers(table.envelope).reshape(2, 2).T
@@ -74,10 +74,6 @@ def governed(bounds: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], NDArr
 def _words(table: Table, x: NDArray[Any]) -> Words:
     bits = np.asarray(x, dtype=np.float32) if table.numeric == "f32" else np.asarray(x).astype(np.int32)
     return np.ascontiguousarray(bits).view(np.uint32)
-
-
-def _is_missing(table: Table, x: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray(~np.isfinite(x) if table.numeric == "f32" else x == MISSING_Q31)
 
 
 def _is_covered(table: Table, cell: NDArray[np.int64]) -> NDArray[np.bool_]:

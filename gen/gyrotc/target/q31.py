@@ -19,7 +19,6 @@ __all__ = [
     "CUT",
     "ENTRIES",
     "GAUSS_ERROR",
-    "POSITION_BITS",
     "Points",
     "biases",
     "cells",
@@ -31,7 +30,6 @@ __all__ = [
 
 ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
 CUT = 32 << 24  # u in 2^-24
-POSITION_BITS = 27  # gain of an input: position = offset * gain * 2^-27
 _H = np.uint64(1557473452)  # 2^-24
 _G = np.uint64(558709134)  # 2^-16
 _TOP = 2052389455  # 2^-29 of one, at the top of the table: docs/numerics.md, section 3

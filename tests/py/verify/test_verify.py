@@ -21,7 +21,7 @@ from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
 from gyrotc.tables.emit import emit, expected_answers
 from gyrotc.verify import job as package
-from gyrotc.verify.board_log import compared_words, read_output
+from gyrotc.verify.board import compared_words, read_output
 from gyrotc.verify.job import verify
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 from jobs import job_of
