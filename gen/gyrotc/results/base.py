@@ -26,6 +26,7 @@ Figure = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)] | None
 Amount = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Axis = Annotated[str, Field(pattern="^[xyz]$")] | None
 Arithmetic = Literal["f32", "q31"]
 
@@ -73,6 +74,13 @@ class Result(Numbered):
     """A whole result, with the version that wrote it."""
 
     gyrotc_version: str = Field(description="of the gyrotc that wrote it")
+
+
+class UnitResult(Result):
+    """A result of one gyro."""
+
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis")
 
 
 def read_result(path: Path, kind: type[R]) -> R:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Axis, Count, Figure, Part, Result
+from .base import Count, Figure, Part, Result, UnitResult
 from .planned import DetectionLimit
 
 __all__ = [
@@ -230,12 +230,10 @@ class FoundEvent(Part):
     )
 
 
-class Diagnosed(Result):
+class Diagnosed(UnitResult):
     """What the static map does not explain, and why (`gyrotc diagnose`)."""
 
     schema_: Annotated[Literal["gyrotc.diagnose/1"], Field(alias="schema")] = "gyrotc.diagnose/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     verdict: DiagnosisVerdict = Field(description="see docs/diagnosis.md")
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..common.metrics import Averages, statistics
 from ..common.ranges import AverageLength
-from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Result
+from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .release import HeldLimits
 
 __all__ = [
@@ -82,12 +82,10 @@ class Method(Part):
     )
 
 
-class Comparison(Result):
+class Comparison(UnitResult):
     """Every training method on one data set (`gyrotc compare`)."""
 
     schema_: Annotated[Literal["gyrotc.compare/1"], Field(alias="schema")] = "gyrotc.compare/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")
     seed: int = Field(description="of everything that is drawn")
@@ -173,12 +171,10 @@ class ModelSizes(Part):
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
 
 
-class Evaluation(Result):
+class Evaluation(UnitResult):
     """What the compiled code makes of recordings (`gyrotc evaluate`)."""
 
     schema_: Annotated[Literal["gyrotc.evaluate/1"], Field(alias="schema")] = "gyrotc.evaluate/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     numeric: Arithmetic = Field(description="arithmetic that was run")
     block_s: float = Field(description="length of a block, s")
     average_s: AverageLength = Field(description="averaging of all RMS figures, s")
@@ -316,12 +312,10 @@ class Calibration(Part):
     significant: bool | None = Field(description="whether it moved by more than that")
 
 
-class Changes(Result):
+class Changes(UnitResult):
     """What is different from an earlier result (`gyrotc build --previous`)."""
 
     schema_: Annotated[Literal["gyrotc.changes/1"], Field(alias="schema")] = "gyrotc.changes/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     same_model: bool = Field(description="whether the models have one hash")
     model_hash: TextChange = Field(description="hashes of the models")
     recordings: FileChanges = Field(description="recordings that the models were fitted to")

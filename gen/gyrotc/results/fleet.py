@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
-from .base import Amount, Axis, Count, Figure, Part, Result
+from .base import Amount, Axis, Count, Figure, Part, Result, Share
 from .release import Verdict
 
 __all__ = [
@@ -160,7 +160,7 @@ class FleetEntry(FleetUnit):
     sketch: Annotated[str, Field(pattern="^([0-9a-f]{16})*$")] = Field(
         default="", description="the 16-digit hashes of some rows, chosen by their value: copies share them"
     )
-    key: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = Field(
+    key: Sha256 | None = Field(
         default=None, description="SHA-256 over recordings, options, limits and program"
     )
     _kept: bool = PrivateAttr(default=False)
@@ -222,7 +222,7 @@ class Copy(Part):
     serial: str = Field(description="its serial")
     other: str = Field(description="name of the other")
     other_serial: str = Field(description="the other's serial")
-    share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+    share: Share = Field(
         description="of the rows of the one with fewer, estimated from the hashes that both have"
     )
 

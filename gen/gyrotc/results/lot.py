@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Amount, Axis, Count, Figure, Part, Positive, Result
+from .base import Amount, Axis, Count, Figure, Part, Positive, Result, Share
 
 __all__ = [
     "AtRest",
@@ -24,7 +24,6 @@ __all__ = [
 Celsius = Annotated[float, Field(ge=-400.0, le=800.0)]
 Rate = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Numbers = tuple[float, ...]
-_Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class LotFunctions(Part):
@@ -65,7 +64,7 @@ class LotUnit(Part):
     serial: str = Field(description="gyro serial")
     model_hash: str = Field(description="hash of its model")
     cluster: int | None = Field(description="number of its cluster, from 0; null: it was set aside")
-    p_value: _Share = Field(description="probability that a unit of the lot without it lies as far from it")
+    p_value: Share = Field(description="probability that a unit of the lot without it lies as far from it")
 
 
 class CrossValidation(Part):
@@ -135,11 +134,11 @@ class LotUse(Part):
     units: Count = Field(description="units that the lot was learnt from")
     member: bool = Field(description="whether this serial is one of them: then the lot has seen it before")
     cluster: int = Field(description="number of the cluster that fits best, from 0")
-    p_value: _Share = Field(
+    p_value: Share = Field(
         description="probability that a unit of the lot lies as far from it as these runs do"
     )
     accepted: bool = Field(description="whether the lot was used: p_value is at least `false_alarm`")
-    false_alarm: _Share = Field(description="share of the lot's own units that the test refuses")
+    false_alarm: Share = Field(description="share of the lot's own units that the test refuses")
     text: str = Field(description="in words: what came from the lot and what from the unit's own runs")
     own_share: Figure = Field(
         description="of the variance that the lot leaves, mean over the envelope: what the unit's runs have removed"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Amount, Axis, Count, Figure, Part, Positive, Result
+from .base import Amount, Count, Figure, Part, Positive, Result, Share, UnitResult
 
 __all__ = [
     "Accuracy",
@@ -63,25 +63,20 @@ class LotPlan(Result):
     )
 
 
-_Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
 class ProposedRun(Part):
     """A run, what it is expected to bring, and what it costs."""
 
     programme: LotProgramme = Field(description="what the chamber does, and 1 sigma of the map after it")
-    removed_share: _Share = Field(
+    removed_share: Share = Field(
         description="of the map's variance, mean over where corrections are asked for"
     )
     price: Amount = Field(description="of the run, with what one run costs before it begins")
 
 
-class NextRun(Result):
+class NextRun(UnitResult):
     """Which run to record next for a unit (`gyrotc plan --unit`)."""
 
     schema_: Annotated[Literal["gyrotc.next-run/1"], Field(alias="schema")] = "gyrotc.next-run/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     model_hash: str = Field(description="of the unit's model")
     scenario: str = Field(description="whose chamber and instrument are assumed")
     before_dph: Amount = Field(description="1 sigma of the map as it is known now, deg/h")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .base import Axis, Count, Figure, Numbered, Part, Result
+from .base import Axis, Count, Figure, Numbered, Part, Result, Share
 
 __all__ = [
     "Checked",
@@ -134,9 +134,7 @@ class TrueLot(Part):
     """Where a gyro of a simulated lot stands in it."""
 
     units: int = Field(description="gyros in the lot")
-    family: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        description="correlation of each parameter between two units of one cluster"
-    )
+    family: Share = Field(description="correlation of each parameter between two units of one cluster")
     clusters: int = Field(description="groups with a center of their own")
     cluster: int = Field(description="number of the group, from 0; of a stranger that of none: -1")
     stranger: bool = Field(description="whether it shares nothing with the lot but the scenario")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Amount, Axis, Figure, Part, Positive, Result
+from .base import Amount, Axis, Figure, Part, Positive, Result, UnitResult
 
 __all__ = [
     "RELEASED",
@@ -61,12 +61,10 @@ class Contribution(Part):
     certificate: str = Field(default="", description="that states it; empty: none")
 
 
-class Budget(Result):
+class Budget(UnitResult):
     """Uncertainty of the bias that is left after compensation (`gyrotc build`)."""
 
     schema_: Annotated[Literal["gyrotc.budget/1"], Field(alias="schema")] = "gyrotc.budget/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     measurand: str = Field(description="what the uncertainty is of, in words")
     contributions: tuple[Contribution, ...] = Field(description="all that are known")
     not_known: tuple[str, ...] = Field(description="sources of which nothing was stated, which are not in it")
@@ -139,12 +137,10 @@ class Limit(Part):
         return f"{self.limit} = {bound} is not met: {measured}"
 
 
-class HeldLimits(Result):
+class HeldLimits(UnitResult):
     """Limits of a product, held against what was measured (`gyrotc build --limits`)."""
 
     schema_: Annotated[Literal["gyrotc.limits/1"], Field(alias="schema")] = "gyrotc.limits/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     product: str = Field(description="name of the product, empty where the limits file gives none")
     sha256: str = Field(description="of the limits file")
     met: bool = Field(description="whether all are met; false where the file gives no limits")

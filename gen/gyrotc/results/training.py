@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .base import Amount, Axis, Count, Figure, Part, Result
+from .base import Amount, Count, Figure, Part, Share, UnitResult
 from .evaluation import FoundIn, Pooled
 from .lot import KnownMap, LotUse, UnitCurve
 
@@ -27,8 +27,6 @@ __all__ = [
     "SpanLeftOut",
     "Training",
 ]
-
-_Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class CheckedCell(Part):
@@ -68,10 +66,10 @@ class EarlierUse(Part):
     date: str | None = Field(description="of the earlier calibration; null: it states none")
     ageing_dph: Amount = Field(description="how far the bias may have moved since, 1 sigma, deg/h")
     ageing_from: str = Field(description="where that comes from")
-    p_value: _Share = Field(
+    p_value: Share = Field(
         description="probability that a unit that has not changed lies as far away as this one"
     )
-    false_alarm: _Share = Field(
+    false_alarm: Share = Field(
         description="share of unchanged units of which it is said that they have changed"
     )
     confirmed: bool = Field(description="whether the check run confirms the earlier model")
@@ -200,12 +198,10 @@ class MapMeans(Part):
     mean_s: _Length = Field(description="their length, s")
 
 
-class Training(Result):
+class Training(UnitResult):
     """How a model was fitted (`gyrotc fit`)."""
 
     schema_: Annotated[Literal["gyrotc.fit/1"], Field(alias="schema")] = "gyrotc.fit/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     units: DeclaredUnits = Field(description="of the recordings")
     method: str = Field(description="training method")
     seed: int = Field(description="from which everything random follows")
@@ -255,12 +251,10 @@ class Training(Result):
     )
 
 
-class Manifest(Result):
+class Manifest(UnitResult):
     """What a certificate must be able to name of a build."""
 
     schema_: Annotated[Literal["gyrotc.manifest/1"], Field(alias="schema")] = "gyrotc.manifest/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     model_hash: str = Field(description="hash of the model")
     refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
     versions: dict[str, str] = Field(description="programs that it was made with")

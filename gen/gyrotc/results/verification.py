@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Arithmetic, Axis, Count, Part, Result
+from .base import Arithmetic, Axis, Count, Part, Result, UnitResult
 from .release import Verdict
 
 __all__ = [
@@ -36,12 +36,10 @@ class EmittedTable(Part):
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
 
 
-class Emitted(Result):
+class Emitted(UnitResult):
     """Tables that were written."""
 
     schema_: Annotated[Literal["gyrotc.emit/1"], Field(alias="schema")] = "gyrotc.emit/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
     id: str = Field(description="id of the table, part of every emitted name")
     tables: tuple[EmittedTable, ...] = Field(description="one for each arithmetic")
     refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")

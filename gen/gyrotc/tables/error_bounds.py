@@ -34,7 +34,7 @@ from ..target.maps import evaluate_map
 from ..target.q31 import GAUSS_ERROR
 from ..target.recursions import TableKind
 from ..target.table import Numeric, Table, f32_words
-from .rounding import exp2_of_minus, guard_of, largest_gradient
+from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient
 
 __all__ = [
     "MARGIN",
@@ -249,7 +249,6 @@ def _steepest(values: Sequence[float], reach_c: float) -> float:
 
 # Of T and of dT/dt: the bound is loose by what a share grows within a cell, the time grows with their number
 _CELLS = (256, 128)
-_LOG2E = 1.4426950408889634  # log2(e)
 
 
 @dataclass(frozen=True, slots=True)
@@ -422,7 +421,7 @@ def _values(model: Model, network: Network, z: list[FloatArray]) -> tuple[FloatA
     values = network.w0 + linear[0] * z[0][:, None] + linear[1] * z[1][None, :]
     for place, narrow, weight in zip(centers, inverse, weights, strict=True):
         a, b = ((z[k] - place[k]) * narrow[k] for k in (0, 1))
-        values = values + weight * exp2_of_minus(a * a * _LOG2E)[:, None] * exp2_of_minus(b * b * _LOG2E)
+        values = values + weight * exp2_of_minus(a * a * LOG2E)[:, None] * exp2_of_minus(b * b * LOG2E)
     low, high = (np.array([x[end] for x in z]) for end in (0, -1))
     steepest = largest_gradient(linear, centers, inverse, weights, low, high)
     span = np.abs(linear) * (high - low)

@@ -118,13 +118,15 @@ def _normalised(scale: Words, temperature: float, slope: float) -> tuple[float, 
     return (temperature - offset) * gain_t, slope * gain_r
 
 
-def _check_range(scale: Words, envelope: Words) -> None:
+def _corners(scale: Words, envelope: Words) -> NDArray[np.float64]:
+    """Lowest and highest inputs of the envelope, normalised, shape (2, 2)."""
     t0, t1, r0, r1 = _numbers(envelope).tolist()
-    for t, r in ((t0, r0), (t1, r1)):
-        if not all(abs(z) <= _MAX_ABS_Z for z in _normalised(scale, t, r)):  # nor NaN
-            raise CheckFailed(
-                f"f32: the envelope reaches beyond {_MAX_ABS_Z:g} half ranges of the model's scale"
-            )
+    return np.array([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
+
+
+def _check_range(scale: Words, envelope: Words) -> None:
+    if not np.all(np.abs(_corners(scale, envelope)) <= _MAX_ABS_Z):  # nor NaN
+        raise CheckFailed(f"f32: the envelope reaches beyond {_MAX_ABS_Z:g} half ranges of the model's scale")
 
 
 def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.float32]:
@@ -153,8 +155,7 @@ def _gradient(
     network: Network, scale: Words, envelope: Words, per_block: float, margin: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Largest slopes of the network over the envelope and `margin` around it, in normalised inputs."""
-    t0, t1, r0, r1 = _numbers(envelope).tolist()
-    corners = np.array([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
+    corners = _corners(scale, envelope)
     inverse = [[1.0 / w if w is not None else 0.0 for w in pair] for pair in network.widths]
     return largest_gradient(
         np.array(network.linear),
@@ -168,9 +169,7 @@ def _gradient(
 
 def _largest(scale: Words, envelope: Words) -> NDArray[np.float64]:
     """Largest |z| over the envelope, shape (2,)."""
-    t0, t1, r0, r1 = _numbers(envelope).tolist()
-    corners = np.abs([_normalised(scale, t, r) for t, r in ((t0, r0), (t1, r1))])
-    return np.asarray(np.max(corners, axis=0))
+    return np.asarray(np.max(np.abs(_corners(scale, envelope)), axis=0))
 
 
 def _input_errors(scale: Words, envelope: Words) -> NDArray[np.float64]:

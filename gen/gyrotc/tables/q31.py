@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from ..target.table import Table
 from .error_bounds import Axis, handover_error_dph, regions, unbounded
 from .rounding import (
     STEEPEST,
+    Floats,
     exp2_of_minus,
     gram,
     guard_words,
@@ -55,8 +55,6 @@ _SQRT_LN2 = 0.8325546111576977  # √(ln 2)
 # Largest |d/dx| and |d²/dx²| of 2^-(α x)², as factors of α and α².
 _SLOPE = STEEPEST * _SQRT_LN2
 _CURVE = 2.0 * 0.6931471805599453  # 2 ln 2
-
-Floats = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +165,6 @@ def surface_of(network: Network, scale: Scale, per_block: float, inputs: Inputs)
     )
 
 
-_INPUT = 65536.0  # units of a temperature in C
 _MAX_SPAN = 2**26  # 1024 C in 2^-16 C: an offset times 32 then fits 32 bits
 _FINEST = 28  # largest number of fraction bits of an argument
 _COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
@@ -269,7 +266,7 @@ def _bound(network: _Fixed, inputs: Inputs, frac_bits: int) -> dict[str, float]:
 def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
     """T min, T max, slope min, slope max in 2^-16 C and 2^-16 C per block."""
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    low_t, high_t, low_r, high_r = (round(v * _INPUT) for v in (t0, t1, r0 * per_block, r1 * per_block))
+    low_t, high_t, low_r, high_r = (round(v * _UNITS_PER_C) for v in (t0, t1, r0 * per_block, r1 * per_block))
     if max(high_t - low_t, high_r - low_r) >= _MAX_SPAN - 1024:
         raise CheckFailed("q31: the envelope spans more than 1023 C, or 1023 C per block")
     return low_t, high_t, low_r, high_r
@@ -412,7 +409,7 @@ def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
         inputs, (region.temperature_c, region.slope_c_per_min), (1.0, per_block), strict=True
     ):
         for value in pair:
-            edges.append(min(max(round(scale.position(value * unit * _INPUT)), 0), POSITIONS - 1))
+            edges.append(min(max(round(scale.position(value * unit * _UNITS_PER_C)), 0), POSITIONS - 1))
     return edges
 
 
@@ -425,7 +422,7 @@ def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
     edges = np.array([_region(region, inputs, model) for region in boxes], dtype=np.float64)
     t, r = (
         Axis(
-            factor=unit * _INPUT * scale.per_unit,
+            factor=unit * _UNITS_PER_C * scale.per_unit,
             offset=-scale.low * scale.per_unit - 0.5,
             limits=(0.0, POSITIONS - 1.0),
             edges=edges[:, 2 * k : 2 * k + 2],

@@ -162,6 +162,7 @@ def _date(model: Model) -> int:
 Floats = NDArray[np.floating[Any]]
 
 _LN2 = 0.6931471805599453  # ln 2
+LOG2E = 1.4426950408889634  # log2(e)
 _DEGREE = 17  # of the series of e^y, |y| < ln 2: what is left out is below 2^-60
 
 
@@ -211,9 +212,7 @@ def solve(matrix: Floats, right: Floats) -> Floats:
 
 # Of T and of dT/dt: the bound is loose by what a slope grows between them, the time grows with their number
 _POINTS = (513, 257)
-_STEEPEST = 0.8577638849607068  # largest |d/dx exp(-x²)|, at x = 1/√2
 _MOST_CURVED = 2.0  # largest |d²/dx² exp(-x²)|
-_LOG2E = 1.4426950408889634  # log2(e)
 
 
 def largest_gradient(
@@ -239,12 +238,12 @@ def largest_gradient(
         for center, inverse, weight in zip(centers, inverse_widths, weights, strict=True):
             a = (moving[axis] - center[axis]) * inverse[axis]
             b = (moving[other] - center[other]) * inverse[other]
-            steep = weight * (-2.0 * a * inverse[axis]) * exp2_of_minus(a * a * _LOG2E)
-            slope += np.multiply(steep[:, None], exp2_of_minus(b * b * _LOG2E), out=product)
+            steep = weight * (-2.0 * a * inverse[axis]) * exp2_of_minus(a * a * LOG2E)
+            slope += np.multiply(steep[:, None], exp2_of_minus(b * b * LOG2E), out=product)
         half = (high - low) / (np.array(_POINTS) - 1.0) / 2.0
         size = np.abs(weights) * inverse_widths[:, axis]
         growth = _MOST_CURVED * half[axis] * size * inverse_widths[:, axis]
-        growth = growth + _STEEPEST**2 * half[other] * size * inverse_widths[:, other]
+        growth = growth + STEEPEST**2 * half[other] * size * inverse_widths[:, other]
         bounds[axis] = np.max(np.abs(slope, out=slope)) + math.fsum(growth)
     return bounds
 

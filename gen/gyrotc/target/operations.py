@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import f32, q31
-from .arithmetic import Bells, Floating, Operations
+from .arithmetic import Bells, Floating, Numbers, Operations
 from .recursions import Recursion, TableKind, recursion_of
 from .table import ARRAYS, Table
 
 __all__ = ["recursions"]
-
-Numbers = NDArray[Any]
 
 _SINE_F32 = tuple(
     np.float32(float.fromhex(c))

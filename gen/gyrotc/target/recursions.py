@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from .arithmetic import Operations
+from .arithmetic import Numbers, Operations
 
 __all__ = [
     "Course",
@@ -97,9 +97,6 @@ def play(width: Any, temperature: NDArray[Number]) -> NDArray[Number]:
 def delayed(shift_s: float, time_s: FloatArray, values: FloatArray) -> FloatArray:
     """values(t − shift), linear between samples; beyond the record its first and last value."""
     return np.interp(time_s - shift_s, time_s, values)
-
-
-Numbers = NDArray[Any]
 
 
 class TableKind(IntEnum):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from . import f32, q31
+from .arithmetic import Numbers
 from .front_end import FALLBACK as FALLEN
 from .front_end import MAP, Steps
 from .recursions import Course, TableKind, TermOutcome
@@ -23,8 +24,6 @@ from .status import FALLBACK, UNCOVERED, WARMING
 from .table import ARRAYS, Table, Words
 
 __all__ = ["RULES", "Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
-
-Numbers = NDArray[Any]
 
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
 RULES = 11
