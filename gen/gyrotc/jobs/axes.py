@@ -116,9 +116,8 @@ def verify_axes(
     if not (folder / "c").is_dir():
         raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
     numeric = next(iter(results.values())).errors[0].numeric
-    emitted = file_entries(
-        folder / "c", joint_texts(models, _sources(folder, tuple(results)), numeric), edited
-    )
+    texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
+    emitted = tuple(file_entries(folder / "c", texts, edited))
     signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
     wrong = sum(file.status == "fail" for file in emitted)
     return JointVerification(
@@ -130,7 +129,7 @@ def verify_axes(
         + wrong
         + (signed is not None and signed.status == "fail"),
         missing=sum(one.missing for one in results.values()),
-        emitted=tuple(emitted),
+        emitted=emitted,
         signature=signed,
         axes=dict(results),
     )

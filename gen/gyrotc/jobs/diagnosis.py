@@ -49,22 +49,23 @@ def _saved(out: Path, found: Diagnosis, progress: Progress | None = None) -> Dia
 
     if progress:
         progress("drawing")
-    result = found.result
+    result, names = found.result, dict[str, Any]()
     if result.extended is not None and found.model is not None:
         found.model.save(out / _MODEL)
-        result = result.model_copy(update={"extended": result.extended.model_copy(update={"model": _MODEL})})
+        names["extended"] = result.extended.model_copy(update={"model": _MODEL})
     scenario = extended_scenario(result)
     if scenario is not None:
         write_atomically(out / _SCENARIO, scenario)
-        result = result.model_copy(update={"scenario": _SCENARIO})
+        names["scenario"] = _SCENARIO
     series = series_of(found)
     drawn = {} if series is None else draw(result, series)
     for name, svg in drawn.items():
         write_atomically(out / PICTURES / f"{name}.svg", svg)
-    result = result.model_copy(update={"pictures": tuple(f"{PICTURES}/{name}.svg" for name in drawn)})
+    names["pictures"] = tuple(f"{PICTURES}/{name}.svg" for name in drawn)
     if series is not None:
         write_atomically(out / SERIES, json_text(series.content()))
-        result = result.model_copy(update={"series": SERIES})
+        names["series"] = SERIES
+    result = result.model_copy(update=names)
     write_atomically(out / "diagnose.json", json_text(result.content()))
     write_diagnosis_page(out)
     return replace(found, result=result)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
 from typing import Any
@@ -139,30 +139,27 @@ def emit_texts(
         asked: The arithmetics were asked for by name.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
     """
-    return dict(_texts(_Made(model.hash, model, emission), asked, zero_at))
+    return dict(_texts(_Made.of(model, emission), asked, zero_at))
 
 
 def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.uint32]]:
     """Answers of the tables to the model's vectors by arithmetic: (status, bits), shape (n, 2), not to write to."""
-    return dict(_expected(_Made(model.hash, model, emission)))
+    return dict(_expected(_Made.of(model, emission)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class _Made:
     """A model and its tables; another one is the same if the model's hash is, and the tables are the same objects."""
 
     hash: str
-    model: Model
-    emission: Emission
+    tables: tuple[tuple[str, int], ...]
+    model: Model = field(compare=False)
+    emission: Emission = field(compare=False)
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Made) and self._key() == other._key()
-
-    def __hash__(self) -> int:
-        return hash(self._key())
-
-    def _key(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self.hash, tuple((numeric, id(table)) for numeric, table in self.emission.tables.items())
+    @classmethod
+    def of(cls, model: Model, emission: Emission) -> _Made:
+        tables = tuple((numeric, id(table)) for numeric, table in emission.tables.items())
+        return cls(model.hash, tables, model, emission)
 
 
 @functools.lru_cache(maxsize=2)

@@ -243,17 +243,14 @@ def _drift(
     return ~warming | young, np.where(warming & young, estimate, steps.slope)
 
 
-def sigma_bits(table: Table, evidence: SigmaEvidence, constant: Any = None) -> Words:
+def sigma_bits(table: Table, evidence: SigmaEvidence) -> Words:
     """Bits of 1 σ of every correction, the first one that before anything is believed.
 
     Args:
         table: A table with uncertainties.
         evidence: What is known of every correction.
-        constant: 1 σ of the constant of the power-on; None: as at a start.
     """
-    do = SQUARES[table.numeric]
-    if constant is None:
-        constant = _rules(table)[Rule.BETWEEN]
+    do, constant = SQUARES[table.numeric], _rules(table)[Rule.BETWEEN]
     none = do.squared(_rules(table)[Rule.NONE : Rule.NONE + 1])
     squares = np.concatenate([none, variances(table, evidence)]) + do.squared(np.asarray([constant]))
     roots = do.root(squares)

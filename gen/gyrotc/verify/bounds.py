@@ -34,7 +34,7 @@ from .flow import (
     parse_flows,
     totals,
 )
-from .sizes import PUBLIC, TERM_CODES
+from .sizes import PUBLIC, TERM_CODES, linked_name
 from .toolchain import Object, Target, compile_objects, disassembly, link, symbols
 
 __all__ = ["Paths", "Program", "instruction_bounds"]
@@ -400,13 +400,11 @@ def _bounds(
         if numeric == "f32" and "-mfloat-abi=soft" in target.flags:
             continue
         of_table = Program(flows, addresses, LoopText(lines, macros, known))
-        found[numeric] = {f: _bound(of_table, numeric, f, _public(addresses, numeric, f)) for f in PUBLIC}
+        found[numeric] = {
+            f: _bound(of_table, numeric, f, addresses[str(linked_name(addresses, numeric, f))])
+            for f in PUBLIC
+        }
     return found
-
-
-def _public(addresses: Mapping[str, int], numeric: str, function: str) -> int:
-    linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
-    return next(address for name, address in addresses.items() if linked.match(name))
 
 
 def _linked(

@@ -103,7 +103,7 @@ def file_entries(
     texts: Mapping[str, bytes],
     edited: Collection[str] = (),
     left_out: Collection[str] = (),
-) -> list[VerifiedFile]:
+) -> Iterator[VerifiedFile]:
     """One entry for each file that should be there or is.
 
     Args:
@@ -112,12 +112,6 @@ def file_entries(
         edited: Names of `EDITABLE` that may differ, but not be missing.
         left_out: Names of files that were not kept; those that are there nevertheless are compared.
     """
-    return list(_entries(c_folder, texts, edited, left_out))
-
-
-def _entries(
-    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str], left_out: Collection[str]
-) -> Iterator[VerifiedFile]:
     there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
     for name, data in sorted(texts.items()):
         if name not in there and name in left_out:

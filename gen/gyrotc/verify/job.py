@@ -264,7 +264,7 @@ def verify(
     job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
     texts = texts_again(model, options, emission)
     left_out = left_out_of(folder, model, texts)
-    emitted = file_entries(job.c_folder, texts, edited, left_out)
+    emitted = tuple(file_entries(job.c_folder, texts, edited, left_out))
     signed = check_signature(job.c_folder, key) if key is not None else None
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code

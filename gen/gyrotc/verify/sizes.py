@@ -8,7 +8,7 @@ a hook of a term; the deepest of them all counts, whichever terms a table has. F
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -165,11 +165,16 @@ def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
     }
 
 
+def linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:
+    """The name by which a public function is linked; None where it is not among them."""
+    linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
+    return next(filter(linked.match, names), None)
+
+
 def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, FunctionCost]:
     costs: dict[str, FunctionCost] = {}
     for function in PUBLIC:
-        linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
-        name = next((n for n in sizes if linked.match(n)), None)
+        name = linked_name(sizes, numeric, function)
         if name is not None:
             costs[function] = FunctionCost(
                 code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),
