@@ -6,7 +6,7 @@ import math
 import platform
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -91,47 +91,36 @@ def _made(made: Mapping[str, str]) -> str:
 def _table_1(figures: Figures, *, published: bool) -> str:
     """Table 1: before, after and improvement in each environment; with the paper's own figures or without."""
     before, after = figures["before"], figures["after"]
-
-    def row(label: str, value: Callable[[str], str]) -> _Row:
-        return [label, *(value(name) for name in ENVIRONMENTS)]
-
-    def paper(
-        method: str, value: Callable[[str], float], digits: int, label: str = "*paper*"
-    ) -> Iterator[_Row]:
-        if published and (method == "before" or method in AFTER_DPH):
-            yield row(label, lambda name: f"*{value(name):.{digits}f}*")
-
+    theirs = AFTER_DPH if published else {}
     rows = [
-        row("before: mean", lambda name: f"{1e3 * before[name]['mean_dph']:.3f}"),
-        row("before: RMS about zero", lambda name: f"{1e3 * before[name]['rms_dph']:.3f}"),
-        *paper("before", lambda name: 1e3 * BEFORE_DPH[name], 3, '*paper\'s "σ" before*'),
-        row("before: σ about the mean", lambda name: f"{1e3 * before[name]['std_dph']:.3f}"),
+        ["before: mean", *(f"{1e3 * before[name]['mean_dph']:.3f}" for name in ENVIRONMENTS)],
+        ["before: RMS about zero", *(f"{1e3 * before[name]['rms_dph']:.3f}" for name in ENVIRONMENTS)],
     ]
+    if published:
+        rows.append(['*paper\'s "σ" before*', *(f"*{1e3 * BEFORE_DPH[name]:.3f}*" for name in ENVIRONMENTS)])
+    rows.append(
+        ["before: σ about the mean", *(f"{1e3 * before[name]['std_dph']:.3f}" for name in ENVIRONMENTS)]
+    )
     for method, label in METHODS.items():
         of = after[method]
-        rows.append(row(f"after, {label}", lambda name, of=of: f"{1e3 * of[name]['rms_dph']:.3f}"))  # type: ignore[misc]
-        rows += paper(method, lambda name, m=method: 1e3 * AFTER_DPH[m][name], 3)  # type: ignore[misc]
+        rows.append([f"after, {label}", *(f"{1e3 * of[name]['rms_dph']:.3f}" for name in ENVIRONMENTS)])
+        if method in theirs:
+            rows.append(["*paper*", *(f"*{1e3 * theirs[method][name]:.3f}*" for name in ENVIRONMENTS)])
     for method in _MAIN:
         of = after[method]
-        rows.append(
-            row(
-                f"improvement, {METHODS[method]}",
-                lambda name, of=of: f"{before[name]['rms_dph'] / of[name]['rms_dph']:.1f}",  # type: ignore[misc]
-            )
-        )
-        rows += paper(method, lambda name, m=method: BEFORE_DPH[name] / AFTER_DPH[m][name], 1)  # type: ignore[misc]
+        gains = (f"{before[name]['rms_dph'] / of[name]['rms_dph']:.1f}" for name in ENVIRONMENTS)
+        rows.append([f"improvement, {METHODS[method]}", *gains])
+        if method in theirs:
+            gains = (f"*{BEFORE_DPH[name] / theirs[method][name]:.1f}*" for name in ENVIRONMENTS)
+            rows.append(["*paper*", *gains])
     for method in _MAIN:
         of = after[method]
-        rows.append(
-            row(
-                f"improvement of σ, {METHODS[method]}",
-                lambda name, of=of: f"{before[name]['std_dph'] / of[name]['std_dph']:.2f}",  # type: ignore[misc]
-            )
-        )
+        gains = (f"{before[name]['std_dph'] / of[name]['std_dph']:.2f}" for name in ENVIRONMENTS)
+        rows.append([f"improvement of σ, {METHODS[method]}", *gains])
     for method, label in METHODS.items():
-        of = after[method]
-        if any(cell["centers"] for cell in of.values()):
-            rows.append(row(f"centers, {label}", lambda name, of=of: str(of[name]["centers"])))  # type: ignore[misc]
+        centers = [after[method][name]["centers"] for name in ENVIRONMENTS]
+        if any(centers):
+            rows.append([f"centers, {label}", *map(str, centers)])
     return _markdown(["1e-3 deg/h", *ENVIRONMENTS], rows)
 
 
