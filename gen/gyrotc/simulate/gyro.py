@@ -38,7 +38,7 @@ from ..causes.base import Scene
 from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .noise import CELL_S
-from .scenario import Channel, Laser, NodeDifference, Scenario, Thermometer
+from .scenario import Channel, Laser, Scenario, Thermometer
 
 __all__ = [
     "BiasMap",
@@ -294,7 +294,9 @@ def internal_of(
     """Differences and laser of a run; `rng` draws what no temperature moves."""
     bias = np.zeros(len(scene.time_s))
     for one in scenario.difference:
-        bias = bias + _difference(one, nodes_c[one.node] - nodes_c[one.against], scene.cavity_c)
+        x = nodes_c[one.node] - nodes_c[one.against]
+        bent = x / np.sqrt(1.0 + (x / one.saturation_c) ** 2)
+        bias = bias + one.dph_per_c * bent * (1.0 + one.growth_per_c * (scene.cavity_c - _REFERENCE_C))
     laser = scenario.laser
     if not (scenario.thermometer or scenario.difference or laser):
         return Internal(bias, nodes_c, None, {})
@@ -314,11 +316,6 @@ def internal_of(
     )
     states |= {"loss_ppm": found.loss_ppm, "gain_ppm": found.gain_ppm, "stroke": found.stroke}
     return Internal(bias + laser_bias(laser, found), nodes_c, found, states)
-
-
-def _difference(one: NodeDifference, x: FloatArray, cavity_c: FloatArray) -> FloatArray:
-    bent = x / np.sqrt(1.0 + (x / one.saturation_c) ** 2)
-    return np.asarray(one.dph_per_c * bent * (1.0 + one.growth_per_c * (cavity_c - _REFERENCE_C)))
 
 
 def internal_readings(

@@ -141,22 +141,19 @@ def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list
         drawn, foreign = (mix @ rng.standard_normal(len(SCORES)) for _ in range(2))
         center = foreign if k in strange else centers[cluster[k]]
         score = np.sqrt(order.family) * center + np.sqrt(1.0 - order.family) * drawn
-        truth = _truth(order, -1 if k in strange else int(cluster[k]), score)
+        group = -1 if k in strange else int(cluster[k])
+        truth = TrueLot(
+            units=order.units,
+            family=order.family,
+            clusters=order.clusters,
+            cluster=group,
+            stranger=group < 0,
+            scores={key: float(value) for key, value in zip(SCORES, score, strict=True)},
+        )
         bias_map = _map(plan.gyro, truth.scores, center, order.family)
         made_plan, serial = _instrument(plan, truth.scores), f"LOT-{seed:04d}-{k + 1:03d}"
         units.append(SimulatedGyro(made_plan, serial, bias_map, seed, of_noise, name, truth))
     return units
-
-
-def _truth(order: LotOrder, cluster: int, score: FloatArray) -> TrueLot:
-    return TrueLot(
-        units=order.units,
-        family=order.family,
-        clusters=order.clusters,
-        cluster=cluster,
-        stranger=cluster < 0,
-        scores={key: float(value) for key, value in zip(SCORES, score, strict=True)},
-    )
 
 
 def _mixing() -> FloatArray:

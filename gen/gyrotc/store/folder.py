@@ -127,7 +127,7 @@ def result_folder(
     try:
         with deferred():
             job = _Job(out, kind, command, names, inputs)
-        yield job.stage()
+        yield Stage(job.work, job, "")
         job.prepare()
         with deferred():
             job.commit()
@@ -207,7 +207,7 @@ class _Job:
         self._lock = Lock(self.place, command)
         try:
             self._recover()
-            self._clean()
+            _clean_beside(self.place)  # what dead jobs left, which held this lock
             self._clean_parts()
             self.earlier = check_contents(out, self.place, kind or None, entries)
             self.parts = {"": marker_of(kind or (self.earlier.kind if self.earlier else "result"), command)}
@@ -229,9 +229,6 @@ class _Job:
             work.rmdir()
             raise
         return work
-
-    def stage(self) -> Stage:
-        return Stage(self.work, self, "")
 
     def part(self, path: Path, kind: str, command: str) -> Stage:
         """A result inside this one, with a marker of its own."""
@@ -298,7 +295,7 @@ class _Job:
         _open.remove(self)
         unfinished.remove(self._begun)
         try:
-            self._clean()
+            _clean_beside(self.place)
         finally:
             self._lock.release()
 
@@ -310,12 +307,8 @@ class _Job:
                     path.rename(self.place)
                     return
 
-    def _clean(self) -> None:
-        """Removes what this and dead jobs left beside the place: they held the lock that this one holds."""
-        _clean_beside(self.place)
-
     def _clean_parts(self) -> None:
-        """The same for the parts of a result that is replaced as a whole; none may be in work."""
+        """Removes what dead jobs left beside parts of a result that is replaced as a whole; none may be in work."""
         marker = read_marker(self.place) if self._entries is None and self.place.is_dir() else None
         for part in marker.parts if marker else ():
             place = self.place / part
@@ -381,15 +374,11 @@ def _described(folder: Path, marker: Marker, parts: tuple[str, ...]) -> Marker:
     """A marker with the hashes of what is in a folder; the files are on disk then, empty folders are gone."""
     files = {}
     for name in walk(folder, parts):
-        if name.endswith("/"):
-            _remove_empty_folders(folder, name)
-        else:
-            files[name] = sha256(folder / name, sync=True)
+        path = folder / name
+        if not name.endswith("/"):
+            files[name] = sha256(path, sync=True)
+            continue
+        while path != folder and not any(path.iterdir()):
+            path.rmdir()
+            path = path.parent
     return marker.but(files=files, parts=parts)
-
-
-def _remove_empty_folders(folder: Path, name: str) -> None:
-    path = folder / name
-    while path != folder and not any(path.iterdir()):
-        path.rmdir()
-        path = path.parent
