@@ -201,7 +201,7 @@ def _means(
     there.reshape(-1)[: x.size] = used
     count = np.count_nonzero(there, axis=1)
     base = values[np.arange(blocks), np.argmax(there, axis=1)]
-    d = np.where(there, arithmetic.diff(values, base[:, None]), values.dtype.type(0))
+    d = np.where(there, values - base[:, None], values.dtype.type(0))
     mean = arithmetic.mean(base, arithmetic.running_sum(d), np.maximum(count, 1))
     return 2 * count >= whole, mean
 
@@ -274,7 +274,7 @@ def _closings(
     last = blocks[full]
     at = last - (window - 1) + np.arange(window)[:, None]
     used = valid[at]
-    d = arithmetic.diff(mean[at], mean[last])
+    d = mean[at] - mean[last]
     steep = arithmetic.slope(d, used)
     sure = np.count_nonzero(used, axis=0) >= max(2, (window + 1) // 2)
     slope[full] = np.where(sure, steep, slope.dtype.type(0))

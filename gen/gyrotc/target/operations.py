@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import f32, q31
-from .arithmetic import Bells, Floating, Numbers, Operations
+from .arithmetic import Bells, Numbers, Operations
 from .recursions import Recursion, TableKind, recursion_of
 from .table import ARRAYS, Table
 
@@ -30,8 +30,8 @@ _PART = 2**30  # of a factor of products that keep to 63 bits
 _FAR = 6 * 2**28  # an argument whose square is 36 octaves: a Gaussian ends at 32
 
 
-class _F32(Floating):
-    """float32: the operations of `Floating`, one by one, on numpy's float32."""
+class _F32(Operations):
+    """float32: the same operations, one by one, on numpy's float32; exponential and cosine are its own."""
 
     def scalars(self, x: Numbers) -> Sequence[Any]:
         return list(x)
@@ -70,11 +70,8 @@ class _F32(Floating):
         return np.asarray(weight * f32.gauss(u))
 
 
-class _Q31:
+class _Q31(Operations):
     """Fixed point: Python integers one by one, int64 in arrays; no product leaves 63 bits."""
-
-    def scalars(self, x: Numbers) -> Sequence[Any]:
-        return list(x.tolist())
 
     def array(self, x: Sequence[Any]) -> Numbers:
         return np.array(x, dtype=np.int64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,30 +35,9 @@ _HALF_EXPONENT = np.uint32(0x1FBB4F2E)
 _HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)  # in float32, so that nothing widens
 
 
-class Squares(Protocol):
-    """Operations of one arithmetic, element by element, each rounded as on the target."""
+class Squares:
+    """Operations of float32, element by element, each rounded as on the target; fixed point has its own."""
 
-    def squared(self, x: Numbers) -> Numbers: ...
-
-    def per_c(self, a: Numbers, b: Any, word: Any) -> Numbers:
-        """word (a - b)"""
-
-    def times(self, k: NDArray[np.int64], x: Any) -> Numbers:
-        """k x, x of magnitude 2^30 at most in fixed point."""
-
-    def limited(self, x: Numbers) -> Numbers: ...
-
-    def estimate(self, mean: Numbers, start: Numbers, blocks: NDArray[np.int64]) -> Numbers:
-        """2 (mean - start) / (2 blocks - 1): the slope of a front end that began at `start`."""
-
-    def root(self, x: Numbers) -> Numbers: ...
-
-    def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> Numbers: ...
-
-    def unsettled(self, width: Any, low: Numbers, high: Numbers, word: Any) -> Numbers: ...
-
-
-class _F32:
     def squared(self, x: Numbers) -> Numbers:
         x = np.asarray(x, dtype=np.float32)
         return np.asarray(x * x)
@@ -67,12 +46,14 @@ class _F32:
         return np.asarray(word * (a - b))
 
     def times(self, k: NDArray[np.int64], x: Any) -> Numbers:
+        """k x, x of magnitude 2^30 at most in fixed point."""
         return np.asarray(np.asarray(k).astype(np.float32) * x)
 
     def limited(self, x: Numbers) -> Numbers:
         return x
 
     def estimate(self, mean: Numbers, start: Numbers, blocks: NDArray[np.int64]) -> Numbers:
+        """The slope of a front end that began at `start`."""
         return np.asarray((_TWO * (mean - start)) / (2 * blocks - 1).astype(np.float32))
 
     def root(self, x: Numbers) -> Numbers:
@@ -105,7 +86,7 @@ class _F32:
         return np.asarray(np.where(left > 0, left, np.float32(0.0)))
 
 
-class _Q31:
+class _Q31(Squares):
     def squared(self, x: Numbers) -> Numbers:
         magnitude = np.abs(self.limited(np.asarray(x, dtype=np.int64))).astype(np.uint64)
         return np.asarray(magnitude * magnitude)
@@ -151,7 +132,7 @@ class _Q31:
         return np.asarray(np.where(left > 0, (left * int(word)) >> 16, 0))
 
 
-SQUARES: dict[str, Squares] = {"f32": _F32(), "q31": _Q31()}
+SQUARES: dict[str, Squares] = {"f32": Squares(), "q31": _Q31()}
 
 
 class Rule:
