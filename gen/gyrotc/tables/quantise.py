@@ -75,11 +75,11 @@ def _refused(table: Table) -> Iterator[str]:
     if table.sigma.size and (cells == 0 or table.sigma.size != words):
         yield "sigma has not a word for each of its cells, twice, each rule and each term"
     yield from _guards(table, guard, guard_whole)
-    records = table.networks.reshape(-1, ARRAYS["networks"])
+    records = table.records("networks")
     if int(records[:, 0].sum(dtype=np.uint64)) != table.n_centers:
         yield "networks that do not share out the centers"
     yield from _each(table, records[:, 1:], network)
-    yield from _each(table, table.centers.reshape(-1, ARRAYS["centers"]), center)
+    yield from _each(table, table.records("centers"), center)
     yield from _terms(table, term)
     yield from _each(table, table.sigma.reshape(-1, 1), sigma)
     yield from _regions(table, records)
@@ -98,7 +98,7 @@ def _each(table: Table, records: NDArray[np.uint32], limits: Limits) -> Iterator
 
 
 def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
-    for channel, record in enumerate(table.guards.reshape(-1, ARRAYS["guards"])):
+    for channel, record in enumerate(table.records("guards")):
         numbers = table.numbers(record)
         yield from _beyond(numbers[:4], limits)
         yield from _beyond(record[4:7], wholes)
@@ -115,7 +115,7 @@ def _terms(table: Table, limits: Limits) -> Iterator[str]:
     if last < 1:
         yield "no network is left to the map"
     for record, channel, stand_in in zip(
-        table.terms.reshape(-1, ARRAYS["terms"]), table.channels, table.stand_ins, strict=True
+        table.records("terms"), table.channels, table.stand_ins, strict=True
     ):
         kind = int(record[0])
         last += stand_in != 0
@@ -159,7 +159,7 @@ def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
         span = high - low
         if not (0 <= span <= _SPAN and (span * 32 * gain) >> 32 <= _LAST_POSITION):
             yield "envelope is reversed, too wide, or its positions end beyond 65535"
-    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])
+    centers = table.numbers(table.records("centers"))
     last = centers[:, [0, 2]] * _LAST_POSITION + centers[:, [1, 3]]
     if np.any(np.abs(last) > _LARGEST):
         yield "argument of a Gaussian leaves 32 bits"

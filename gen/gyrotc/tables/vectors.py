@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..model import Model
 from ..target.front_end import period_us
+from ..target.history import Calls
 from .rounding import channel_names, guard_of
 
 __all__ = ["MISSING", "Calls", "Segment", "Vectors", "answers_text", "make_vectors"]
@@ -46,18 +47,6 @@ class Segment:
     step: int
     noise: int
     bits: dict[str, int]
-
-
-@dataclass(frozen=True, slots=True)
-class Calls:
-    """Calls of the step functions, one entry each, in order.
-
-    `missed[k]`: 0 for a call of `sample` with the bits `channels[k]`, shape (n, n_channels); else the count of a
-    call of `missed`.
-    """
-
-    channels: NDArray[np.uint32]
-    missed: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

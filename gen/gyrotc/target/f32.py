@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import ARRAYS, Table, Words
+from .table import Table, Words
 
 __all__ = ["ENTRIES", "FUSIBLE", "Fused", "biases", "cells", "exp2_table", "gauss", "normalise", "stand_in"]
 
@@ -97,8 +97,8 @@ def normalise(table: Table, x: NDArray[np.float32], fused: Fused = _NONE) -> Poi
 
 def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
     """Bits of the map's results."""
-    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
-    counts = table.networks.reshape(-1, ARRAYS["networks"])[: table.n_networks, 0].astype(np.int64)
+    networks = table.numbers(table.records("networks"))[: table.n_networks]
+    counts = table.records("networks")[: table.n_networks, 0].astype(np.int64)
     if len(networks) == 1:
         return _network(table, networks[0], 0, int(counts[0]), points, fused).view(np.uint32)
     total, shares = np.zeros_like(points.z_t), np.zeros_like(points.z_t)
@@ -117,7 +117,7 @@ def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
 
 def stand_in(table: Table, number: int, points: Points) -> NDArray[np.float32]:
     """What the network of this number, from 1 on, makes of inputs."""
-    records = table.networks.reshape(-1, ARRAYS["networks"])
+    records = table.records("networks")
     first, count = int(records[: number - 1, 0].sum()), int(records[number - 1, 0])
     return _network(table, table.numbers(records[number - 1]), first, count, points, _NONE)
 
@@ -129,7 +129,7 @@ def _network(
     z_t, z_r = points.z_t, points.z_r
     acc = _plus("linear", z_t, network[2], network[1], fused)
     acc = _plus("linear", z_r, network[3], acc, fused)
-    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])[first : first + count]
+    centers = table.numbers(table.records("centers"))[first : first + count]
     with np.errstate(under="ignore"):
         for c_t, g_t, c_r, g_r, weight in centers:
             u = (z_t - c_t) * g_t

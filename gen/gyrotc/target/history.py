@@ -21,7 +21,7 @@ from .recursions import CourseChannel, TermOutcome
 from .samples import Guarded
 from .sigma import SigmaEvidence, evidence_of, sigma_bits
 from .status import CHANNEL_LOST, CLAMPED, HELD
-from .table import ARRAYS, Table, Words
+from .table import Table, Words
 
 __all__ = ["Replay", "answers", "arithmetic_of", "corrections", "evidence", "replay", "settings_of"]
 
@@ -74,7 +74,7 @@ def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[n
 
 def settings_of(table: Table, samples_per_block: int) -> Settings:
     """Members of a table that the front end uses."""
-    missing = table.guards.reshape(-1, ARRAYS["guards"])[:, 6]
+    missing = table.records("guards")[:, 6]
     return Settings(
         samples_per_block=samples_per_block,
         period_us=period_us(table.block_us, samples_per_block),
@@ -87,7 +87,7 @@ def settings_of(table: Table, samples_per_block: int) -> Settings:
 
 def _guarded(table: Table, channel: int) -> Guarded:
     """The guard of a channel."""
-    record = table.guards.reshape(-1, ARRAYS["guards"])[channel]
+    record = table.records("guards")[channel]
     low, high, max_step, max_rate = table.numbers(record)[:4]
     agree_us, stuck_us, missing_blocks = (int(word) for word in record[4:7])
     return Guarded(low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, takes_edge=channel > 0)
@@ -180,7 +180,7 @@ def _shown(
     """An auxiliary channel at every correction."""
     arithmetic = arithmetic_of(table)
     readings = with_missing(arithmetic, channels[:, channel], stream.position)
-    fallback = table.numbers(table.guards.reshape(-1, ARRAYS["guards"])[channel])[7]
+    fallback = table.numbers(table.records("guards")[channel])[7]
     return channel_at(arithmetic, readings, _guarded(table, channel), fallback, settings, steps)
 
 
@@ -209,14 +209,16 @@ def _bits(table: Table, numbers: NDArray[Any]) -> Words:
 _SPREAD = np.uint32(0x9E3779B1)  # odd: 2^32 over the golden ratio (Knuth, TAOCP 3, section 6.4)
 
 
-class CallSequence(Protocol):
-    """Calls of the step functions, one entry each: bits of every channel, or `missed` samples (0: none)."""
+@dataclass(frozen=True, slots=True)
+class Calls:
+    """Calls of the step functions, one entry each, in order.
 
-    @property
-    def channels(self) -> Words: ...
+    `missed[k]`: 0 for a call of `sample` with the bits `channels[k]`, shape (n, n_channels); else the count of a
+    call of `missed`.
+    """
 
-    @property
-    def missed(self) -> NDArray[np.int64]: ...
+    channels: Words
+    missed: NDArray[np.int64]
 
 
 class KnownInputs(Protocol):
@@ -227,7 +229,7 @@ class KnownInputs(Protocol):
 
     def map_inputs(self, numeric: str) -> Words: ...
 
-    def calls(self, numeric: str) -> CallSequence: ...
+    def calls(self, numeric: str) -> Calls: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +319,7 @@ def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
     return np.concatenate([zero, maps, zero, history])
 
 
-def _step_answers(table: Table, calls: CallSequence, samples_per_block: int) -> NDArray[np.uint32]:
+def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray[np.uint32]:
     """Answers of the step functions; each call is a row, or samples missed before the next row."""
     settings = settings_of(table, samples_per_block)
     was_missed = calls.missed > 0

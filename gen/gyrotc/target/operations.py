@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from . import f32, q31
 from .arithmetic import Bells, Numbers, Operations
 from .recursions import Recursion, TableKind, recursion_of
-from .table import ARRAYS, Table
+from .table import Table
 
 __all__ = ["recursions"]
 
@@ -129,7 +129,7 @@ _OPERATIONS: dict[str, Operations] = {"f32": _F32(), "q31": _Q31()}
 def recursions(table: Table) -> list[Recursion]:
     """The terms of a table."""
     made = []
-    for record in table.terms.reshape(-1, ARRAYS["terms"]):
+    for record in table.records("terms"):
         numbers = table.numbers(record[2:])
         parameters = list(numbers) if table.numeric == "f32" else [int(n) for n in numbers]
         made.append(recursion_of(TableKind(int(record[0])), _OPERATIONS[table.numeric], parameters))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from .arithmetic import divided
-from .table import ARRAYS, Table, Words
+from .table import Table, Words
 
 __all__ = [
     "CUT",
@@ -79,7 +79,7 @@ def _position(x: IntArray, low: int, gain: int) -> IntArray:
 
 def biases(table: Table, points: Points) -> Words:
     """Bits of the map's results."""
-    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])[: table.n_networks]
+    networks = table.numbers(table.records("networks"))[: table.n_networks]
     if len(networks) == 1:
         return _bits(_network(table, networks[0], 0, points))
     total: IntArray = np.zeros_like(points.x_t)
@@ -96,7 +96,7 @@ def biases(table: Table, points: Points) -> Words:
 
 def stand_in(table: Table, number: int, points: Points) -> IntArray:
     """What the network of this number, from 1 on, makes of inputs."""
-    networks = table.numbers(table.networks).reshape(-1, ARRAYS["networks"])
+    networks = table.numbers(table.records("networks"))
     return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
 
 
@@ -109,7 +109,7 @@ def _network(table: Table, network: IntArray, first: int, points: Points) -> Int
     narrow = int(table.scale[2])
     count, w0, linear_t, linear_r = (int(n) for n in network[:4])
     acc = (linear_t * points.x_t + linear_r * points.x_r) * 8192
-    centers = table.numbers(table.centers).reshape(-1, ARRAYS["centers"])[first : first + count]
+    centers = table.numbers(table.records("centers"))[first : first + count]
     for s_t, k_t, s_r, k_r, weight in centers:
         a = (s_t * points.x_t + k_t).astype(np.uint64)  # squares are those of the signed number, mod 2^64
         b = (s_r * points.x_r + k_r).astype(np.uint64)

@@ -21,7 +21,7 @@ from .front_end import FALLBACK as FALLEN
 from .front_end import MAP, Steps
 from .recursions import Course, TableKind, TermOutcome
 from .status import FALLBACK, UNCOVERED, WARMING
-from .table import ARRAYS, Table, Words
+from .table import Table, Words
 
 __all__ = ["RULES", "Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
 
@@ -297,7 +297,7 @@ def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
     """What each term does not know of the time before it began, or of a channel of which nothing is believed."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)
-    for i, record in enumerate(table.terms.reshape(-1, ARRAYS["terms"])):
+    for i, record in enumerate(table.records("terms")):
         first, word, kind = table.numbers(record[2:])[0], words[i], int(record[0])
         if TableKind(kind).reads_channel:
             yield np.where(next(away), do.squared(word), np.zeros_like(do.squared(word)))

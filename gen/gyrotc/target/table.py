@@ -95,6 +95,11 @@ class Table:
     bound_parts_dph: dict[str, float]  # what the bound is made of
     stand_in_bounds_dph: tuple[float, ...] = ()  # the same of each stand-in alone
 
+    def records(self, array: str) -> Words:
+        """An array of records, one a row: shape (n, words of a record)."""
+        words: Words = getattr(self, array)
+        return words.reshape(-1, ARRAYS[array])
+
     @property
     def n_centers(self) -> int:
         return self.centers.size // ARRAYS["centers"]
@@ -102,7 +107,7 @@ class Table:
     @property
     def stand_ins(self) -> tuple[int, ...]:
         """Of every term the number of its stand-in among the networks, from 1 on; 0: it has none."""
-        return tuple(int(word) >> 16 for word in self.terms.reshape(-1, ARRAYS["terms"])[:, 1])
+        return tuple(int(word) >> 16 for word in self.records("terms")[:, 1])
 
     @property
     def n_stand_ins(self) -> int:
@@ -116,7 +121,7 @@ class Table:
     @property
     def channels(self) -> tuple[int, ...]:
         """Channel of every term; 0: the temperature."""
-        return tuple(int(word) & 0xFFFF for word in self.terms.reshape(-1, ARRAYS["terms"])[:, 1])
+        return tuple(int(word) & 0xFFFF for word in self.records("terms")[:, 1])
 
     @property
     def n_channels(self) -> int:
@@ -160,7 +165,7 @@ class Table:
     @property
     def stand_in_bytes(self) -> int:
         """Those of the stand-ins among them."""
-        counts = self.networks.reshape(-1, ARRAYS["networks"])[self.n_networks :, 0]
+        counts = self.records("networks")[self.n_networks :, 0]
         return 4 * (3 * counts.size + ARRAYS["centers"] * int(counts.sum()))
 
     @property

@@ -306,13 +306,13 @@ def counts_of(table: Table) -> Counts:
     n_map = len(table.networks) // ARRAYS["networks"] - table.n_stand_ins
     return Counts(
         named,
-        int(table.networks.reshape(-1, ARRAYS["networks"])[:, 0].max()),
+        int(table.records("networks")[:, 0].max()),
         table.numeric == "q31" and table.scale[2] != 0,
-        int(table.guards.reshape(-1, ARRAYS["guards"])[:, 6].max()),
+        int(table.records("guards")[:, 6].max()),
         len(table.words),
-        tuple(int(k) for k in table.terms.reshape(-1, ARRAYS["terms"])[:, 0]),
+        tuple(int(k) for k in table.records("terms")[:, 0]),
         table.n_stand_ins,
-        int(max(table.networks.reshape(-1, ARRAYS["networks"])[n_map:, 0], default=0)),
+        int(max(table.records("networks")[n_map:, 0], default=0)),
         sizes,
         int(table.guards[6]),
     )

@@ -152,7 +152,7 @@ def _numbers(model: Model, table: Table) -> Iterator[str]:
     network = model.networks[0]
     own, w0, linear_t, linear_r, *_ = table.numbers(table.networks).tolist()
     yield f"{w0} {linear_t} {linear_r} {own} {len(network.weights)}"
-    for record in table.numbers(table.centers).reshape(-1, 5)[:own].tolist():
+    for record in table.numbers(table.records("centers"))[:own].tolist():
         yield " ".join(map(str, record))
     yield f"{table.coverage_cells[0]} {table.coverage_cells[1]}"
     yield " ".join(str(int(word)) for word in table.coverage)
