@@ -95,12 +95,12 @@ def normalise(table: Table, x: NDArray[np.float32], fused: Fused = _NONE) -> Poi
     return Points(x, z_t, z_r)
 
 
-def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
-    """Bits of the map's results."""
+def biases(table: Table, points: Points, fused: Fused = _NONE) -> NDArray[np.float32]:
+    """The map's results."""
     networks = table.numbers(table.records("networks"))[: table.n_networks]
     counts = table.records("networks")[: table.n_networks, 0].astype(np.int64)
     if len(networks) == 1:
-        return _network(table, networks[0], 0, int(counts[0]), points, fused).view(np.uint32)
+        return _network(table, networks[0], 0, int(counts[0]), points, fused)
     total, shares = np.zeros_like(points.z_t), np.zeros_like(points.z_t)
     first = 0
     for network, count in zip(networks, counts, strict=True):
@@ -112,7 +112,7 @@ def biases(table: Table, points: Points, fused: Fused = _NONE) -> Words:
         first += int(count)
     quotient = total / np.where(shares > 0, shares, _ONE)
     fallback = table.numbers([table.fallback])[0]
-    return np.asarray(np.where(shares > 0, quotient, fallback)).view(np.uint32)
+    return np.asarray(np.where(shares > 0, quotient, fallback))
 
 
 def stand_in(table: Table, number: int, points: Points) -> NDArray[np.float32]:

@@ -113,7 +113,7 @@ def corrections(
     steps = steps.led(table.lead_blocks)
     made = np.flatnonzero(steps.kind == MAP)
     outcome = _outcome(table, steps, stream, table.numbers(channels), samples_per_block)
-    inputs = np.stack([_bits(table, outcome.temperature), _bits(table, outcome.slope)], axis=1)
+    inputs = table.bits(np.stack([outcome.temperature, outcome.slope], axis=1))
     status = np.zeros(steps.kind.size, dtype=np.int32)
     bits = np.zeros(steps.kind.size, dtype=np.uint32)
     status[made], plain = evaluate_map(table, inputs[made])
@@ -197,13 +197,7 @@ def _total(
         total = table.numbers(bits) + within
     total, beyond = governed(table.numbers(table.authority), total)
     remarks = remarks | np.where(clamped | beyond, status_bits.CLAMPED, 0).astype(np.int32)
-    return _bits(table, total), remarks
-
-
-def _bits(table: Table, numbers: NDArray[Any]) -> Words:
-    if table.numeric == "f32":
-        return np.asarray(numbers, dtype=np.float32).view(np.uint32)
-    return np.asarray(numbers, dtype=np.int64).astype(np.int32).view(np.uint32)
+    return table.bits(total), remarks
 
 
 _SPREAD = np.uint32(0x9E3779B1)  # odd: 2^32 over the golden ratio (Knuth, TAOCP 3, section 6.4)

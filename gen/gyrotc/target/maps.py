@@ -38,16 +38,16 @@ def evaluate_map(
     if table.numeric == "f32":
         points = f32.normalise(table, x, fused)
         cells = f32.cells(table, points, table.coverage_cells)
-        bias = f32.biases(table, points, fused)
+        bias: NDArray[Any] = f32.biases(table, points, fused)
     else:
         positions = q31.normalise(table, x)
         cells, bias = q31.cells(positions, table.coverage_cells), q31.biases(table, positions)
-    within, clamped = governed(table.numbers(table.authority), table.numbers(bias))
-    bias = np.where(clamped, _words(table, within), bias)
+    within, clamped = governed(table.numbers(table.authority), bias)
+    bits = table.bits(np.where(clamped, within, bias))
     status = status | np.where(clamped, CLAMPED, 0)
     status = status | np.where(_is_covered(table, cells), 0, UNCOVERED)
     status = np.where(usable, status, E_ARG).astype(np.int32)
-    return status, np.where(usable, bias, np.uint32(0)).astype(np.uint32)
+    return status, np.where(usable, bits, np.uint32(0)).astype(np.uint32)
 
 
 def stand_in(table: Table, number: int, temperature: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
@@ -69,11 +69,6 @@ def governed(bounds: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     """Numbers within bounds, and which of them were not."""
     low, high = bounds
     return np.clip(x, low, high), (x < low) | (x > high)
-
-
-def _words(table: Table, x: NDArray[Any]) -> Words:
-    bits = np.asarray(x, dtype=np.float32) if table.numeric == "f32" else np.asarray(x).astype(np.int32)
-    return np.ascontiguousarray(bits).view(np.uint32)
 
 
 def _is_covered(table: Table, cell: NDArray[np.int64]) -> NDArray[np.bool_]:

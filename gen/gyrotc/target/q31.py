@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from .arithmetic import divided
-from .table import Table, Words
+from .table import Table
 
 __all__ = [
     "CUT",
@@ -77,11 +77,11 @@ def _position(x: IntArray, low: int, gain: int) -> IntArray:
     return np.asarray(((offset * np.uint64(gain)) >> np.uint64(32)).astype(np.int64))
 
 
-def biases(table: Table, points: Points) -> Words:
-    """Bits of the map's results."""
+def biases(table: Table, points: Points) -> IntArray:
+    """The map's results."""
     networks = table.numbers(table.records("networks"))[: table.n_networks]
     if len(networks) == 1:
-        return _bits(_network(table, networks[0], 0, points))
+        return _network(table, networks[0], 0, points)
     total: IntArray = np.zeros_like(points.x_t)
     shares: IntArray = np.zeros_like(points.x_t)
     first = 0
@@ -91,17 +91,13 @@ def biases(table: Table, points: Points) -> Words:
         shares = shares + share
         first += int(network[0])
     blended = divided(total, np.maximum(shares, 1))
-    return _bits(np.where(shares > 0, blended, table.numbers([table.fallback])[0]))
+    return np.where(shares > 0, blended, table.numbers([table.fallback])[0])
 
 
 def stand_in(table: Table, number: int, points: Points) -> IntArray:
     """What the network of this number, from 1 on, makes of inputs."""
     networks = table.numbers(table.records("networks"))
     return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
-
-
-def _bits(bias: IntArray) -> Words:
-    return bias.astype(np.int32).view(np.uint32)
 
 
 def _network(table: Table, network: IntArray, first: int, points: Points) -> IntArray:

@@ -234,8 +234,7 @@ def sigma_bits(table: Table, evidence: SigmaEvidence) -> Words:
     do, constant = SQUARES[table.numeric], _rules(table)[Rule.BETWEEN]
     none = do.squared(_rules(table)[Rule.NONE : Rule.NONE + 1])
     squares = np.concatenate([none, variances(table, evidence)]) + do.squared(np.asarray([constant]))
-    roots = do.root(squares)
-    return roots.view(np.uint32) if table.numeric == "f32" else roots.astype(np.uint32)
+    return table.bits(do.root(squares))
 
 
 def variances(table: Table, evidence: SigmaEvidence) -> Numbers:

@@ -205,3 +205,8 @@ class Table:
         """Members or arrays as numbers of the arithmetic: float32, or int64 for fixed point."""
         bits = np.ascontiguousarray(words, dtype=np.uint32)
         return bits.view(np.float32) if self.numeric == "f32" else bits.view(np.int32).astype(np.int64)
+
+    def bits(self, numbers: NDArray[Any]) -> Words:
+        """The other way."""
+        kept = numbers.astype(np.float32 if self.numeric == "f32" else np.int32)
+        return np.ascontiguousarray(kept).view(np.uint32)
