@@ -83,22 +83,28 @@ def events_of(dataset: Dataset) -> list[Event]:
     found: list[Event] = []
     departing: list[NDArray[np.int64]] = []
     for number, run in enumerate(runs):
-        rows = run.rows()
-        departing.append(departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s)))
-        found += _bursts(number, run, rows, departing[-1])
-        found += _thermometer(number, run, rows)
-        found += _dropouts(number, run, rows)
+        of_run, wild = _of_rows(number, run)
+        found += of_run
+        departing.append(wild)
     judged = _Judged(runs, departing)
     steps, drifts = _told_once(steps_of(judged), drifts_of(judged))
     for number, run in enumerate(runs):
         found += [_drift(run, drift, float(judged[number][0][-1])) for drift in drifts if drift.run == number]
-        of_run = [step for step in steps if step.run == number]
-        if of_run:
+        its_steps = [step for step in steps if step.run == number]
+        if its_steps:
             time = judged[number][0]
-            found += _steps(run, of_run, float(time[0]), float(time[-1]))
+            found += _steps(run, its_steps, float(time[0]), float(time[-1]))
     again = {(e.run, e.time_s[1]) for e in found if e.id == "restart"}
     found = [e for e in found if e.id != "dropout" or (e.run, e.time_s[0]) not in again]
     return sorted(found, key=lambda event: (event.run, event.time_s[0]))
+
+
+def _of_rows(number: int, run: Run) -> tuple[list[Event], NDArray[np.int64]]:
+    """Events that a run's rows show by themselves, and its rows that are spikes or parts of bursts."""
+    rows = run.rows()
+    wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
+    found = (_bursts(number, run, rows, wild), _thermometer(number, run, rows), _dropouts(number, run, rows))
+    return [event for events in found for event in events], wild
 
 
 class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):

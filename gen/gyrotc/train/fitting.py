@@ -220,6 +220,7 @@ def _read(
         parts.append(samples_of(blocks, front.block_s, k))
         columns.append(seen_by_target(dataset, run.rows(), blocks) if channels else {})
         left_out += stretches_left_out(run, blocks.left_out_s)
+        del blocks  # before those of the next run are made: a file of 100 Hz fills memory
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
