@@ -40,6 +40,12 @@ def fleet(
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
     ] = None,
+    wait: Annotated[
+        int,
+        typer.Option(
+            "--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits."
+        ),
+    ] = 60,
     full: Annotated[
         bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
     ] = False,
@@ -64,21 +70,22 @@ def fleet(
     """
     from ..fleet.manifest import load_manifest, share_of
     from ..fleet.page import summary_of
-    from ..fleet.run import gather, run_fleet, run_share
+    from ..fleet.run import Cluster, gather, run_fleet, run_share
 
     share = share_of(shard) if shard else None
     if share and gathered:
         raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
     wanted = replace(wanted, options=replace(wanted.options, prior=lot_in(lot)))
+    cluster = Cluster(scheduler, wait, tell) if scheduler else None
     with progress() as say:
         told = _Told(len(wanted.units), say)
         if share:
-            entries = run_share(wanted, out, share, jobs=jobs, scheduler=scheduler, full=full, told=told)
+            entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, told=told)
         elif gathered:
             entries = gather(wanted, out, full=full, tag=tag, told=told)
         else:
-            entries = run_fleet(wanted, out, jobs=jobs, scheduler=scheduler, full=full, tag=tag, told=told)
+            entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, told=told)
     if share:
         _tell_share(shard or "", entries)
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 import platform
 import signal
@@ -127,13 +128,14 @@ def _single_threaded() -> None:
 
 
 def _without_warnings() -> None:
-    """What libraries warn of is no news for who typed a command, here and in processes of a fleet.
+    """What libraries warn of or log is no news for who typed a command, here and in processes of a fleet.
 
     Whoever asks for warnings (`PYTHONWARNINGS`, `python -W`) gets them; in tests each one is an error (`pytest.ini`).
     """
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
         os.environ.setdefault("PYTHONWARNINGS", "ignore")
+        logging.disable()  # of Dask: what becomes of a gyro is told by the fleet
 
 
 _COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`

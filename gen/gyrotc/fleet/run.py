@@ -11,11 +11,13 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,7 @@ from .manifest import SUMMARY, Fleet, Share, mine, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
-__all__ = ["gather", "on_dask", "on_processes", "run_fleet", "run_share", "tasks_of"]
+__all__ = ["Cluster", "gather", "on_dask", "on_processes", "run_fleet", "run_share", "tasks_of"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
@@ -74,14 +76,13 @@ def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry
         pool.shutdown(wait=True, cancel_futures=True)  # until nobody writes any more
 
 
-def _entry_of(task: Task, future: Any) -> FleetEntry:
+def _entry_of(task: Task, future: Future[FleetEntry]) -> FleetEntry:
     try:
-        entry: FleetEntry = future.result()
+        return future.result()
     except BrokenProcessPool:
         raise
     except Exception as error:  # it could not be sent there or back
         return failed(task, f"{type(error).__name__}: {error}")
-    return entry
 
 
 def _alone(task: Task) -> FleetEntry:
@@ -114,27 +115,115 @@ def _end_with_parent() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def on_dask(scheduler: str, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
+_CONNECT_S = 10.0
+_LOOK_S = 0.2  # between two looks at what has come
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """A Dask cluster.
+
+    Attributes:
+        address: Of its scheduler.
+        wait_s: How long a fleet waits where there is no worker, at its begin and later.
+        say: Called with what is waited for, and with the address of the dashboard.
+    """
+
+    address: str
+    wait_s: float
+    say: Callable[[str], None] = lambda _: None
+
+
+def on_dask(cluster: Cluster, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
     """As `on_processes`, on the workers of a cluster.
 
+    Dask gives a task whose worker was lost to another, and fails it when that has happened more often than its
+    scheduler allows (`allowed-failures`). What is left when the scheduler or all workers are lost is unfinished.
+    A future is released with its result: else Dask would do the task again when the worker that did it is lost.
+
     Raises:
-        InputError: Dask is not installed, or the scheduler cannot be reached.
+        InputError: Dask is not installed, the scheduler cannot be reached, or no worker comes.
     """
-    try:
-        from distributed import Client
+    with _connected(cluster) as client:
         from distributed import as_completed as completed
+
+        _wait_for_worker(cluster, client)
+        cluster.say(_described(cluster, client))
+        numbers = {future: k for k, future in enumerate(client.map(do_unit, tasks, pure=False))}
+        arrived = completed(list(numbers), with_results=True, raise_errors=False)
+        why = f"{cluster.address}: the scheduler was lost, or has cancelled it"
+        while numbers:
+            for future, result in arrived.next_batch(block=False):
+                if isinstance(result, (FleetEntry, tuple)):  # else it was cancelled
+                    number = numbers.pop(future)
+                    future.release()
+                    yield number, _entry_on_dask(tasks[number], result)
+            if all(future.cancelled() for future in numbers):
+                break
+            try:
+                _wait_for_worker(cluster, client)
+            except InputError as error:
+                why = error.found
+                break
+            time.sleep(_LOOK_S)
+    for number in numbers.values():
+        yield number, _unfinished(tasks[number], f"{why}; give the command again")
+
+
+@contextmanager
+def _connected(cluster: Cluster) -> Iterator[Any]:
+    """A client; with the end of the block the scheduler forgets what it has not begun."""
+    try:
+        import distributed
     except ImportError as error:
         raise InputError("--scheduler", "Dask is not installed here", "pip install gyrotc[dask]") from error
     try:
-        client = Client(scheduler, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise InputError("--scheduler", f"{scheduler}: {error}", "the address of a Dask scheduler") from error
+        client = distributed.Client(cluster.address, timeout=_CONNECT_S)
+    except (OSError, ValueError, distributed.TimeoutError) as error:
+        found = f"{cluster.address}: {(str(error) or type(error).__name__).splitlines()[0]}"
+        raise InputError("--scheduler", found, "the address of a Dask scheduler") from error
     with client:
-        futures = client.map(do_unit, tasks, pure=False)
-        numbers = {future.key: number for number, future in enumerate(futures)}
-        for future in completed(futures):
-            number = numbers[future.key]
-            yield number, _there(tasks[number], _entry_of(tasks[number], future))
+        yield client
+
+
+def _wait_for_worker(cluster: Cluster, client: Any) -> None:
+    """Returns at once where there is a worker.
+
+    Raises:
+        InputError: None came in time, or the scheduler was lost.
+    """
+    from distributed import TimeoutError as TimeIsOver
+
+    try:
+        if not client.nthreads():
+            limit = f"{cluster.wait_s:g} s at most"
+            cluster.say(f"waiting for a worker of {cluster.address} (0 now, 1 is enough), {limit}")
+            client.wait_for_workers(1, timeout=cluster.wait_s)
+    except TimeIsOver as error:
+        found, expected = f"no worker in {cluster.wait_s:g} s", f"dask worker {cluster.address}"
+        raise InputError("--scheduler", f"{cluster.address}: {found}", expected) from error
+    except OSError as error:
+        raise InputError("--scheduler", f"{cluster.address}: the scheduler was lost", "it runs") from error
+
+
+def _described(cluster: Cluster, client: Any) -> str:
+    threads = client.nthreads()
+    try:
+        dashboard = f"dashboard {client.dashboard_link}"
+    except KeyError:
+        dashboard = "no dashboard"
+    return f"{cluster.address}: {len(threads)} workers, {sum(threads.values())} threads, {dashboard}"
+
+
+def _entry_on_dask(task: Task, result: FleetEntry | tuple[Any, Any, Any]) -> FleetEntry:
+    """What has become of a task: its entry, or type, value and place of what was raised."""
+    if isinstance(result, FleetEntry):
+        return _there(task, result)
+    error = result[1]
+    if type(error).__name__ != "KilledWorker":
+        return failed(task, f"{type(error).__name__}: {error}; workers need the same gyrotc")
+    times, last = error.allowed_failures + 1, error.last_worker.name
+    return failed(task, f"{times} workers died with it, the last one {last} (out of memory?)")
 
 
 def _there(task: Task, entry: FleetEntry) -> FleetEntry:
@@ -154,7 +243,7 @@ def run_fleet(
     out: Path,
     *,
     jobs: int = 2,
-    scheduler: str | None = None,
+    cluster: Cluster | None = None,
     full: bool = False,
     tag: str = "",
     told: Told | None = None,
@@ -164,19 +253,19 @@ def run_fleet(
     Args:
         out: A folder for each unit goes into it, and the files of the summary.
         jobs: Processes on this machine.
-        scheduler: Address of a Dask scheduler to use instead; its workers see the same folders.
+        cluster: To use instead; its workers see the same folders.
         tag: Goes into the catalogue with what is new in it.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
         told: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
-        InputError: A scheduler is named and Dask is not installed, or cannot be reached; `out` is, holds or lies in
+        InputError: As `on_dask`, where a cluster is named; `out` is, holds or lies in
             a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
     place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        entries = _run(fleet, place, jobs, scheduler, full, told or (lambda _: None))
+        entries = _run(fleet, place, jobs, cluster, full, told or (lambda _: None))
         enter(place, entries, tag)
         return entries
     finally:
@@ -193,7 +282,7 @@ def run_share(
     share: Share,
     *,
     jobs: int = 2,
-    scheduler: str | None = None,
+    cluster: Cluster | None = None,
     full: bool = False,
     told: Told | None = None,
 ) -> list[FleetEntry]:
@@ -208,7 +297,7 @@ def run_share(
         entries = _done_already(tasks, say)
         if len(entries) < len(tasks):
             _without_summary(place)  # what it says of them ends now
-        return _worked(tasks, entries, jobs, scheduler, say)
+        return _worked(tasks, entries, jobs, cluster, say)
     finally:
         with deferred():
             clean_units(place, [unit.folder for unit in own.units])
@@ -279,7 +368,7 @@ def tasks_of(fleet: Fleet, out: Path, full: bool) -> list[Task]:
 
 
 def _run(
-    fleet: Fleet, out: Path, jobs: int, scheduler: str | None, full: bool, say: Told
+    fleet: Fleet, out: Path, jobs: int, cluster: Cluster | None, full: bool, say: Told
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
     tasks = tasks_of(fleet, out, full)
@@ -287,7 +376,7 @@ def _run(
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
         write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
-    return _summed(out, _worked(tasks, entries, jobs, scheduler, say))
+    return _summed(out, _worked(tasks, entries, jobs, cluster, say))
 
 
 def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
@@ -302,12 +391,12 @@ def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
 
 
 def _worked(
-    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, scheduler: str | None, say: Told
+    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, cluster: Cluster | None, say: Told
 ) -> list[FleetEntry]:
     """Does what has no entry yet; all entries in the order of the tasks."""
     waiting = [number for number in range(len(tasks)) if number not in entries]
     left = [tasks[number] for number in waiting]
-    for k, entry in on_dask(scheduler, left) if scheduler else on_processes(jobs, left):
+    for k, entry in on_dask(cluster, left) if cluster and left else on_processes(jobs, left):
         entries[waiting[k]] = entry
         say(entry)
     return [entries[number] for number in range(len(tasks))]

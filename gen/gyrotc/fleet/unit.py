@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from .. import __version__
 from ..assess.limits import coverage_factor
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
@@ -101,6 +102,7 @@ class Task:
         full: As of `run_fleet`.
         program: Hash of the program that asks for it.
         key: Hash of what it is to be made of, as the one who asks has found it; empty: that could not be read.
+        version: Of the gyrotc that asks for it.
     """
 
     unit: Unit
@@ -110,6 +112,7 @@ class Task:
     full: bool
     program: str
     key: str = ""
+    version: str = __version__
 
     def keyed(self) -> Task:
         """The same with its key."""
@@ -152,7 +155,8 @@ def do_unit(task: Task) -> FleetEntry:
         if task.unit.refused:
             raise InputError(task.unit.name, task.unit.refused)
         if task.program != program_of():
-            found = f"is not the one that asks (program {program_of()[:16]}, not {task.program[:16]})"
+            here, there = f"{__version__} ({program_of()[:16]})", f"{task.version} ({task.program[:16]})"
+            found = f"is {here}, and {there} where the fleet was started"
             raise InputError(f"the gyrotc of worker {_worker()}", found, "the same gyrotc everywhere")
         return _built(task)
     except GyrotcError as error:

@@ -86,7 +86,7 @@ def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_pat
     assert done_before(replace(task, full=True)) is None
     assert done_before(replace(task, program="0" * 64)) is None
     stranger = do_unit(replace(task, program="0" * 64))
-    assert stranger.status == "failed" and "not the one that asks" in (stranger.reason or "")
+    assert stranger.status == "failed" and "where the fleet was started" in (stranger.reason or "")
     assert done_before(task) is not None
 
 

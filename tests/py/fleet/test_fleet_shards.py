@@ -16,7 +16,7 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.fleet import run as pools
 from gyrotc.fleet.manifest import Fleet, Share, Unit, load_manifest, mine, share_of
-from gyrotc.fleet.run import gather, run_fleet, run_share, tasks_of
+from gyrotc.fleet.run import Cluster, gather, run_fleet, run_share, tasks_of
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.store.marker import MARKER
@@ -103,8 +103,9 @@ def test_a_result_that_misses_its_limits_is_gathered_as_failed(tmp_path: Path) -
 @pytest.mark.slow
 def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        entries = run_fleet(load_manifest(lot / "d"), lot / "dask", scheduler=cluster.scheduler_address)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+        cluster = Cluster(local.scheduler_address, 60.0)
+        entries = run_fleet(load_manifest(lot / "d"), lot / "dask", cluster=cluster)
     assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
     assert contents(lot / "dask") == contents(lot / "whole")
 
