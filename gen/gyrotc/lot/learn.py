@@ -106,6 +106,7 @@ def inflation(found: list[tuple[FloatArray, FloatArray]]) -> float:
     return max(1.0, float(np.mean((squares * (1.0 + ratio) - 1.0) / ratio)))
 
 
+_TOGETHER = 64  # units whose matrices are inverted together: bounds memory
 _EVERY = 4  # rounds between two fits of the processes' parameters: each is a search
 
 
@@ -225,8 +226,9 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, FloatArray
     """
     spread = state.spread()
     inverse = np.linalg.inv(spread)
-    told = inverse + units.precision
-    posterior: FloatArray = np.asarray(np.linalg.inv(told), dtype=np.float64)
+    posterior = np.empty(units.precision.shape)
+    for k in range(0, len(units), _TOGETHER):
+        posterior[k : k + _TOGETHER] = np.linalg.inv(inverse + units.precision[k : k + _TOGETHER])
     alone = _times(posterior, units.moment)
     known = state.basis.variance(state.of_mean)
     groups = [state.cluster == c for c in range(int(state.cluster.max()) + 1)]
@@ -350,13 +352,14 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
 
 def sums_of(units: Sequence[UnitMeans], basis: LotBasis, center: float, unit: float) -> UnitSums:
     """What recordings say of the coefficients, in units of the lot."""
-    precision, moment = [], []
-    for u in units:
+    n = len(basis.kept)
+    precision, moment = np.empty((len(units), n, n)), np.empty((len(units), n))
+    for k, u in enumerate(units):
         values = basis.values(u.temperature_c, u.slope_c_per_min)
         weight = u.count * (unit / u.sigma_dph) ** 2
-        precision.append((values * weight[:, None]).T @ values)
-        moment.append(values.T @ (weight * (u.bias_dph - center) / unit))
-    return UnitSums(np.array(precision), np.array(moment))
+        precision[k] = (values * weight[:, None]).T @ values
+        moment[k] = values.T @ (weight * (u.bias_dph - center) / unit)
+    return UnitSums(precision, moment)
 
 
 def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:
