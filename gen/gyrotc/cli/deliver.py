@@ -151,9 +151,7 @@ def _passphrase(key: Path) -> str:
 
 
 @app.command()
-def stamp(
-    model: Annotated[Path, typer.Argument(help="A model.json that was changed on purpose.")],
-) -> None:
+def stamp(model: Annotated[Path, typer.Argument(help="A model.json that was changed on purpose.")]) -> None:
     """Enter the checksum of a model.json that was changed by hand: from then on it is another model.
 
     Example: gyrotc stamp result/model.json

@@ -41,9 +41,7 @@ _SHELLS = ("bash", "zsh", "fish")
 
 
 @app.command()
-def completion(
-    shell: Annotated[str, typer.Argument(help="bash, zsh or fish.")],
-) -> None:
+def completion(shell: Annotated[str, typer.Argument(help="bash, zsh or fish.")]) -> None:
     """A script that completes commands and options in a shell, on stdout.
 
     Example: gyrotc completion bash > ~/.local/share/bash-completion/completions/gyrotc

@@ -41,14 +41,7 @@ from .base import (
     with_build_options,
     write_json,
 )
-from .results import (
-    evaluation_table,
-    file_notes,
-    prediction_line,
-    training_lines,
-    verify_notes,
-    verify_table,
-)
+from .results import evaluation_table, file_notes, prediction_line, training_lines, verify_notes, verify_table
 
 __all__ = ["evaluation_folders"]
 

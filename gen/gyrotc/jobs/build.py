@@ -184,10 +184,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics)
     verification = verify(
-        work,
-        targets=order.targets,
-        compiled=order.compiled,
-        progress=lambda name: say(f"verifying {name}"),
+        work, targets=order.targets, compiled=order.compiled, progress=lambda name: say(f"verifying {name}")
     )
     _write(work / "verify.json", verification.content())
     evaluation = evaluate(

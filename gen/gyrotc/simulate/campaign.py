@@ -270,11 +270,7 @@ def _save(path: Path, values: NDArray[np.float64]) -> None:
 
 
 def _write_texts(
-    folder: Path,
-    gyro: SimulatedGyro,
-    weight: float | None,
-    runs: list[dict[str, Any]],
-    truths: list[TrueRun],
+    folder: Path, gyro: SimulatedGyro, weight: float | None, runs: list[dict[str, Any]], truths: list[TrueRun]
 ) -> None:
     plan = gyro.plan
     head: dict[str, Any] = {
@@ -286,10 +282,7 @@ def _write_texts(
     if weight is not None:
         head["pulse_weight_arcsec"] = weight
     levels = plan.noise.model_dump()
-    tables = {
-        "meta": {"simulated": True},
-        "noise": {key: levels[key] for key in _DECLARED if levels[key]},
-    }
+    tables = {"meta": {"simulated": True}, "noise": {key: levels[key] for key in _DECLARED if levels[key]}}
     write_own(folder / "dataset.toml", dataset_toml(head, tables, runs))
     truth = SimulatedTruth(
         scenario=gyro.scenario,

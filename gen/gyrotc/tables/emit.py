@@ -125,11 +125,7 @@ def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
 
 
 def emit_texts(
-    model: Model,
-    emission: Emission,
-    *,
-    asked: bool = False,
-    zero_at: float | None = None,
+    model: Model, emission: Emission, *, asked: bool = False, zero_at: float | None = None
 ) -> dict[str, bytes]:
     """All files of `c/` by name.
 

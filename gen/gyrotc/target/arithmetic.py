@@ -126,9 +126,7 @@ class Arithmetic:
         return np.asarray(num / np.where(den > 0, den, 1).astype(np.float32))
 
 
-def moments(
-    used: NDArray[np.bool_],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def moments(used: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """n, Σk, Σk² over the abscissae k = 0, 1, ... in use, shape (n,) each."""
     k = np.arange(len(used), dtype=np.int64)
     if used.all():  # as almost everywhere

@@ -99,10 +99,7 @@ def left_out_of(folder: Path, model: Model, texts: Mapping[str, bytes]) -> dict[
 
 
 def file_entries(
-    c_folder: Path,
-    texts: Mapping[str, bytes],
-    edited: Collection[str] = (),
-    left_out: Collection[str] = (),
+    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = (), left_out: Collection[str] = ()
 ) -> Iterator[VerifiedFile]:
     """One entry for each file that should be there or is.
 
