@@ -26,7 +26,6 @@ __all__ = [
     "NEW",
     "OWN",
     "SCHEMA",
-    "Marker",
     "check_apart",
     "check_contents",
     "check_intact",

@@ -10,8 +10,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from ..results.folder import Marker
 from .files import create, sync_folder, write_own
-from .marker import MARKER, NEW, OWN, Marker, marker_text, sha256, walk
+from .marker import MARKER, NEW, OWN, marker_text, sha256, walk
 
 __all__ = ["Update", "can_exchange", "exchange", "write_marker"]
 
