@@ -19,11 +19,11 @@ from .maps import evaluate_map, governed, stand_in
 from .operations import recursions
 from .recursions import CourseChannel, TermOutcome
 from .samples import Guarded
-from .sigma import SigmaEvidence, evidence_of, sigma_bits
+from .sigma import evidence_of, sigma_bits
 from .status import CHANNEL_LOST, CLAMPED, HELD
 from .table import Table, Words
 
-__all__ = ["Replay", "answers", "arithmetic_of", "corrections", "evidence", "replay", "settings_of"]
+__all__ = ["Replay", "answers", "replay"]
 
 _WINDOW = 2  # blocks: the slope of a channel is of no use
 
@@ -72,7 +72,7 @@ def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[n
     return np.asarray(found[source])
 
 
-def settings_of(table: Table, samples_per_block: int) -> Settings:
+def _settings(table: Table, samples_per_block: int) -> Settings:
     """Members of a table that the front end uses."""
     missing = table.records("guards")[:, 6]
     return Settings(
@@ -93,95 +93,76 @@ def _guarded(table: Table, channel: int) -> Guarded:
     return Guarded(low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, takes_edge=channel > 0)
 
 
-def arithmetic_of(table: Table) -> Arithmetic:
-    """Operations of a table's arithmetic."""
-    return F32 if table.numeric == "f32" else Q31
+@dataclass(frozen=True, slots=True)
+class _Followed:
+    """A history and its corrections; these have one entry more, the first, for the time before any."""
+
+    stream: Stream
+    steps: Steps
+    status: NDArray[np.int32]
+    bits: Words
+    sigma: Words | None  # None: the table has no uncertainties
+    age: NDArray[np.int64]
 
 
-def corrections(
-    table: Table, steps: Steps, stream: Stream, channels: Words, samples_per_block: int
-) -> tuple[NDArray[np.int32], Words]:
-    """Status and bits of every correction, after one entry for the time before the first.
+def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_per_block: int) -> _Followed:
+    """Front end, terms, map and uncertainty over a history; arguments as of `replay`."""
+    settings, arithmetic = _settings(table, samples_per_block), F32 if table.numeric == "f32" else Q31
+    readings = table.numbers(channels)
+    stream = Stream.of_rows(arithmetic, settings, readings[:, 0], missed)
+    steps = follow(arithmetic, stream.samples, settings)
+    led = steps.led(table.lead_blocks)
+    seen = np.clip(led.temperature, *table.numbers(table.envelope)[:2])
+    course = replace(stream.course(led, samples_per_block), temperature=seen)
+    outcome = TermOutcome(
+        led.temperature,
+        led.slope,
+        np.zeros_like(led.temperature),
+        led.remarks | np.where(seen != led.temperature, CLAMPED, 0).astype(np.int32),
+    )
+    if not led.at.size:  # no corrections: nothing that terms could change
+        outcome.away += [np.zeros(0, dtype=np.bool_) for channel in table.channels if channel]
+    terms = zip(recursions(table), table.channels, table.stand_ins, strict=True)
+    for recursion, channel, number in terms if led.at.size else ():
+        shown = None
+        if channel:
+            of_rows = with_missing(arithmetic, readings[:, channel], stream.position)
+            fallback = table.numbers(table.records("guards")[channel])[7]
+            shown = channel_at(arithmetic, of_rows, _guarded(table, channel), fallback, settings, led)
+        before = outcome.added
+        recursion.apply(course, shown, outcome)
+        if shown is not None and number:
+            away = np.flatnonzero(shown.is_away & (led.kind == MAP))
+            instead = stand_in(table, number, outcome.temperature[away], outcome.slope[away])
+            outcome.added[away] = before[away] + instead
+    status, bits = _corrections(table, led, outcome)
+    found = evidence_of(table, steps, course, outcome, status)
+    return _Followed(
+        stream,
+        steps,
+        np.concatenate([[np.int32(HELD)], status]).astype(np.int32),
+        np.concatenate([[np.uint32(0)], bits]).astype(np.uint32),
+        sigma_bits(table, found) if table.sigma.size else None,
+        np.concatenate([[0], found.age]),
+    )
 
-    Args:
-        table: The table.
-        steps: The corrections of the history.
-        stream: Its samples.
-        channels: Bits of every row's channels, shape (n, n_channels).
-        samples_per_block: What the target gives to `gtc_<n>_init`.
-    """
-    steps = steps.led(table.lead_blocks)
+
+def _corrections(table: Table, steps: Steps, outcome: TermOutcome) -> tuple[NDArray[np.int32], Words]:
+    """Status and bits of every correction."""
     made = np.flatnonzero(steps.kind == MAP)
-    outcome = _outcome(table, steps, stream, table.numbers(channels), samples_per_block)
     inputs = table.bits(np.stack([outcome.temperature, outcome.slope], axis=1))
     status = np.zeros(steps.kind.size, dtype=np.int32)
     bits = np.zeros(steps.kind.size, dtype=np.uint32)
     status[made], plain = evaluate_map(table, inputs[made])
-    total, governed = _total(table, plain, outcome.added[made], outcome.remarks[made])
-    bits[made] = total
-    status[made] |= governed
+    bits[made], remarks = _total(table, plain, outcome.added[made], outcome.remarks[made])
+    status[made] |= remarks
     source = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
     status, bits = status[source], bits[source]
-    status[steps.kind == KEEP] |= status_bits.HELD
+    status[steps.kind == KEEP] |= HELD
     fallen = steps.kind == FALLBACK
-    status[fallen] = status_bits.HELD | status_bits.FALLBACK
+    status[fallen] = HELD | status_bits.FALLBACK
     bits[fallen] = table.fallback
-    return np.concatenate([[np.int32(status_bits.HELD)], status]).astype(np.int32), np.concatenate(
-        [[np.uint32(0)], bits]
-    ).astype(np.uint32)
-
-
-def evidence(
-    table: Table,
-    steps: Steps,
-    stream: Stream,
-    channels: Words,
-    samples_per_block: int,
-    status: NDArray[np.int32],
-) -> SigmaEvidence:
-    """What the uncertainty of every correction goes by; arguments as of `corrections`, and the status of each."""
-    led = steps.led(table.lead_blocks)
-    outcome = _outcome(table, led, stream, table.numbers(channels), samples_per_block)
-    seen = np.clip(led.temperature, *table.numbers(table.envelope)[:2])
-    course = replace(stream.course(led, samples_per_block), temperature=seen)
-    return evidence_of(table, steps, course, outcome, status)
-
-
-def _outcome(
-    table: Table, steps: Steps, stream: Stream, channels: NDArray[Any], samples_per_block: int
-) -> TermOutcome:
-    """What the terms make of every correction; of use where the map makes it."""
-    low, high = table.numbers(table.envelope)[:2]
-    seen = np.clip(steps.temperature, low, high)
-    beyond = np.where(seen != steps.temperature, status_bits.CLAMPED, 0).astype(np.int32)
-    found = TermOutcome(
-        steps.temperature, steps.slope, np.zeros_like(steps.temperature), steps.remarks | beyond
-    )
-    terms = recursions(table)
-    if not terms or steps.at.size == 0:
-        return found
-    course = replace(stream.course(steps, samples_per_block), temperature=seen)
-    settings = settings_of(table, samples_per_block)
-    for recursion, channel, number in zip(terms, table.channels, table.stand_ins, strict=True):
-        shown = _shown(table, settings, steps, stream, channels, channel) if channel else None
-        before = found.added
-        recursion.apply(course, shown, found)
-        if shown is not None and number:
-            away = np.flatnonzero(shown.is_away & (steps.kind == MAP))
-            found.added[away] = before[away] + stand_in(
-                table, number, found.temperature[away], found.slope[away]
-            )
-    return found
-
-
-def _shown(
-    table: Table, settings: Settings, steps: Steps, stream: Stream, channels: NDArray[Any], channel: int
-) -> CourseChannel:
-    """An auxiliary channel at every correction."""
-    arithmetic = arithmetic_of(table)
-    readings = with_missing(arithmetic, channels[:, channel], stream.position)
-    fallback = table.numbers(table.records("guards")[channel])[7]
-    return channel_at(arithmetic, readings, _guarded(table, channel), fallback, settings, steps)
+    return status, bits
 
 
 def _total(
@@ -196,7 +177,7 @@ def _total(
     else:
         total = table.numbers(bits) + within
     total, beyond = governed(table.numbers(table.authority), total)
-    remarks = remarks | np.where(clamped | beyond, status_bits.CLAMPED, 0).astype(np.int32)
+    remarks = remarks | np.where(clamped | beyond, CLAMPED, 0).astype(np.int32)
     return table.bits(total), remarks
 
 
@@ -249,11 +230,9 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         missed: Samples that did not arrive before each row, shape (n,).
         samples_per_block: What the target gives to `gtc_<n>_init`.
     """
-    settings = settings_of(table, samples_per_block)
-    channels, missed = np.asarray(channels), np.asarray(missed, dtype=np.int64)
-    stream, steps = _followed(table, settings, channels, missed)
-    status, bits = corrections(table, steps, stream, channels, samples_per_block)
-    sigma, age = _uncertain(table, steps, stream, channels, samples_per_block, status)
+    missed = np.asarray(missed, dtype=np.int64)
+    found = _followed(table, np.asarray(channels), missed, samples_per_block)
+    stream, steps, status = found.stream, found.steps, found.status
     position = stream.position
     valid = steps.valid[position // samples_per_block]
     in_force = steps.in_force(position)
@@ -267,36 +246,13 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
     return Replay(
         sample_status=at_rows | held,
         status=at_rows,
-        bits=bits[in_force],
+        bits=found.bits[in_force],
         missed_status=missed_status,
         block_valid=valid,
         begun=begun,
-        sigma=None if sigma is None else sigma[in_force],
-        age=age[in_force],
+        sigma=None if found.sigma is None else found.sigma[in_force],
+        age=found.age[in_force],
     )
-
-
-def _uncertain(
-    table: Table,
-    steps: Steps,
-    stream: Stream,
-    channels: Words,
-    samples_per_block: int,
-    status: NDArray[np.int32],
-) -> tuple[Words | None, NDArray[np.int64]]:
-    """Bits of 1 σ and age of every correction, after one entry for the time before the first."""
-    found = evidence(table, steps, stream, channels, samples_per_block, status[1:])
-    age = np.concatenate([[0], found.age])
-    return sigma_bits(table, found) if table.sigma.size else None, age
-
-
-def _followed(
-    table: Table, settings: Settings, channels: Words, missed: NDArray[np.int64]
-) -> tuple[Stream, Steps]:
-    """The front end over a history."""
-    arithmetic = arithmetic_of(table)
-    stream = Stream.of_rows(arithmetic, settings, table.numbers(channels)[:, 0], missed)
-    return stream, follow(arithmetic, stream.samples, settings)
 
 
 def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
@@ -315,7 +271,6 @@ def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
 
 def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray[np.uint32]:
     """Answers of the step functions; each call is a row, or samples missed before the next row."""
-    settings = settings_of(table, samples_per_block)
     was_missed = calls.missed > 0
     channels = calls.channels[~was_missed]
     missed = np.diff(np.cumsum(calls.missed)[~was_missed], prepend=0)
@@ -323,11 +278,9 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     if waiting:  # the history ends with missing samples: one more holds their place
         absent = np.full((1, table.n_channels), table.encode_inputs(np.nan), dtype=np.uint32)
         channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
-    stream, steps = _followed(table, settings, channels, missed)
-    status, bits = corrections(table, steps, stream, channels, samples_per_block)
-    sigma, _ = _uncertain(table, steps, stream, channels, samples_per_block, status)
-    if sigma is not None:
-        bits = bits + sigma * _SPREAD
+    found = _followed(table, channels, missed, samples_per_block)
+    stream, steps, status = found.stream, found.steps, found.status
+    bits = found.bits if found.sigma is None else found.bits + found.sigma * _SPREAD
     row = np.cumsum(~was_missed) - 1
     last = np.where(
         was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]
