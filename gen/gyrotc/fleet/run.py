@@ -125,7 +125,7 @@ class Cluster:
 
     Attributes:
         address: Of its scheduler.
-        wait_s: How long a fleet waits where there is no worker, at its begin and later.
+        wait_s: How long a fleet waits where there is no worker.
         say: Called with what is waited for, and with the address of the dashboard.
     """
 
