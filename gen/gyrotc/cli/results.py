@@ -44,7 +44,10 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
 
 def training_lines(training: Training) -> Iterator[str]:
     """What training did: spans, the correction chosen, channels, and what came from a lot or an earlier model."""
-    yield from _span_lines(training)
+    if spans := training.spans:
+        yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
+        for s in spans:
+            yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
     if training.ladder:
         yield f"correction {training.method}: {training.reason}"
         tried = (
@@ -53,15 +56,6 @@ def training_lines(training: Training) -> Iterator[str]:
         yield f"  left-out RMS, deg/h: {', '.join(tried)}"
     yield from _channel_lines(training)
     yield from _lot_lines(training)
-
-
-def _span_lines(training: Training) -> Iterator[str]:
-    """What was cut where there are fewer than three training runs."""
-    spans = training.spans
-    if spans:
-        yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
-        for s in spans:
-            yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
 
 
 def _lot_lines(training: Training) -> Iterator[str]:

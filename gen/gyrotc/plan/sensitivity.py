@@ -212,14 +212,11 @@ class Sensitivity:
 
     def _energies(self, runs: Sequence[int]) -> FloatArray:
         """d² of every column at unit amplitude after the map is taken out, shape (K,)."""
-        gram = self._gram(runs)
+        gram = self.grams[list(runs)].sum(axis=0)
         m = self.bank.map.shape[1]
         inner, cross = gram[:m, :m], gram[:m, m:]
         held = np.linalg.solve(inner + _RIDGE * np.diag(inner).max() * np.eye(m), cross)
         return np.asarray(np.diag(gram)[m:] - (cross * held).sum(axis=0))
-
-    def _gram(self, runs: Sequence[int]) -> FloatArray:
-        return np.asarray(self.grams[list(runs)].sum(axis=0))
 
     def map_error(self, runs: Sequence[int]) -> float:
         """RMS error of the map over all planned temperatures and rates, fitted to a choice of runs, deg/h.
@@ -229,7 +226,7 @@ class Sensitivity:
         m = self.bank.map.shape[1]
         y = self.search.y
         prior = y.size * float(np.var(y)) / m
-        spread = np.linalg.inv(self._gram(runs)[:m, :m] + np.eye(m) / prior)
+        spread = np.linalg.inv(self.grams[list(runs)].sum(axis=0)[:m, :m] + np.eye(m) / prior)
         return float(np.sqrt(np.trace(spread) / y.size))
 
 

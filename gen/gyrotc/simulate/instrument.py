@@ -172,7 +172,10 @@ def record(
     bias = bias + internal.bias_dph
     sensor_seeds, channel_seeds = sensing.spawn(2)
     reading = _readings(scenario, scene.sensed_c, np.random.default_rng(sensor_seeds))
-    of_channels = _channel_readings(scenario, true_channels, channel_seeds)
+    of_channels = {
+        channel.name: channel_readings(channel, true_channels[channel.name], np.random.default_rng(child))
+        for channel, child in zip(scenario.channel, channel_seeds.spawn(len(scenario.channel)), strict=True)
+    }
     cavity = scene.cavity_c[inside]
     rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], 60.0 * np.diff(cavity) / CELL_S)
     there = bias[inside]
@@ -287,13 +290,3 @@ def _readings(scenario: Scenario, sensed_c: FloatArray, rng: np.random.Generator
     sensor = scenario.sensor
     reading = sensed_c + sensor.offset_c + rng.normal(0.0, sensor.noise_c, len(sensed_c))
     return quantised_c(reading, sensor.resolution_c)
-
-
-def _channel_readings(
-    scenario: Scenario, true_channels: dict[str, FloatArray], seeds: np.random.SeedSequence
-) -> dict[str, FloatArray]:
-    children = seeds.spawn(len(scenario.channel))
-    return {
-        channel.name: channel_readings(channel, true_channels[channel.name], np.random.default_rng(child))
-        for channel, child in zip(scenario.channel, children, strict=True)
-    }
