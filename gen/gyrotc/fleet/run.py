@@ -115,7 +115,7 @@ def _end_with_parent() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-_CONNECT_S = 10.0
+_CONNECT_S = 10.0  # also the scheduler of a busy cluster answers within seconds
 _LOOK_S = 0.2  # between two looks at what has come
 
 

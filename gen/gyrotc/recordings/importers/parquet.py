@@ -16,7 +16,7 @@ from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
 __all__ = ["open_parquet"]
 
-_SAMPLE_ROWS = 20
+_SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count
 
 
 def open_parquet(path: Path) -> LoggerFile:
