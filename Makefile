@@ -7,12 +7,13 @@ override GYROTC := .venv/bin/gyrotc
 override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.
-unexport DATA AXIS SECONDS SEED STORM GYROTC_REAL_DATA SETS MEGABYTES TAG
+unexport DATA AXIS SECONDS SEED EACH STORM GYROTC_REAL_DATA SETS MEGABYTES TAG
 override export SET_DATA := $(value DATA)
 override export SET_AXIS := $(value AXIS)
 override export SET_SECONDS := $(or $(value SECONDS),20)
 override export SET_STORM := $(or $(value STORM),1000000)
 override export SET_SEED := $(value SEED)
+override export SET_EACH := $(or $(value EACH),36)
 override export SET_SETS := $(or $(value SETS),2000)
 override export SET_MEGABYTES := $(value MEGABYTES)
 override export SET_TAG := $(value TAG)
@@ -179,6 +180,10 @@ blind: setup
 blind-other: setup
 	@$(PYTHON) -m tests.blind.other.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## events planted in recordings (steps, drifts, gains, a loose thermometer): found, named, placed (EACH=36, SEED=)
+events: setup
+	@$(PYTHON) -m tests.events --workers 2 --each "$$SET_EACH" $${SET_SEED:+"--seed=$$SET_SEED"}
+
 ## training on 2,000 odd but valid data sets, minutes (SETS=2000; SEED=n begins with the n-th: shares)
 odd: setup
 	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/train/test_odd_training.py
@@ -217,4 +222,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean

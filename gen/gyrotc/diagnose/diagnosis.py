@@ -11,8 +11,8 @@ import numpy as np
 from ..common.arrays import Progress
 from ..common.metrics import LEAST_SPAN_C
 from ..model import Model
-from ..quality.events import Event, accepted, events_of
-from ..quality.sign_and_gain import gain_changes, turned_runs
+from ..quality.events import Event, accepted
+from ..quality.sign_and_gain import found_events
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.diagnosed import Diagnosed
 from ..results.training import Training
@@ -77,27 +77,13 @@ def diagnose(
     say = progress or (lambda _: None)
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    events = _events(dataset, whole)
+    events = found_events(dataset)
     found = _diagnosed(
         accepted(whole, events) if accept_events else whole, options or _options_of(model), say
     )
     told = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=told | {"next": steps}))
-
-
-def _events(dataset: Dataset, whole: Dataset) -> list[Event]:
-    """Of whole runs first; a step where a gain changes is that change."""
-    turned = turned_runs(dataset)
-    gains = [e for e in gain_changes(whole) if e.file not in {t.file for t in turned}]
-
-    def of_gain(event: Event) -> bool:
-        times = [gain.time_s for gain in gains if gain.file == event.file]
-        return event.id in ("step", "ramp") and any(
-            a <= event.time_s[2] and event.time_s[1] <= b for _, a, b in times
-        )
-
-    return [*turned, *gains, *(e for e in events_of(whole) if not of_gain(e))]
 
 
 def _about(events: Sequence[Event], accept: bool) -> list[str]:

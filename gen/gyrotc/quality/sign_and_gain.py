@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, cell_means
-from ..recordings.records import Curve, Dataset, Run
-from .events import Event, evidence_beside_memories
+from ..recordings.records import Curve, Dataset, Run, joined_runs
+from .events import Event, events_of, evidence_beside_memories
 from .facts import facts_of
 from .orientation import orientation_findings
 from .recorded import sign_findings
 
-__all__ = ["another_gain_throughout", "gain_changes", "turned_runs"]
+__all__ = ["another_gain_throughout", "found_events", "gain_changes", "turned_runs"]
 
 _Means = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -64,6 +64,21 @@ class _Change:
         """Whether it is clear when its error is so many times larger."""
         far = abs(self.factor - 1.0)
         return self.swings and far > max(_LEAST_CHANGE, _CLEAR * stretch * self.error)
+
+
+def found_events(dataset: Dataset) -> list[Event]:
+    """Events of the training runs, those of whole runs first; a step where a gain changes is that change."""
+    whole = replace(dataset, runs=joined_runs(dataset.runs))
+    turned = turned_runs(dataset)
+    gains = [e for e in gain_changes(whole) if e.file not in {t.file for t in turned}]
+
+    def of_gain(event: Event) -> bool:
+        times = [gain.time_s for gain in gains if gain.file == event.file]
+        return event.id in ("step", "ramp") and any(
+            a <= event.time_s[2] and event.time_s[1] <= b for _, a, b in times
+        )
+
+    return [*turned, *gains, *(e for e in events_of(whole) if not of_gain(e))]
 
 
 def gain_changes(dataset: Dataset) -> list[Event]:
