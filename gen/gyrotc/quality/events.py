@@ -26,6 +26,7 @@ from .drifts import Drift, drifts_of
 from .facts import facts_of
 from .outliers import departing_rows
 from .steps import Step, steps_of
+from .thermometers import stuck_stretches
 
 __all__ = ["Event", "accepted", "events_of", "evidence_beside_memories"]
 
@@ -33,8 +34,7 @@ Limits = tuple[float, float, float]
 
 _BURST_ROWS = 10  # fewer are outliers
 _JOINED = 1.5  # row periods between rows of one burst
-_LOST_S = 60.0  # a thermometer that stands still, or no rows, for longer
-_STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
+_LOST_S = 60.0  # no rows for longer
 _ONE_PLACE_S = 3600.0  # half of the longest window in which a drift is looked for
 _BLOCK_S = 10.0  # over which the level around a burst is taken
 
@@ -262,13 +262,9 @@ def _thermometer(number: int, run: Run, rows: Rows) -> Iterator[Event]:
         yield Event("thermometer_jump", number, run.file, (at, at, at), (size, size, size), "C", text, None)
     inside = run.in_span(rows.time_s)
     time, temperature = rows.time_s[inside], rows.temperature_c[inside]
-    starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
-    lengths = np.diff(np.r_[starts, len(temperature)])
-    if len(starts) < 0.5 * len(temperature):
-        return  # a coarse thermometer repeats itself
-    for k in np.flatnonzero((lengths >= _STUCK_ROWS) & (lengths * run.row_period_s > _LOST_S)):
-        start = float(time[starts[k]])
-        end = float(time[starts[k] + lengths[k] - 1]) + run.row_period_s
+    for first, rows_still in stuck_stretches(time, temperature, run.row_period_s):
+        start = float(time[first])
+        end = float(time[first + rows_still - 1]) + run.row_period_s
         text = (
             f"The temperature of {run.file} stands still to the last digit for {end - start:g} s from {start:g} s on: "
             "the thermometer was lost, or its record."

@@ -20,6 +20,7 @@ from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Mark, Rows, Run, SharedRows
 from .facts import RunFacts
+from .thermometers import stuck_stretches
 
 __all__ = [
     "Finding",
@@ -197,10 +198,7 @@ def finding(name: str, text: str, **evidence: Any) -> Finding:
 _LEAST_RUNS = 3  # of two runs nobody knows which one is reversed
 _LEAST_PLACES = 8  # of eight places a correlation of 0.9 is chance in 0.2 % of cases
 _ALIKE = 0.9  # correlation of a run's mean curve over temperature with that of the others
-_STUCK_S, _STUCK_ROWS = (
-    60.0,
-    60,
-)  # where half of the rows differ from the one before, 60 alike come once in 2^60
+_STUCK_ROWS = 60  # that differ from the one before: fewer do not show the steps of a rate
 _FEWEST_VALUES = 10  # a channel of fewer values says nothing
 
 
@@ -294,33 +292,29 @@ def copied_channel_findings(run: Run, rows: Rows) -> Iterator[Finding]:
 
 
 def stuck_temperature_findings(run: Run, rows: Rows) -> Iterator[Finding]:
-    """The longest stretch of one identical temperature, where most other rows differ from the one before."""
+    """The longest stretch in which the thermometer was stuck."""
     inside = run.in_span(rows.time_s)
     temperature, time = rows.temperature_c[inside], rows.time_s[inside]
-    starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
-    length = np.diff(np.r_[starts, len(temperature)])
-    k = int(np.argmax(length))
-    others = len(temperature) - int(length[k])
-    if length[k] * run.row_period_s <= _STUCK_S or length[k] < _STUCK_ROWS or len(starts) - 1 <= 0.5 * others:
+    stretches = stuck_stretches(time, temperature, run.row_period_s)
+    if not stretches:
         return
-    if others < _STUCK_ROWS:
-        return
-    first, last = float(time[starts[k]]), float(time[starts[k] + length[k] - 1])
+    start, length = max(stretches, key=lambda stretch: stretch[1])
+    first, last = float(time[start]), float(time[start + length - 1])
     line = exclude_line([(first, last + run.row_period_s)], "thermometer stuck")
     yield {
         "id": "stuck_temperature",
         "text": (
-            f"the temperature stays at {temperature[starts[k]]:.6g} C from {first:.10g} to {last:.10g} s "
-            f"({length[k]} rows), where it otherwise changes from row to row: the thermometer was stuck. Look at its "
+            f"the temperature stays at {temperature[start]:.6g} C from {first:.10g} to {last:.10g} s "
+            f"({length} rows), where it otherwise changes from row to row: the thermometer was stuck. Look at its "
             f"wiring; to leave the stretch out: {line}"
         ),
         "evidence": {
             "file": run.file,
             "from_s": run.from_s,
             "span_s": [first, last],
-            "rows": int(length[k]),
+            "rows": int(length),
         },
-        "marks": (Mark(run.file, _rows_of(inside, starts[k], length[k]), (first, last + run.row_period_s)),),
+        "marks": (Mark(run.file, _rows_of(inside, start, length), (first, last + run.row_period_s)),),
     }
 
 

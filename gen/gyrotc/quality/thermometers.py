@@ -1,4 +1,4 @@
-"""Further thermometers that are not in a run what they are in the others: they disagree, lag, or lost contact.
+"""Thermometers that were stuck, and further ones that are not in a run what they are in the others.
 
 In every run a thermometer follows the gyro's own: u − T = offset + share (T − mean) − lag dT/dt. What the other runs
 agree on is held against the run.
@@ -16,7 +16,7 @@ from ..common.arrays import FloatArray
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 
-__all__ = ["thermometer_findings"]
+__all__ = ["stuck_stretches", "thermometer_findings"]
 
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
@@ -27,6 +27,41 @@ _LEAST_RANGE_C = 5.0  # over less neither share nor lag of a run is known
 _SIGMAS = 5.0  # of what the other runs differ by among themselves
 _LEAST_C = 0.3  # class B thermometers may differ by so much (IEC 60751)
 _LEAST_S = 60.0  # a cell
+
+
+_STUCK_S = 60.0  # a thermometer that stands still for longer; readings come faster
+_STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
+_OFTEN = 0.5  # of the rows differ from the one before: else repeating is what the thermometer does
+_LONGER = 4.0  # than what else repeats in the run; holds of one programme, in which a converter waits, differ by less
+_MOST = 5  # stuck stretches of a run that are told apart from a thermometer that often repeats
+_RELEASE = 3.0  # times the steps that rows make on ramps: the temperature went on meanwhile
+_ON_RAMPS = 0.95  # quantile of the steps
+
+
+def stuck_stretches(time: FloatArray, temperature: FloatArray, period_s: float) -> list[tuple[int, int]]:
+    """First row and number of rows of the stretches in which a thermometer was stuck.
+
+    A coarse converter, or a logger that averages one, repeats a reading for as long as a chamber holds. So a stretch
+    counts only where it is far longer than all others of a run that seldom repeats, or where it ends with a step that
+    no ramp of the run makes from row to row.
+    """
+    starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
+    lengths = np.diff(np.r_[starts, len(temperature)])
+    long = np.flatnonzero((lengths >= _STUCK_ROWS) & (lengths * period_s > _STUCK_S))
+    if len(starts) < 2 or len(long) == 0:
+        return []
+    longest = np.sort(np.r_[lengths[long], np.delete(lengths, long).max(initial=1)])[::-1].astype(np.float64)
+    apart = np.flatnonzero(longest[:-1] >= _LONGER * longest[1:])
+    apart = apart[apart < _MOST]
+    rare = len(apart) > 0 and len(starts) >= _OFTEN * (len(temperature) - longest[: apart[-1] + 1].sum())
+    least = longest[apart[-1]] if rare else np.inf
+    steps = np.abs(np.diff(temperature[starts]))
+    release = _RELEASE * float(np.quantile(steps, _ON_RAMPS))
+    return [
+        (int(starts[k]), int(lengths[k]))
+        for k in long
+        if lengths[k] >= least or (k < len(steps) and steps[k] > release)
+    ]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from gyrotc.quality.events import Event, accepted, events_of
 from gyrotc.quality.outliers import departing
 from gyrotc.quality.sign_and_gain import another_gain_throughout, gain_changes, turned_runs
 from gyrotc.quality.steps import steps_of
-from gyrotc.quality.thermometers import thermometer_findings
+from gyrotc.quality.thermometers import stuck_stretches, thermometer_findings
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
 from gyrotc.simulate.campaign import simulate
@@ -494,3 +494,19 @@ def test_one_that_answers_later_is_named_and_by_how_much(sound: Dataset) -> None
 
 def test_two_runs_say_nothing(sound: Dataset) -> None:
     assert list(thermometer_findings(replace(sound, runs=sound.runs[:2]))) == []
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("wavering", [0.0, 0.2, 0.5])
+def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged: bool) -> None:
+    """A converter of 1/16 C in holds of half an hour and an hour; stuck on a ramp it is told with its rows."""
+    rng = np.random.default_rng(SEED + 5)
+    time = np.arange(5 * 3600.0)
+    true = np.interp(time / 3600.0, [0, 1, 1.5, 2, 2.5, 3.5, 5], [20, 20, 50, 50, 0, 0, 1])
+    read = np.round(true / 0.0625 + wavering * rng.standard_normal(time.size)) * 0.0625
+    stuck = read.copy()
+    stuck[4800:5400] = stuck[4800]  # within the ramp from 20 to 50 C
+    for values, expected in ((read, []), (stuck, [480])):
+        rows = np.round(values.reshape(-1, 10).mean(axis=1), 4) if averaged else values[9::10]
+        found = stuck_stretches(time[9::10], rows, 10.0)
+        assert [first for first, _ in found] == pytest.approx(expected, abs=1), found
