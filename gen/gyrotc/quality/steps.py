@@ -260,7 +260,8 @@ class _Windows:
         best = int(np.argmin(left))
         noise = max(float(left[best]) / max(n - 2, 1), 1e-300)
         likely = inside[left <= left[best] + _PLACED_95 * noise]
-        between = float(time[near[max(likely[0] - 1, 0)]]), float(time[near[likely[-1]]])
+        # One row more on either side: a row that is a mean may hold the step, and bear the time of its end or its start
+        between = float(time[near[max(likely[0] - 2, 0)]]), float(time[near[min(likely[-1] + 1, n - 1)]])
         first = float(time[near[inside[best]]])
         size, spread = max((fit.step(s) for s in (edge, first)), key=lambda s: abs(s[0] / s[1]))
         error = NORMAL_95 * scale * spread
