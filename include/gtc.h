@@ -108,6 +108,7 @@ extern "C" {
 #define GTC_E_IMAGE (-4)     /* image or saved state corrupted, truncated or torn */
 #define GTC_E_ID (-5)        /* image or saved state of another table */
 #define GTC_E_PERIOD (-6)    /* no whole number of samples of this period makes a block of the table */
+#define GTC_E_ABSENT (-7)    /* the table does not hold what the call needs: uncertainties, or a re-zero */
 
 /* What the firmware should do. Every correction with a positive status is to be subtracted:
  *   GTC_WARMING    nothing more; the filter may take the bias as less certain
@@ -123,7 +124,8 @@ extern "C" {
  *   GTC_E_IMAGE      from check: memory fails, report; from open: use the table compiled in; from
  *                    restore: start with gtc_<n>_init()
  *   GTC_E_ID         of another unit: as GTC_E_IMAGE, and see how it came there
- *   GTC_E_PERIOD     wrong sample period, or a table for another block: do not compensate, report */
+ *   GTC_E_PERIOD     wrong sample period, or a table for another block: do not compensate, report
+ *   GTC_E_ABSENT     go on without the call: the correction stands as it is */
 
 /* The q31 mark of a sample that did not arrive. (In f32 a NaN is one.) */
 #define GTC_TEMP_MISSING (-2147483647L - 1L)
@@ -342,7 +344,8 @@ GTC_MUST_CHECK int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time
 GTC_MUST_CHECK int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels);
 
 /* `count` samples that did not arrive, in one call or in many: the results are the same bits. Same statuses as a
- * sample that is held. Cost: that of the blocks that end, at most missing_blocks + 1 of the guards. */
+ * sample that is held; GTC_E_ARG, as from gtc_<n>_sample_at(), for NULL and for a state whose period or count of
+ * samples in a block is 0. Cost: that of the blocks that end, at most missing_blocks + 1 of the guards. */
 GTC_MUST_CHECK int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count);
 GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
 
@@ -357,7 +360,7 @@ GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bia
  * training was not, and until terms have forgotten the time before the start; docs/design.md gives the rules. It is
  * of the bias: the noise of the rate comes on top. Where sigma grows at once, add sigma_new^2 - sigma_old^2 to the
  * filter's variance (examples/nav_loop). A table without uncertainties is refused.
- * Returns the status of the correction, GTC_E_ARG (NULL) or GTC_E_LAYOUT (no uncertainties in the table).
+ * Returns the status of the correction, GTC_E_ARG (NULL) or GTC_E_ABSENT (no uncertainties in the table).
  * Cost: on a Cortex-M4F 220 instructions in float32, 770 in fixed point, without terms; other cores: docs/results.md
  * of gyrotc. The map is not evaluated. */
 GTC_MUST_CHECK int gtc_f32_snapshot(const gtc_f32_state_t *state, gtc_f32_snapshot_t *snapshot);
@@ -372,7 +375,7 @@ GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapsh
  * the noise of the rate over its length; a table that saw no turn-on offsets moves next to nothing. The shift of all
  * calls together stays within the table's `rezero`; what would go beyond ends there, with GTC_CLAMPED. It is in the
  * correction at once, in the fallback, too, outlasts save and restore, and gtc_<n>_unzero() takes it back.
- * Returns 0, GTC_CLAMPED, GTC_E_ARG (NULL, not a number, 0 s) or GTC_E_LAYOUT (the table grants no shift);
+ * Returns 0, GTC_CLAMPED, GTC_E_ARG (NULL, not a number, 0 s) or GTC_E_ABSENT (the table grants no shift);
  * negative: nothing was changed. */
 GTC_MUST_CHECK int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds);
 GTC_MUST_CHECK int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds);

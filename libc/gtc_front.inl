@@ -631,11 +631,17 @@ static uint_least32_t FN(skip)(STATE *state, uint_least32_t samples)
     return samples - (blocks * state->samples_per_block);
 }
 
+/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
+static int FN(has_times)(const STATE *state)
+{
+    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
+}
+
 static int FN(run_missed)(STATE *state, uint_least32_t count)
 {
     uint_least32_t rest = count;
 
-    if ((state == NULL) || (state->table == NULL)) {
+    if ((state == NULL) || (FN(has_times)(state) == 0)) {
         return GTC_E_ARG;
     }
     if (count == 0U) {
@@ -674,7 +680,7 @@ static int FN(run_sample_at)(STATE *state, uint_least32_t time_us, const NUM *ch
     uint_least32_t later_us;
     uint_least32_t n;
 
-    if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
+    if ((state == NULL) || (channels == NULL) || (FN(has_times)(state) == 0)) {
         return GTC_E_ARG;
     }
     if (state->is_stamped == 0U) {

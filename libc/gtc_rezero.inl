@@ -16,7 +16,7 @@ static int FN(run_snapshot)(const STATE *state, SNAPSHOT *snapshot)
         return GTC_E_ARG;
     }
     if (!FN(has_sigma)(state->table)) {
-        return GTC_E_LAYOUT;
+        return GTC_E_ABSENT;
     }
     status = FN(run_bias)(state, &snapshot->bias);
     snapshot->sigma = FN(root)(FN(plus)(FN(variance)(state), FN(variance_of_constant)(state)));
@@ -54,7 +54,7 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
         return GTC_E_ARG;
     }
     if ((!FN(has_sigma)(state->table)) || (!(MEMBER(state->table->rezero) > NUM_ZERO))) {
-        return GTC_E_LAYOUT;
+        return GTC_E_ABSENT;
     }
     prior = FN(variance_of_constant)(state);
     rest = FN(plus)(FN(variance)(state), FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));

@@ -545,6 +545,25 @@ TEST(bad_arguments_are_refused)
     CHECK_INT(GTC_E_ARG, FN(bias)(&state, &bias));
 }
 
+/* A flipped bit can make a period of one microsecond, or a block of one sample, 0. */
+TEST(a_state_that_lost_its_times_is_refused_and_ends)
+{
+    const num_t temp = C(15.0);
+    int lost;
+
+    for (lost = 0; lost < 2; lost++) {
+        state_t state = started();
+
+        if (lost == 0) {
+            state.samples_per_block = 0U;
+        } else {
+            state.period_us = 0U;
+        }
+        CHECK_INT(GTC_E_ARG, FN(missed)(&state, 0xFFFFFFFFUL));
+        CHECK_INT(GTC_E_ARG, FN(sample_at)(&state, 0UL, &temp));
+    }
+}
+
 int main(void)
 {
     RUN(before_the_first_sample_the_correction_is_zero_and_held);
@@ -576,5 +595,6 @@ int main(void)
     RUN(missed_is_the_same_as_missing_samples);
     RUN(a_table_that_this_build_cannot_use_is_refused);
     RUN(bad_arguments_are_refused);
+    RUN(a_state_that_lost_its_times_is_refused_and_ends);
     return test_end();
 }

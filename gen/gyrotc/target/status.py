@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "CHANNEL_LOST",
     "CLAMPED",
+    "E_ABSENT",
     "E_ARG",
     "E_ID",
     "E_IMAGE",
@@ -32,3 +33,4 @@ E_SELF_TEST = -3
 E_IMAGE = -4
 E_ID = -5
 E_PERIOD = -6
+E_ABSENT = -7

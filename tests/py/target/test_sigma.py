@@ -10,7 +10,7 @@ from conftest import ROOT
 from gyrotc.common.errors import CheckFailed
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.history import replay
-from gyrotc.target.status import E_LAYOUT
+from gyrotc.target.status import E_ABSENT
 from libc_build import Runtime, runtime
 from libc_device import history, variant
 from models import random_model, random_uncertainty
@@ -77,7 +77,7 @@ def test_a_history_without_a_reading_has_the_sigma_of_before_the_first(numeric: 
 def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> None:
     table = quantise(random_model(5), numeric)
     status, _ = build.snapshots(table, table.encode_inputs(np.full((20, 1), 20.0)), np.zeros(20), 2)
-    assert set(status[:, 1]) == {E_LAYOUT}
+    assert set(status[:, 1]) == {E_ABSENT}
 
 
 @pytest.mark.slow
