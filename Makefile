@@ -144,6 +144,10 @@ lot: setup
 uncertainty: setup
 	@$(PYTHON) -m bench.budget docs
 
+## is sigma true, and does the status say so, when a sensor, the clock or a re-zero fails: docs/results.md
+faults: setup
+	@$(PYTHON) -m bench docs --only faults
+
 ## every result of the generator as in tests/oracle/reference.json? minutes (GYROTC_REAL_DATA names measured recordings)
 oracle: setup
 	@$(PYTHON) -m tests.oracle --real "$$SET_REAL"
@@ -222,4 +226,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean

@@ -62,6 +62,13 @@ def _sigma(docs: Path) -> None:
     write(docs, "sigma", {"cost": cost(), **coverage(_say)}, section)
 
 
+def _faults(docs: Path) -> None:
+    """What the runtime says of itself when something fails."""
+    from .faults import faults, section
+
+    write(docs, "faults", faults(_say), section)
+
+
 def _bounds(docs: Path) -> None:
     """Static bounds on instructions, beside what an emulator counts."""
     from .bounds import bounds, section
@@ -109,6 +116,7 @@ _PARTS = {"training": _training, "runtime": _runtime, "growth": _growth}
 _ALONE = {
     "raw": _raw,
     "sigma": _sigma,
+    "faults": _faults,
     "bounds": _bounds,
     "fleet": _fleet,
     "lot": _lot,

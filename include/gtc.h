@@ -109,6 +109,7 @@ extern "C" {
 #define GTC_E_ID (-5)        /* image or saved state of another table */
 #define GTC_E_PERIOD (-6)    /* no whole number of samples of this period makes a block of the table */
 #define GTC_E_ABSENT (-7)    /* the table does not hold what the call needs: uncertainties, or a re-zero */
+#define GTC_E_REST (-8)      /* a re-zero beyond 4 sigma of what is known: the vehicle moved, or Earth's rate is in it */
 
 /* What the firmware should do. Every correction with a positive status is to be subtracted:
  *   GTC_WARMING    nothing more; the filter may take the bias as less certain
@@ -125,7 +126,8 @@ extern "C" {
  *                    restore: start with gtc_<n>_init()
  *   GTC_E_ID         of another unit: as GTC_E_IMAGE, and see how it came there
  *   GTC_E_PERIOD     wrong sample period, or a table for another block: do not compensate, report
- *   GTC_E_ABSENT     go on without the call: the correction stands as it is */
+ *   GTC_E_ABSENT     go on without the call: the correction stands as it is
+ *   GTC_E_REST       as GTC_E_ABSENT; take another rest */
 
 /* The q31 mark of a sample that did not arrive. (In f32 a NaN is one.) */
 #define GTC_TEMP_MISSING (-2147483647L - 1L)
@@ -144,8 +146,9 @@ typedef struct {
     float low;             /* lowest ... */
     float high;            /* ... and highest temperature that the terms saw since they began, C */
     float plain;           /* correction without the shift, deg/h */
+    float edge;            /* what terms add of readings at the edge of their range, beyond their stand-ins, deg/h */
     uint_least32_t begun;  /* blocks since init when the terms began */
-    uint_least32_t known;  /* one bit a term: it went on from where it was, or its channel is believed */
+    uint_least32_t known;  /* one bit a term: it went on from where it was, or its channel is read */
     uint_least32_t sure;   /* 0: there was no correction yet, 1: nothing is known of the slope, 2: drift is known */
 } gtc_f32_doubt_t;
 
@@ -156,6 +159,7 @@ typedef struct {
     int_least32_t low;
     int_least32_t high;
     int_least32_t plain;
+    int_least32_t edge;
     uint_least32_t begun;
     uint_least32_t known;
     uint_least32_t sure;
@@ -208,6 +212,7 @@ typedef struct {
     uint_least32_t off_blocks;     /* blocks without power before it */
     uint_least32_t is_stamped;     /* 1: a sample with a time came, and ... */
     uint_least32_t time_us;        /* ... this is the last one's, on the grid of sample periods */
+    uint_least32_t unused;         /* samples in a row whose time had not moved on */
     float shift;                   /* of the constant, deg/h: gtc_f32_rezero() */
     float constant;                /* 1 sigma of the constant with it, deg/h */
     gtc_f32_doubt_t doubt;
@@ -229,6 +234,7 @@ typedef struct {
     uint_least32_t off_blocks;
     uint_least32_t is_stamped;
     uint_least32_t time_us;
+    uint_least32_t unused;
     int_least32_t shift;
     int_least32_t constant;
     gtc_q31_doubt_t doubt;
@@ -264,7 +270,7 @@ typedef struct {
 } gtc_q31_snapshot_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (37 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (38 + GTC_MAX_SLOPE_BLOCKS + (15 * GTC_MAX_TERMS))
 
 /* What the functions below take on a Cortex-M4F with arm-none-eabi-gcc 12.2 or 14.2 and -O2, the larger of the two
  * rounded up, bytes: code with all that it calls, which is linked once; stack at the deepest call, whatever terms
@@ -275,12 +281,12 @@ typedef struct {
  *   open            2760    500       2540    520
  *   map              920     20        790    120
  *   init            2600    310       2420    320
- *   sample          5480    210       5840    380
- *   sample_at       5810    230       6170    400
- *   missed          4700    210       5250    370
+ *   sample          5700    240       6100    410
+ *   sample_at       6100    260       6520    440
+ *   missed          4920    240       5510    400
  *   bias              80      0         80     10
- *   snapshot        1180     50       1900    140
- *   rezero          1440     50       2290    140
+ *   snapshot        1180     50       1980    140
+ *   rezero          1580     50       2880    160
  *   unzero           120     10        120     10
  *   angle            340      0        180     30
  *   save             600     40        600     40
@@ -338,7 +344,8 @@ GTC_MUST_CHECK int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *c
  * slot of the period in which its time lies, counted from the first one; slots that were passed count as
  * gtc_<n>_missed(). So jitter of less than half a period does no harm, lost samples and a clock that is off leave
  * the slope right. A sample whose slot is taken, or that comes late (up to 268 s before the last one), is not used:
- * GTC_HELD. Where no sample comes for longer, call it with readings that are missing, at least once an hour.
+ * GTC_HELD; from as many in a row on as make a block, each is a period in which nothing came, so that a clock that stands
+ * still ends in GTC_FALLBACK as a sensor does that is missing. Where no sample comes for longer, call it with readings that are missing, at least once an hour.
  * Keep to either this or gtc_<n>_sample(), gtc_<n>_missed(). After gtc_<n>_restore() time begins anew. */
 GTC_MUST_CHECK int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time_us, const float *channels);
 GTC_MUST_CHECK int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels);
@@ -373,9 +380,11 @@ GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapsh
  *   seconds    length of the rest, s
  * The rest is weighed against what training saw from power-on to power-on, with the uncertainty of the correction and
  * the noise of the rate over its length; a table that saw no turn-on offsets moves next to nothing. The shift of all
- * calls together stays within the table's `rezero`; what would go beyond ends there, with GTC_CLAMPED. It is in the
- * correction at once, in the fallback, too, outlasts save and restore, and gtc_<n>_unzero() takes it back.
- * Returns 0, GTC_CLAMPED, GTC_E_ARG (NULL, not a number, 0 s) or GTC_E_ABSENT (the table grants no shift);
+ * calls together stays within the table's `rezero`; what would go beyond ends there, with GTC_CLAMPED. A mean rate
+ * beyond 4 sigma of what table, correction and noise allow is refused. The shift is in the correction at once, in the
+ * fallback, too, and gtc_<n>_unzero() takes it back. It is of this power-on: restore keeps it over 0 blocks without
+ * power, not over more, as power-ons are independent of one another in what training saw.
+ * Returns 0, GTC_CLAMPED, GTC_E_ARG (NULL, not a number, 0 s), GTC_E_ABSENT (the table grants no shift) or GTC_E_REST;
  * negative: nothing was changed. */
 GTC_MUST_CHECK int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds);
 GTC_MUST_CHECK int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds);

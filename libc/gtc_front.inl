@@ -20,20 +20,10 @@
 /* The longest time that is counted, microseconds. */
 #define MAX_US 0xFFFFFFFFUL
 
-/* Words of a guard. */
-#define GUARD_AGREE 4U
-#define GUARD_STUCK 5U
-#define GUARD_MISSING 6U
-#define GUARD_FALLBACK 7U
-
 /* What becomes of a reading. */
 #define IS_HELD 0
 #define IS_BELIEVED 1
 #define IS_NEW_START 2
-
-/* Of the readings that were taken as the edge of their range: in the running block, in the mean. */
-#define CLAMPED_NOW 1U
-#define CLAMPED_MEAN 2U
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
@@ -107,6 +97,7 @@ static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32
     effect.slope = slope;
     effect.added = NUM_ZERO;
     effect.known = state->doubt.known;
+    effect.edge = NUM_ZERO;
     effect.remarks = (FN(bits)(seen) != FN(bits)(temp)) ? (remarks | GTC_CLAMPED) : remarks;
     for (i = 0U; i < table->n_terms; i++) {
         table->term_code[i]->apply(state, i, seen, &effect);
@@ -225,17 +216,6 @@ static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
     const uint_least32_t sum = (a + b) & MAX_US;
 
     return (sum >= a) ? sum : MAX_US;
-}
-
-static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
-{
-    return &state->table->guards[channel * GTC_GUARD_WORDS];
-}
-
-/* A channel has been missing for so long that its fallback stands for it. */
-static int FN(is_lost)(const INPUT *in, const gtc_word_t *guard)
-{
-    return (in->held_blocks > guard[GUARD_MISSING].bits) ? 1 : 0;
 }
 
 /* Nothing of a channel was ever believed, or not since it was lost. */
@@ -540,6 +520,7 @@ static void FN(clear)(STATE *state)
     state->off_blocks = 0U;
     state->is_stamped = 0U;
     state->time_us = 0U;
+    state->unused = 0U;
     FN(doubt_clear)(state);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         window[i] = NUM_ZERO;
@@ -674,6 +655,17 @@ static uint_least32_t FN(slots)(const STATE *state, uint_least32_t later_us)
     return n + ((rest >= (state->period_us - rest)) ? 1U : 0U);
 }
 
+/* A sample whose time has not moved on is not used. One or a few come of jitter, or of a caller that is faster than its
+ * period. After as many in a row as make a block the clock has stopped: each of them is a period in which nothing came. */
+static int FN(not_used)(STATE *state)
+{
+    if (state->unused < state->samples_per_block) {
+        state->unused++;
+        return (int)state->status | GTC_HELD;
+    }
+    return FN(run_missed)(state, 1U);
+}
+
 /* Times are put on a grid of sample periods, from the first one on, so that no error of them adds up. */
 static int FN(run_sample_at)(STATE *state, uint_least32_t time_us, const NUM *channels)
 {
@@ -691,8 +683,9 @@ static int FN(run_sample_at)(STATE *state, uint_least32_t time_us, const NUM *ch
     later_us = (time_us - state->time_us) & MAX_US;
     n = FN(slots)(state, later_us);
     if ((n == 0U) || (later_us > (MAX_US - LATEST))) {
-        return (int)state->status | GTC_HELD;
+        return FN(not_used)(state);
     }
+    state->unused = 0U;
     state->time_us = (state->time_us + (n * state->period_us)) & MAX_US;
     (void)FN(run_missed)(state, n - 1U);
     return FN(run_sample)(state, channels);

@@ -637,7 +637,9 @@ static inline uint_least64_t FN(squared)(int_least64_t x)
 
 static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
 {
-    return a + b;
+    const uint_least64_t sum = a + b;
+
+    return (sum >= a) ? sum : ~(uint_least64_t)0U;
 }
 
 /* Every number of a state has a square */

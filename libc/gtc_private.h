@@ -43,6 +43,16 @@ uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_l
 /* Whether a kind of term reads an auxiliary channel. */
 #define READS_CHANNEL(kind) ((kind) >= GTC_TERM_AUXILIARY)
 
+/* Words of a guard. */
+#define GUARD_AGREE 4U
+#define GUARD_STUCK 5U
+#define GUARD_MISSING 6U
+#define GUARD_FALLBACK 7U
+
+/* Of the readings that were taken as the edge of their range: in the running block, in the mean. */
+#define CLAMPED_NOW 1U
+#define CLAMPED_MEAN 2U
+
 /* What terms make of the inputs and add to the bias. */
 typedef struct {
     float temp;
@@ -50,6 +60,7 @@ typedef struct {
     float added;
     int_least32_t remarks;
     uint_least32_t known; /* as of a doubt */
+    float edge;           /* as of a doubt */
 } gtc_f32_effect_t;
 
 typedef struct {
@@ -58,6 +69,7 @@ typedef struct {
     int_least64_t added;
     int_least32_t remarks;
     uint_least32_t known;
+    int_least32_t edge;
 } gtc_q31_effect_t;
 
 /* Functions of one kind of term; i is the number of the term in its table.

@@ -3,7 +3,10 @@
  *
  * The rest is weighed as a Kalman filter weighs a measurement: the constant has the variance P that training saw from
  * power-on to power-on, the mean residual of the rest that of the correction and of the noise over its length, R.
- * The shift takes the share P/(P + R) of it and leaves the variance P R/(P + R). gen/gyrotc/target/sigma.py is its mirror.
+ * The shift takes the share P/(P + R) of it and leaves the variance P R/(P + R); but the part of R that is the
+ * correction's does not average out over rests, so that no less is left than after a rest without noise. A rest that lies
+ * GATE standard deviations of P + R from 0 is none: the vehicle moved, or Earth's rate is in it. The next power-on draws a
+ * constant anew, independent of this one: nothing of the shift is kept for it.
  *
  * SPDX-License-Identifier: MIT
  */
@@ -42,12 +45,25 @@ static NUM FN(granted)(const TABLE *table, WIDE shift)
     return found;
 }
 
+/* Of a measurement and what it is compared with, in standard deviations: a rest is wrong once in 16,000. */
+#define GATE 4U
+
+/* The variance of the constant after a rest: `rest` of the correction and of the noise, `of_map` of the correction. */
+static SQUARE FN(variance_left)(const STATE *state, SQUARE prior, SQUARE rest, SQUARE of_map)
+{
+    const SQUARE between = FN(squared)(FN(rule)(state->table, RULE_BETWEEN));
+    const SQUARE least = FN(part_of_square)(FN(share_of)(between, of_map), of_map);
+    const SQUARE left = FN(part_of_square)(FN(share_of)(prior, rest), rest);
+
+    return (left > least) ? left : least;
+}
+
 static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
 {
     int status = GTC_OK;
     SQUARE prior;
+    SQUARE of_map;
     SQUARE rest;
-    SHIFT_SHARE share;
     WIDE shift;
 
     if ((state == NULL) || (state->table == NULL) || (FN(is_missing)(mean_rate) != 0) || (seconds == 0U)) {
@@ -57,14 +73,18 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
         return GTC_E_ABSENT;
     }
     prior = FN(variance_of_constant)(state);
-    rest = FN(plus)(FN(variance)(state), FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
-    share = FN(share_of)(prior, rest);
-    shift = FN(add)((FN(is_missing)(state->shift) != 0) ? NUM_ZERO : state->shift, FN(part)(share, mean_rate));
+    of_map = FN(variance)(state);
+    rest = FN(plus)(of_map, FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
+    if (!(FN(shared_out)(FN(squared)(mean_rate), GATE * GATE) <= FN(plus)(prior, rest))) {
+        return GTC_E_REST;
+    }
+    shift = FN(add)((FN(is_missing)(state->shift) != 0) ? NUM_ZERO : state->shift,
+                    FN(part)(FN(share_of)(prior, rest), mean_rate));
     state->shift = FN(granted)(state->table, shift);
     if ((shift > state->shift) || (shift < state->shift)) {
         status = GTC_CLAMPED;
     } else {
-        state->constant = FN(root)(FN(part_of_square)(share, rest));
+        state->constant = FN(root)(FN(variance_left)(state, prior, rest, of_map));
     }
     FN(put)(state, state->doubt.plain, state->status);
     return status;

@@ -7,7 +7,7 @@
  */
 
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545333UL
+#define SAVE_MAGIC 0x47545334UL
 
 /* What another build may have otherwise. */
 #define SAVE_OPTIONS \
@@ -110,6 +110,7 @@ static void FN(carry_doubt)(FN(cursor_t) *at, STATE *state)
     FN(carry)(at, &state->doubt.low);
     FN(carry)(at, &state->doubt.high);
     FN(carry)(at, &state->doubt.plain);
+    FN(carry)(at, &state->doubt.edge);
     FN(carry_bits)(at, &state->doubt.begun);
     FN(carry_bits)(at, &state->doubt.known);
     FN(carry_bits)(at, &state->doubt.sure);
@@ -243,7 +244,7 @@ static int FN(shift_is_sound)(const STATE *state)
 static int FN(doubt_is_sound)(const STATE *state)
 {
     return ((!FN(is_missing)(state->doubt.at[0])) && (!FN(is_missing)(state->doubt.at[1]))
-            && (!FN(is_missing)(state->doubt.drift)) && (!FN(is_missing)(state->doubt.plain))
+            && (!FN(is_missing)(state->doubt.drift)) && (!FN(is_missing)(state->doubt.plain)) && (!FN(is_missing)(state->doubt.edge))
             && FN(is_temperature)(state->doubt.start) && FN(is_temperature)(state->doubt.low)
             && FN(is_temperature)(state->doubt.high)) ? 1 : 0;
 }
@@ -278,7 +279,9 @@ static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
 
     FN(clear)(state);
     state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
-    FN(rezero_outlast)(state);
+    if (off_blocks != 0U) {
+        FN(rezero_clear)(state);
+    }
     for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
         if ((i >= state->table->n_terms) || (state->table->term_code[i]->survives == 0U)) {
             FN(forget)(state, i);

@@ -50,6 +50,7 @@ static void FN(doubt_clear)(volatile STATE *state)
     state->doubt.low = NUM_ZERO;
     state->doubt.high = NUM_ZERO;
     state->doubt.plain = NUM_ZERO;
+    state->doubt.edge = NUM_ZERO;
     state->doubt.begun = 0U;
     state->doubt.known = 0U;
     state->doubt.sure = 0U;
@@ -88,6 +89,7 @@ static void FN(doubt_input)(STATE *state, const EFFECT *effect, NUM slope)
     const uint_least32_t filled = state->filled;
 
     state->doubt.known = effect->known;
+    state->doubt.edge = effect->edge;
     state->doubt.at[0] = effect->temp;
     state->doubt.at[1] = effect->slope;
     state->doubt.sure = 2U;
@@ -168,11 +170,11 @@ static SQUARE FN(variance_beyond)(const STATE *state)
     return sum;
 }
 
-/* Of what terms do not know of the time before they began, or of a channel of which nothing is believed. */
+/* Of what terms do not know of the time before they began, or of a channel that is held, lost or beyond its range. */
 static SQUARE FN(variance_of_terms)(const STATE *state)
 {
     const TABLE *const table = state->table;
-    SQUARE sum = NO_SQUARE;
+    SQUARE sum = FN(squared)(state->doubt.edge);
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
@@ -181,7 +183,7 @@ static SQUARE FN(variance_of_terms)(const STATE *state)
         const NUM first = FN(parameter)(state, i, 0U);
 
         if (((state->doubt.known >> i) & 1U) != 0U) {
-            /* it went on from where it was, or its channel is believed */
+            /* it went on from where it was, or the mean of its channel is new and within its range */
         } else if (READS_CHANNEL(kind)) {
             sum = FN(plus)(sum, FN(squared)(word));
         } else if (kind == GTC_TERM_MEMORY) {
@@ -228,14 +230,4 @@ static void FN(rezero_clear)(STATE *state)
 static SQUARE FN(variance_of_constant)(const STATE *state)
 {
     return FN(square_or)(FN(squared)(state->constant), FN(squared)(FN(rule)(state->table, RULE_BETWEEN)));
-}
-
-/* A shift goes on; the constant of the next power-on differs from that of the last one by twice the variance. */
-static void FN(rezero_outlast)(STATE *state)
-{
-    if (FN(has_sigma)(state->table) && ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO))) {
-        const SQUARE between = FN(squared)(FN(rule)(state->table, RULE_BETWEEN));
-
-        state->constant = FN(root)(FN(plus)(FN(variance_of_constant)(state), FN(plus)(between, between)));
-    }
 }

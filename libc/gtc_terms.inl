@@ -163,6 +163,17 @@ const struct FN(term_code) FN(term_harmonic) = {
  * The mean is that of the channel's last block with enough readings. While nothing of the channel is believed a term
  * adds its stand-in; one that has none takes the guard's fallback for the mean (gtc_front.inl). */
 
+static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
+{
+    return &state->table->guards[channel * GTC_GUARD_WORDS];
+}
+
+/* A channel has been missing for so long that its fallback stands for it. */
+static int FN(is_lost)(const INPUT *in, const gtc_word_t *guard)
+{
+    return (in->held_blocks > guard[GUARD_MISSING].bits) ? 1 : 0;
+}
+
 /* Whether the channel of a term shows a mean, with the remarks about it; else the stand-in is added. */
 static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NUM *mean)
 {
@@ -172,25 +183,41 @@ static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NU
     const INPUT *const in = &state->input[channel];
     const uint_least32_t bit = (uint_least32_t)1U << i;
 
-    effect->known &= ~bit;
-    if (in->gap_us != 0U) {
-        effect->known |= bit;
-    }
+    int_least32_t remarks = GTC_OK;
+
     if ((in->gap_us == 0U) || (in->held_blocks != 0U)) {
-        effect->remarks |= GTC_HELD;
+        remarks |= GTC_HELD;
     }
-    if (in->held_blocks > state->table->guards[(channel * GTC_GUARD_WORDS) + 6U].bits) {
-        effect->remarks |= GTC_CHANNEL_LOST;
+    if (FN(is_lost)(in, FN(guard)(state, channel)) != 0) {
+        remarks |= GTC_CHANNEL_LOST;
     }
-    if ((in->clamped & 2U) != 0U) {
-        effect->remarks |= GTC_CLAMPED;
+    if ((in->clamped & CLAMPED_MEAN) != 0U) {
+        remarks |= GTC_CLAMPED;
     }
+    effect->known = (remarks == GTC_OK) ? (effect->known | bit) : (effect->known & ~bit);
+    effect->remarks |= remarks;
     if ((in->gap_us == 0U) && (stand_in != 0U)) {
         effect->added = FN(add)(effect->added, FN(stand_in)(state->table, stand_in, effect));
         return 0;
     }
     *mean = in->mean;
     return 1;
+}
+
+/* Adds the effect of what a channel shows. Where that is the edge of its range, the sensor may be at fault as well as the
+ * supply: the effect may be wrong by what it is beyond that which the term adds without a reading. */
+static void FN(add_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, WIDE shown)
+{
+    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
+    const uint_least32_t stand_in = FN(stand_in_of)(term);
+
+    effect->added = FN(add)(effect->added, shown);
+    if ((state->input[FN(channel_of)(term)].clamped & CLAMPED_MEAN) != 0U) {
+        const WIDE usual = (stand_in != 0U) ? FN(stand_in)(state->table, stand_in, effect) : NUM_ZERO;
+        const WIDE beyond = FN(diff)(shown, usual);
+
+        effect->edge = (NUM)FN(limited)(FN(add)(effect->edge, (beyond < NUM_ZERO) ? -beyond : beyond));
+    }
 }
 
 /* Linear. Parameters: slope; reference. Adds slope (mean - reference). */
@@ -202,7 +229,7 @@ static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFF
 
     (void)x;
     if (FN(is_shown)(state, i, effect, &mean) != 0) {
-        effect->added = FN(add)(effect->added, FN(scaled_difference)(mean, reference, slope));
+        FN(add_shown)(state, i, effect, FN(scaled_difference)(mean, reference, slope));
     }
 }
 
@@ -226,7 +253,7 @@ static void FN(curve_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT 
         mean = (NUM)FN(limited)(mean);
         sum = FN(scaled_difference)(mean, ELEMENT(term[4]), ELEMENT(term[2]));
         sum = FN(add)(sum, FN(bells)(mean, &term[3]));
-        effect->added = FN(add)(effect->added, sum);
+        FN(add_shown)(state, i, effect, sum);
     }
 }
 
@@ -248,7 +275,7 @@ static void FN(product_apply)(const STATE *state, uint_least32_t i, NUM x, EFFEC
     NUM mean = NUM_ZERO;
 
     if (FN(is_shown)(state, i, effect, &mean) != 0) {
-        effect->added = FN(add)(effect->added, FN(scaled_difference)(mean, reference, (NUM)FN(limited)(here)));
+        FN(add_shown)(state, i, effect, FN(scaled_difference)(mean, reference, (NUM)FN(limited)(here)));
     }
 }
 

@@ -339,6 +339,47 @@ TEST(stamped_samples_are_the_samples_of_their_slots)
     }
 }
 
+/* A clock that stands still: samples go on, their time does not. A few in a row are jitter, a block of them is a fault, which
+ * ends as a sensor does that is missing; when the clock goes on the front end begins again. */
+TEST(a_clock_that_stands_still_ends_in_the_fallback)
+{
+    state_t a = started();
+    num_t temps[2];
+    uint_least32_t time_us = 0UL;
+    uint_least32_t k;
+
+    temps[0] = C(15.0);
+    temps[1] = C(15.0) + STEP;
+    for (k = 0UL; k < 30UL * N; k++) {
+        time_us += PERIOD;
+        CHECK(FN(sample_at)(&a, time_us, &temps[k & 1UL]) >= 0);
+    }
+    CHECK_INT(GTC_OK, status_of(&a));
+    for (k = 0UL; k < N; k++) {
+        CHECK((FN(sample_at)(&a, time_us, &temps[k & 1UL]) & GTC_HELD) != 0);
+        CHECK_INT(GTC_OK, status_of(&a));
+    }
+    for (k = 0UL; k < 2UL * N; k++) {
+        CHECK((FN(sample_at)(&a, time_us, &temps[k & 1UL]) & GTC_HELD) != 0);
+    }
+    CHECK((status_of(&a) & GTC_HELD) != 0);
+    for (k = 0UL; (k < 200UL * N) && ((status_of(&a) & GTC_FALLBACK) == 0); k++) {
+        CHECK((FN(sample_at)(&a, (uint_least32_t)(time_us - (k % 3UL)), &temps[k & 1UL]) & GTC_HELD) != 0);
+    }
+    CHECK((status_of(&a) & GTC_FALLBACK) != 0);
+    for (k = 0UL; k < 30UL * N; k++) {
+        time_us += PERIOD;
+        CHECK(FN(sample_at)(&a, time_us, &temps[k & 1UL]) >= 0);
+    }
+    CHECK_INT(GTC_OK, status_of(&a));
+    /* A caller that is twice as fast as its period loses nothing. */
+    for (k = 0UL; k < 60UL * N; k++) {
+        time_us += (uint_least32_t)((PERIOD / 2UL) + (k & 1UL));
+        CHECK(FN(sample_at)(&a, time_us, &temps[(k / 2UL) & 1UL]) >= 0);
+        CHECK_INT(GTC_OK, status_of(&a));
+    }
+}
+
 TEST(stamps_tell_lost_samples_late_ones_and_a_clock_that_is_off)
 {
     state_t a = started();
@@ -585,6 +626,7 @@ int main(void)
     RUN(a_period_of_which_no_whole_number_makes_a_block_is_refused);
     RUN(a_long_time_without_samples_is_the_same_in_one_call_and_in_many);
     RUN(stamped_samples_are_the_samples_of_their_slots);
+    RUN(a_clock_that_stands_still_ends_in_the_fallback);
     RUN(stamps_tell_lost_samples_late_ones_and_a_clock_that_is_off);
     RUN(a_table_with_a_lead_looks_a_block_ahead);
     RUN(no_correction_leaves_the_authority);

@@ -207,7 +207,7 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
 #define TERM_AT (INPUT_AT + (13 * (GTC_MAX_TERMS + 1)))
 #define DOUBT_AT (TERM_AT + (2 * GTC_MAX_TERMS))
-#define SHIFT_AT (DOUBT_AT + 10)
+#define SHIFT_AT (DOUBT_AT + 11)
 
 /* CRC of a saved state, bit by bit: over all words before it. */
 static void resealed(gtc_word_t words[WORDS])
@@ -269,13 +269,13 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
 /* What the uncertainty goes by must be numbers and temperatures, the shift what the table grants. */
 TEST(doubts_that_no_call_leaves_are_refused_with_a_right_crc)
 {
-    static const int at[10] = {
-        DOUBT_AT, DOUBT_AT + 1, DOUBT_AT + 2, DOUBT_AT + 3, DOUBT_AT + 4, DOUBT_AT + 5, DOUBT_AT + 6, SHIFT_AT,
-        SHIFT_AT, SHIFT_AT + 1,
+    static const int at[11] = {
+        DOUBT_AT, DOUBT_AT + 1, DOUBT_AT + 2, DOUBT_AT + 3, DOUBT_AT + 4, DOUBT_AT + 5, DOUBT_AT + 6, DOUBT_AT + 7,
+        SHIFT_AT, SHIFT_AT, SHIFT_AT + 1,
     };
-    static const uint_least32_t to[10] = {
-        MISSING_BITS, MISSING_BITS, MISSING_BITS, 0x70000000UL, 0x70000000UL, 0x70000000UL, MISSING_BITS, 0x70000000UL,
-        0xF0000000UL, MISSING_BITS,
+    static const uint_least32_t to[11] = {
+        MISSING_BITS, MISSING_BITS, MISSING_BITS, 0x70000000UL, 0x70000000UL, 0x70000000UL, MISSING_BITS, MISSING_BITS,
+        0x70000000UL, 0xF0000000UL, MISSING_BITS,
     };
     gtc_word_t words[WORDS];
     gtc_word_t forged[WORDS];
@@ -284,11 +284,11 @@ TEST(doubts_that_no_call_leaves_are_refused_with_a_right_crc)
 
     walk(&state, 0, 30);
     saved(&state, words);
-    for (k = 0; k < 10; k++) {
+    for (k = 0; k < 11; k++) {
         memcpy(forged, words, sizeof forged);
         forged[at[k]].bits = to[k];
         if ((TEST_Q31 != 0) && (at[k] == SHIFT_AT)) {
-            forged[at[k]].bits = (k == 7) ? 0x7FFFFFFFUL : 0x80000001UL;
+            forged[at[k]].bits = (k == 8) ? 0x7FFFFFFFUL : 0x80000001UL;
         }
         resealed(forged);
         CHECK_INT(GTC_E_IMAGE, restored(&state, forged, 0U));

@@ -85,6 +85,36 @@ class Runtime:
         bits = np.zeros((len(channels), 3), np.uint32)
         return self._driven("snapshots", table, channels, missed, samples_per_block, 4, bits), bits
 
+    def calls(
+        self, table: Table, kind: np.ndarray, number: np.ndarray, values: Words, samples_per_block: int
+    ) -> tuple[np.ndarray, Words]:
+        """Calls in order: what each and `snapshot` after it return, shape (n, 2); bits of bias and sigma.
+
+        Args:
+            kind: Of the calls of libc_shim.c: sample, sample_at, missed, rezero, save and restore, init.
+            number: Time, count, seconds or blocks without power, one a call.
+            values: Bits of the channels, or of the measured rate in the first one, shape (n, n_channels).
+        """
+        struct, _keep = self.struct(table)
+        state = ctypes.create_string_buffer(self._shim(table, "state_size", ctypes.c_size_t)() + 16)
+        kind = np.concatenate([[5], kind]).astype(np.int32)
+        number = np.concatenate([[0], number]).astype(np.uint32)
+        values = np.concatenate([values[:1], values]).astype(np.uint32)
+        status, bits = np.zeros((len(kind), 2), np.int32), np.zeros((len(kind), 2), np.uint32)
+        self._shim(table, "calls")(
+            state,
+            ctypes.byref(struct),
+            ctypes.c_uint32(period_us(table.block_us, samples_per_block)),
+            _address(kind),
+            _address(number),
+            _address(values),
+            ctypes.c_long(values.shape[1]),
+            ctypes.c_long(len(kind)),
+            _address(status),
+            _address(bits),
+        )
+        return status[1:], bits[1:]
+
     def _driven(
         self,
         shim: str,

@@ -11,6 +11,10 @@
                           const uint_least32_t *missed, long rows, int *status, num *bias);       \
     void shim_##n##_snapshots(gtc_##n##_state_t *state, const num *channels, long n_channels,     \
                               const uint_least32_t *missed, long rows, int *status, num *out);    \
+    void shim_##n##_calls(gtc_##n##_state_t *state, const gtc_##n##_table_t *table,               \
+                          uint_least32_t period_us, const int *kind,                              \
+                          const uint_least32_t *number, const num *values, long n_channels,       \
+                          long rows, int *status, num *out);                                      \
     size_t shim_##n##_state_size(void)                                                            \
     {                                                                                             \
         return sizeof(gtc_##n##_state_t);                                                         \
@@ -48,6 +52,41 @@
             out[3 * i] = snapshot.bias;                                                           \
             out[(3 * i) + 1] = snapshot.sigma;                                                    \
             out[(3 * i) + 2] = snapshot.correlation_s;                                            \
+        }                                                                                         \
+    }                                                                                             \
+    void shim_##n##_calls(gtc_##n##_state_t *state, const gtc_##n##_table_t *table,               \
+                          uint_least32_t period_us, const int *kind,                              \
+                          const uint_least32_t *number, const num *values, long n_channels,       \
+                          long rows, int *status, num *out)                                       \
+    {                                                                                             \
+        gtc_word_t words[GTC_SAVE_WORDS];                                                         \
+        long i;                                                                                   \
+        for (i = 0; i < rows; i++) {                                                              \
+            gtc_##n##_snapshot_t snapshot = {0, 0, 0, 0U, 0};                                     \
+            const num *const at = &values[i * n_channels];                                        \
+            double sum = 0.0;                                                                     \
+            long k;                                                                               \
+            int done = 0;                                                                         \
+            switch (kind[i]) {                                                                    \
+            case 0: done = gtc_##n##_sample(state, at); break;                                    \
+            case 1: done = gtc_##n##_sample_at(state, number[i], at); break;                      \
+            case 2: done = gtc_##n##_missed(state, number[i]); break;                             \
+            case 3: /* the mean of what the calls before it gave is taken off */                  \
+                for (k = i - (long)number[i]; k < i; k++) {                                       \
+                    sum += (double)out[2 * k];                                                    \
+                }                                                                                 \
+                done = gtc_##n##_rezero(state, at[0] - (num)(sum / number[i]), number[i]);        \
+                break;                                                                            \
+            case 4:                                                                               \
+                done = gtc_##n##_save(state, words);                                              \
+                done = gtc_##n##_restore(state, table, period_us, words, number[i]);              \
+                break;                                                                            \
+            default: done = gtc_##n##_init(state, table, period_us); break;                       \
+            }                                                                                     \
+            status[2 * i] = done;                                                                 \
+            status[(2 * i) + 1] = gtc_##n##_snapshot(state, &snapshot);                           \
+            out[2 * i] = snapshot.bias;                                                           \
+            out[(2 * i) + 1] = snapshot.sigma;                                                    \
         }                                                                                         \
     }
 

@@ -129,12 +129,9 @@ def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_
             of_rows = with_missing(arithmetic, readings[:, channel], stream.position)
             fallback = table.numbers(table.records("guards")[channel])[7]
             shown = channel_at(arithmetic, of_rows, _guarded(table, channel), fallback, settings, led)
-        before = outcome.added
+            if number:
+                shown = replace(shown, stand_in=_stand_in(table, number, outcome, shown, led))
         recursion.apply(course, shown, outcome)
-        if shown is not None and number:
-            away = np.flatnonzero(shown.is_away & (led.kind == MAP))
-            instead = stand_in(table, number, outcome.temperature[away], outcome.slope[away])
-            outcome.added[away] = before[away] + instead
     status, bits = _corrections(table, led, outcome)
     found = evidence_of(table, steps, course, outcome, status)
     return _Followed(
@@ -145,6 +142,14 @@ def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_
         sigma_bits(table, found) if table.sigma.size else None,
         np.concatenate([[0], found.age]),
     )
+
+
+def _stand_in(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> Numbers:
+    """What a term adds without its channel, where that is asked for; else 0."""
+    asked = np.flatnonzero((shown.is_away | ((shown.remarks & CLAMPED) != 0)) & (steps.kind == MAP))
+    found = np.zeros_like(outcome.added)
+    found[asked] = stand_in(table, number, outcome.temperature[asked], outcome.slope[asked])
+    return found
 
 
 def _corrections(table: Table, steps: Steps, outcome: TermOutcome) -> tuple[NDArray[np.int32], Words]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from .arithmetic import Numbers, Operations
+from .status import CLAMPED
 
 __all__ = [
     "Course",
@@ -140,18 +141,22 @@ class CourseChannel:
         mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
         remarks: Status bits: held, lost, clamped, shape (n,).
         is_away: Where nothing of it is believed, so that something stands for it, shape (n,).
+        stand_in: What its term adds then, shape (n,), needed there and where a reading lies at the edge of its range;
+            None: the effect of `mean`.
     """
 
     mean: Numbers
     remarks: NDArray[np.int32]
     is_away: NDArray[np.bool_]
+    stand_in: Numbers | None = None
 
 
 @dataclass(slots=True)
 class TermOutcome:
     """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits.
 
-    `away`: of each term that reads a channel, where nothing of the channel is believed.
+    `away`: of each term that reads a channel, where that is held, lost or beyond its range. `edge`: what terms add of
+    readings at the edge of their range, beyond what they add without a reading, as magnitudes.
     """
 
     temperature: Numbers
@@ -159,6 +164,10 @@ class TermOutcome:
     added: Numbers
     remarks: NDArray[np.int32]
     away: list[NDArray[np.bool_]] = field(default_factory=list)
+    edge: Numbers = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.edge = np.zeros_like(self.added)
 
 
 class Recursion:
@@ -226,9 +235,15 @@ class _OfChannel(Recursion):
         if channel is None:
             raise ValueError("a term of a channel without its channel")
         added = self._added(channel.mean, course.temperature)
-        outcome.added = outcome.added + np.where(np.isnan(added), added.dtype.type(0), added)
+        added = np.where(np.isnan(added), added.dtype.type(0), added)
+        usual = np.zeros_like(added) if channel.stand_in is None else channel.stand_in
+        beyond = np.where((channel.remarks & CLAMPED) != 0, np.abs(added - usual), np.zeros_like(added))
+        outcome.edge = self.do.limited(outcome.edge + beyond)
+        outcome.added = outcome.added + (
+            added if channel.stand_in is None else np.where(channel.is_away, channel.stand_in, added)
+        )
         outcome.remarks = outcome.remarks | channel.remarks
-        outcome.away.append(channel.is_away)
+        outcome.away.append(channel.remarks != 0)
 
     def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
         raise NotImplementedError

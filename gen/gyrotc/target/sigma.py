@@ -2,7 +2,7 @@
 
 Mirror of libc/gtc_sigma.inl, and of the last part of libc/gtc_num_<n>.h; docs/design.md gives the rules with their
 reasons. A square is a float32 number, or an unsigned one of 64 bits in the square of the bias' unit; in fixed point
-each part is no larger than 2^30, so that the sum of all fits.
+each part is no larger than 2^30, and sums saturate.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ __all__ = ["RULES", "Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "varia
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
 RULES = 11
 
-_PART = 2**30  # fewer than 16 squares of it fit 64 bits
+_PART = 2**30  # its square and a few more fit 64 bits
 _LARGEST = 2**31 - 1  # of a word
 # Half the exponent's bias, less what makes the first guess of a root even
 _HALF_EXPONENT = np.uint32(0x1FBB4F2E)
@@ -41,6 +41,9 @@ class Squares:
     def squared(self, x: Numbers) -> Numbers:
         x = np.asarray(x, dtype=np.float32)
         return np.asarray(x * x)
+
+    def plus(self, a: Numbers, b: Numbers) -> Numbers:
+        return np.asarray(a + b)
 
     def per_c(self, a: Numbers, b: Any, word: Any) -> Numbers:
         return np.asarray(word * (a - b))
@@ -90,6 +93,10 @@ class _Q31(Squares):
     def squared(self, x: Numbers) -> Numbers:
         magnitude = np.abs(self.limited(np.asarray(x, dtype=np.int64))).astype(np.uint64)
         return np.asarray(magnitude * magnitude)
+
+    def plus(self, a: Numbers, b: Numbers) -> Numbers:
+        total = np.asarray(a + b)
+        return np.where(total >= a, total, np.uint64(2**64 - 1))
 
     def per_c(self, a: Numbers, b: Any, word: Any) -> Numbers:
         return np.asarray(((a - b) * int(word)) >> 16)
@@ -152,7 +159,8 @@ class SigmaEvidence:
         age: Blocks for which the correction is held.
         since: Blocks since the terms began.
         low, high: Of the temperatures that they saw since then.
-        away: Of each term that reads a channel, where nothing of the channel was believed.
+        away: Of each term that reads a channel, where that is held, lost or beyond its range.
+        edge: What terms add of readings at the edge of their range, beyond what they add without a reading.
     """
 
     status: NDArray[np.int32]
@@ -165,6 +173,7 @@ class SigmaEvidence:
     low: Numbers
     high: Numbers
     away: tuple[NDArray[np.bool_], ...]
+    edge: Numbers
 
     def __len__(self) -> int:
         return int(self.status.size)
@@ -203,6 +212,7 @@ def evidence_of(
         low=_extremes(np.minimum, course, steps.is_restart),
         high=_extremes(np.maximum, course, steps.is_restart),
         away=tuple(of_term[made] for of_term in outcome.away),
+        edge=outcome.edge[made],
     )
 
 
@@ -233,21 +243,20 @@ def sigma_bits(table: Table, evidence: SigmaEvidence) -> Words:
     """
     do, constant = SQUARES[table.numeric], _rules(table)[Rule.BETWEEN]
     none = do.squared(_rules(table)[Rule.NONE : Rule.NONE + 1])
-    squares = np.concatenate([none, variances(table, evidence)]) + do.squared(np.asarray([constant]))
+    squares = do.plus(np.concatenate([none, variances(table, evidence)]), do.squared(np.asarray([constant])))
     return table.bits(do.root(squares))
 
 
 def variances(table: Table, evidence: SigmaEvidence) -> Numbers:
     """Variance of every correction without that of the constant of the power-on."""
     do, rules = SQUARES[table.numeric], _rules(table)
-    total = _of_map(table, evidence) + _of_age(table, evidence)
-    total = total + _of_start(table, evidence)
-    beyond = [_beyond(table, evidence, k) for k in (0, 1)]
-    total = total + (beyond[0] + beyond[1])
-    terms = np.zeros_like(total)
+    total = do.plus(_of_map(table, evidence), _of_age(table, evidence))
+    total = do.plus(total, _of_start(table, evidence))
+    total = do.plus(total, do.plus(*(_beyond(table, evidence, k) for k in (0, 1))))
+    terms = do.squared(evidence.edge)
     for part in _of_terms(table, evidence):
-        terms = terms + part
-    total = total + terms
+        terms = do.plus(terms, part)
+    total = do.plus(total, terms)
     fallen = (evidence.status & FALLBACK) != 0
     return np.where(fallen, do.squared(rules[Rule.FALLBACK]), total)
 
@@ -293,7 +302,7 @@ def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> Numbers:
 
 
 def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
-    """What each term does not know of the time before it began, or of a channel of which nothing is believed."""
+    """What each term does not know of the time before it began, or of a channel that is not read."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)
     for i, record in enumerate(table.records("terms")):

@@ -11,6 +11,7 @@ __all__ = [
     "E_IMAGE",
     "E_LAYOUT",
     "E_PERIOD",
+    "E_REST",
     "E_SELF_TEST",
     "FALLBACK",
     "HELD",
@@ -34,3 +35,4 @@ E_IMAGE = -4
 E_ID = -5
 E_PERIOD = -6
 E_ABSENT = -7
+E_REST = -8
