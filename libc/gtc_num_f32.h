@@ -515,7 +515,6 @@ static inline float FN(bells)(float x, const gtc_word_t *bells)
 #define SNAPSHOT gtc_f32_snapshot_t
 #define SQUARE float /* (deg/h)^2 */
 #define NO_SQUARE 0.0F
-#define SHIFT_SHARE float
 
 static inline float FN(limited)(float x)
 {

@@ -625,7 +625,6 @@ static inline int_least64_t FN(bells)(int_least32_t x, const gtc_word_t *bells)
 #define SNAPSHOT gtc_q31_snapshot_t
 #define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
 #define NO_SQUARE 0U
-#define SHIFT_SHARE uint_least64_t /* 2^-31 */
 
 static inline uint_least64_t FN(squared)(int_least64_t x)
 {
@@ -635,11 +634,13 @@ static inline uint_least64_t FN(squared)(int_least64_t x)
     return (uint_least64_t)square;
 }
 
+/* All ones where the sum carries beyond 64 bits. */
 static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
 {
     const uint_least64_t sum = a + b;
+    const uint_least64_t carry = ((a & b) | ((a | b) & ~sum)) >> 63;
 
-    return (sum >= a) ? sum : ~(uint_least64_t)0U;
+    return sum | ((uint_least64_t)0U - carry);
 }
 
 /* Every number of a state has a square */

@@ -58,19 +58,31 @@ static SQUARE FN(variance_left)(const STATE *state, SQUARE prior, SQUARE rest, S
     return (left > least) ? left : least;
 }
 
-static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
+/* GTC_OK, or why a rest cannot move the constant. */
+static int FN(can_rezero)(const STATE *state, NUM mean_rate, uint_least32_t seconds)
 {
     int status = GTC_OK;
+
+    if ((state == NULL) || (state->table == NULL) || (FN(is_missing)(mean_rate) != 0) || (seconds == 0U)) {
+        status = GTC_E_ARG;
+    } else if ((!FN(has_sigma)(state->table)) || (!(MEMBER(state->table->rezero) > NUM_ZERO))) {
+        status = GTC_E_ABSENT;
+    } else {
+        /* it can */
+    }
+    return status;
+}
+
+static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
+{
+    int status = FN(can_rezero)(state, mean_rate, seconds);
     SQUARE prior;
     SQUARE of_map;
     SQUARE rest;
     WIDE shift;
 
-    if ((state == NULL) || (state->table == NULL) || (FN(is_missing)(mean_rate) != 0) || (seconds == 0U)) {
-        return GTC_E_ARG;
-    }
-    if ((!FN(has_sigma)(state->table)) || (!(MEMBER(state->table->rezero) > NUM_ZERO))) {
-        return GTC_E_ABSENT;
+    if (status != GTC_OK) {
+        return status;
     }
     prior = FN(variance_of_constant)(state);
     of_map = FN(variance)(state);

@@ -420,6 +420,25 @@ TEST(a_stand_in_is_added_while_nothing_of_its_channel_is_believed)
     CHECK(same(map_with(&TERMS, C(40.0)) + map_with(&alone, C(40.0)), bias_of(&b)));
 }
 
+/* A reading at either edge of its range is doubtful by what it adds beyond the stand-in, or beyond nothing. */
+TEST(a_reading_at_the_edge_says_how_far_it_may_be_wrong)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    const table_t without = without_stand_in(terms);
+    int k;
+
+    for (k = 0; k < 4; k++) {
+        state_t a = started_with((k < 2) ? &TERMS : &without);
+        const num_t reading = ((k % 2) == 0) ? C(-300.0) : C(300.0);
+
+        (void)samples(&a, C(15.0), C(12.0), 401);
+        CHECK(a.doubt.edge == 0);
+        (void)samples(&a, C(15.0), reading, 20);
+        CHECK_INT(GTC_CLAMPED, status_of(&a));
+        CHECK(a.doubt.edge > 0);
+    }
+}
+
 /* CURVED with two stand-ins, both the map's own network. */
 TEST(bent_lines_and_products_have_stand_ins_too)
 {
@@ -810,6 +829,7 @@ int main(void)
     RUN(no_reading_makes_a_correction_that_is_no_number);
 #endif
     RUN(a_stand_in_is_added_while_nothing_of_its_channel_is_believed);
+    RUN(a_reading_at_the_edge_says_how_far_it_may_be_wrong);
     RUN(bent_lines_and_products_have_stand_ins_too);
     RUN(a_block_that_was_overwritten_stays_within_the_authority);
     RUN(a_term_that_was_overwritten_is_back_by_the_end_of_the_block);
