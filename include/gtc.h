@@ -280,17 +280,17 @@ typedef struct {
  *   check           4460    450       3570    470
  *   open            2760    500       2540    520
  *   map              920     20        790    120
- *   init            2600    310       2420    320
- *   sample          5700    240       6100    410
- *   sample_at       6100    260       6520    440
- *   missed          4920    240       5510    400
+ *   init            2680    320       2490    330
+ *   sample          5830    250       6230    420
+ *   sample_at       6230    270       6660    450
+ *   missed          5030    240       5630    410
  *   bias              80      0         80     10
- *   snapshot        1180     50       1980    140
- *   rezero          1580     50       2880    160
+ *   snapshot        1210     50       2030    140
+ *   rezero          1640     60       2960    170
  *   unzero           120     10        120     10
  *   angle            340      0        180     30
- *   save             600     40        600     40
- *   restore         4390    820       4140    880 */
+ *   save             630     40        630     40
+ *   restore         4490    840       4240    900 */
 
 /* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
