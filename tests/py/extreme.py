@@ -12,6 +12,7 @@ from models import random_model
 from numpy.typing import NDArray
 
 _FLAT = 1e-7  # of the span: the narrowest overlap
+_MOST_DPH = 7.5e6  # docs/FORMAT.md: no number of a network is larger
 
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:
@@ -34,9 +35,13 @@ def extreme_model(seed: int) -> Model:
         return None if rng.random() < 0.1 else _log(rng, 1e-3, 1e3)
 
     inside = rng.random() < 0.7
+
+    def legal(value: float) -> float:
+        return min(max(float(value), -_MOST_DPH), _MOST_DPH)
+
     network = Network(
-        w0=float(rng.normal(0.0, 1.0)) * size * _log(rng, 1e-3, 5.0),
-        linear=(float(rng.normal(0.0, size)), float(rng.normal(0.0, size))),
+        w0=legal(rng.normal(0.0, 1.0) * size * _log(rng, 1e-3, 5.0)),
+        linear=(legal(rng.normal(0.0, size)), legal(rng.normal(0.0, size))),
         centers=tuple(
             (float(rng.uniform(t0, t1)), float(rng.uniform(r0, r1)))
             if inside
@@ -44,7 +49,7 @@ def extreme_model(seed: int) -> Model:
             for _ in range(n)
         ),
         widths=tuple((width(), width()) for _ in range(n)),
-        weights=tuple(float(v) for v in rng.normal(0.0, size, n)),
+        weights=tuple(legal(v) for v in rng.normal(0.0, size, n)),
     )
     return random_model(
         seed,
@@ -97,7 +102,7 @@ def extreme_bank(seed: int) -> Model:
                 network.model_copy(
                     update={
                         "region": region,
-                        "w0": network.w0 + offset,
+                        "w0": min(network.w0 + offset, _MOST_DPH),
                         "weights": tuple(w * factor for w in network.weights),
                     }
                 )

@@ -104,9 +104,9 @@ class Surface:
         total = self.w0 + scaled / POSITIONS
         return _add_products(total, self.weights, self.factors(0, x_t), self.factors(1, x_r))
 
-    def steepest(self) -> Floats:
-        """Bounds of the derivatives by one position over the whole envelope, shape (2,)."""
-        low, high = np.zeros(2), np.full(2, float(POSITIONS))
+    def steepest(self, reach: Floats) -> Floats:
+        """Bounds of the derivatives by one position, shape (2,); `reach`: positions beyond the first and the last."""
+        low, high = -reach, POSITIONS + reach
         inverse = self.alpha * _SQRT_LN2
         return largest_gradient(self.linear / POSITIONS, self.center, inverse, self.weights, low, high)
 
@@ -221,7 +221,7 @@ def table_of(model: Model) -> Table:
     inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
     given = (*model.networks, *model.stand_ins)
     surfaces = [surface_of(n, model.scale, per_block, inputs) for n in given]
-    felt = [_felt(surface) for surface in surfaces]
+    felt = [_felt(surface, _moved(inputs)) for surface in surfaces]
     chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
     fraction = min(_fraction(surface) for surface in chosen)
     if fraction < _COARSEST:
@@ -272,10 +272,18 @@ def _envelope(model: Model, per_block: float) -> tuple[int, int, int, int]:
     return low_t, high_t, low_r, high_r
 
 
-def _felt(surface: Surface) -> NDArray[np.bool_]:
-    """Gaussians that reach 2^-32 somewhere in the envelope."""
+def _moved(inputs: Inputs) -> Floats:
+    """Positions by which an input can be moved: to the middle of its cell, and by the rounded edges of the envelope.
+
+    As far can the model's own envelope reach beyond the positions: many of them, where it is narrower than 2^-16 C.
+    """
+    return np.array([0.5 + 0.5 * i.per_unit for i in inputs])
+
+
+def _felt(surface: Surface, reach: Floats) -> NDArray[np.bool_]:
+    """Gaussians that reach 2^-32 somewhere in the envelope, which ends at most `reach` beyond the positions."""
     center = surface.center
-    beyond = np.maximum(np.maximum(-center, center - POSITIONS), 0.0) * surface.alpha
+    beyond = np.maximum(np.maximum(-center, center - POSITIONS) - reach, 0.0) * surface.alpha
     return np.asarray(beyond[:, 0] ** 2 + beyond[:, 1] ** 2 < 32.0)
 
 
@@ -353,9 +361,9 @@ def _in_dph(surface: Surface, whole: NDArray[np.int64], frac_bits: int) -> Surfa
 
 
 def _input_error(exact: Surface, inputs: Inputs) -> float:
-    """Largest effect of an input that is moved to the middle of its cell, deg/h."""
-    moved = [0.5 + 0.5 * i.per_unit for i in inputs]  # the second: edges of the envelope are rounded, too
-    steepest = exact.steepest()
+    """Largest effect of an input that is moved, deg/h."""
+    moved = _moved(inputs)
+    steepest = exact.steepest(moved)
     return math.fsum(moved[k] * float(steepest[k]) for k in (0, 1))
 
 

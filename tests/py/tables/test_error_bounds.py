@@ -59,6 +59,28 @@ def test_what_is_narrower_than_the_grid_is_within_the_authority(
     assert worst_error_dph(model, table, seed) <= table.error_bound_dph
 
 
+@pytest.mark.parametrize("width", [0.03, 0.3, 3.0])
+def test_the_bound_holds_in_an_envelope_narrower_than_fixed_point_tells(width: float) -> None:
+    """Both its ends round to the same 2^-16 C, 6 positions beside the center: fixed point bounds it or refuses it."""
+    center = 19.6 / 65536.0
+    gaussian = Network(
+        w0=0.0, linear=(0.0, 0.0), centers=((center, 0.0),), widths=((width, None),), weights=(1.0,)
+    )
+    model = random_model(
+        3,
+        scale=Scale(temperature_c=(center, 2e-6), slope_c_per_min=1.0),
+        envelope=Envelope(temperature_c=(center - 1e-6, center + 1e-6), slope_c_per_min=(-1.0, 1.0)),
+        networks=(gaussian,),
+        coverage=None,
+        fallback_dph=0.0,
+    )
+    try:
+        table = quantise(model, "q31")
+    except CheckFailed:
+        return
+    assert worst_error_dph(model, table, 3) <= table.error_bound_dph
+
+
 @pytest.mark.parametrize("numeric", NUMERICS)
 @pytest.mark.parametrize("id", ["auxiliary_curve", "auxiliary_product"])
 def test_the_bound_of_curves_and_products_holds(id: str, numeric: Numeric) -> None:
