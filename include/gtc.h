@@ -280,7 +280,7 @@ typedef struct {
  *   check           4460    450       3570    470
  *   open            2760    500       2540    520
  *   map              920     20        790    120
- *   init            2680    320       2490    330
+ *   init             550     70        570     70
  *   sample          5830    250       6230    420
  *   sample_at       6230    270       6660    450
  *   missed          5030    240       5630    410
@@ -290,9 +290,9 @@ typedef struct {
  *   unzero           120     10        120     10
  *   angle            340      0        180     30
  *   save             630     40        630     40
- *   restore         4490    840       4240    900 */
+ *   restore         2260    620       2050    660 */
 
-/* Boot self-test of a table: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
+/* Boot self-test of a table that is compiled in; before gtc_<n>_init(), which relies on it: layout, arithmetic (f32: rounding, ties, products not fused into sums, no
  * excess precision, sums in their order, subnormals not flushed to 0), checksum over its values, every
  * word within its range (docs/FORMAT.md, section 3), its known answers, which the generator chooses to
  * differ where a product is fused.
@@ -323,7 +323,8 @@ GTC_MUST_CHECK int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp,
 
 /* Starts a state. period_us: time from sample to sample on this target, microseconds; a whole number of them,
  * at most 2^20, must make a block of the table, to a thousandth of it.
- * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (as check) or GTC_E_PERIOD. Cost: some operations a word. */
+ * The table is one that gtc_<n>_check() or gtc_<n>_open() accepted: its words are not tested again.
+ * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (another layout, or more than this build was compiled for) or GTC_E_PERIOD. */
 GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t period_us);
 GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_least32_t period_us);
 

@@ -471,6 +471,15 @@ static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t pe
     return ((n <= MAX_SAMPLES_PER_BLOCK) && (off <= (table->block_us / PERIOD_PARTS))) ? n : 0U;
 }
 
+/* 1 if a table is of this layout and within the options of this build, so that no array of a state is too short for it.
+ * Its other words are those that gtc_<n>_check() or gtc_<n>_open() found sound. */
+static int FN(fits_build)(const TABLE *table)
+{
+    return ((table->layout == GTC_TABLE_LAYOUT) && (table->slope_blocks <= GTC_MAX_SLOPE_BLOCKS)
+            && (table->n_terms <= GTC_MAX_TERMS) && (table->n_channels <= (GTC_MAX_TERMS + 1U))
+            && ((GTC_WITH_BANK != 0) || (table->n_networks == 1U))) ? 1 : 0;
+}
+
 /* GTC_OK, or why a state cannot be started. */
 static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t period_us)
 {
@@ -478,7 +487,7 @@ static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t 
 
     if ((state == NULL) || (table == NULL) || (period_us == 0U)) {
         status = GTC_E_ARG;
-    } else if (!FN(is_usable)(table)) {
+    } else if (!FN(fits_build)(table)) {
         status = GTC_E_LAYOUT;
     } else if (FN(samples_in_block)(table, period_us) == 0U) {
         status = GTC_E_PERIOD;

@@ -1,7 +1,7 @@
 /* gtc_limits.inl - the legal range of every word of a table, in the numbers included before.
  *
  * This is the one text of them. A table with a word outside of its range, or one that does not meet the
- * conditions of gtc_table.inl, is refused by gtc_<n>_open(), gtc_<n>_check() and gtc_<n>_init(); with any other
+ * conditions of gtc_table.inl, is refused by gtc_<n>_open() and gtc_<n>_check(); with any other
  * table no function of the runtime meets a run-time error (docs/proof.md). The generator reads this file and
  * emits no other table; docs/FORMAT.md, section 3, says it to users. Units stand in gtc_table.h.
  *

@@ -126,6 +126,9 @@ int main(void)
     long cuts = 0;
     int save;
 
+    if (gtc_f32_check(TABLE) != GTC_OK) {
+        return 1;
+    }
     memset(flash, 0xFF, sizeof flash);
     for (save = 1; save <= SAVES; save++) {
         memcpy(before, flash, sizeof before);

@@ -1,5 +1,5 @@
 /* test_bank.c - several networks in one table: hand-over without a jump, where it is compiled in. */
-#include "test_num.h"
+#include "test_image.h"
 
 /* 0.08 deg/h for 1/16 C: four times the steepest that the blend is. */
 #if TEST_Q31
@@ -77,12 +77,11 @@ TEST(networks_that_do_not_share_out_the_centers_are_refused)
 {
     table_t table = BANK;
     gtc_word_t networks[3 * GTC_NETWORK_WORDS];
-    state_t state;
 
     memcpy(networks, BANK.networks, sizeof networks);
     networks[GTC_NETWORK_WORDS].bits = 0xFFFFFFFFUL;
     table.networks = networks;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
 
 int main(void)

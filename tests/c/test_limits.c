@@ -238,12 +238,10 @@ TEST(weights_and_gains_keep_to_their_ranges)
 TEST(a_linked_table_keeps_to_the_ranges_too)
 {
     table_t table = TABLE;
-    state_t state;
 
     table.calibrated = 0x80000000UL;
     table.crc = image[image_of(&table, image) - 1U].bits;
     CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
 }
 
 TEST(an_envelope_of_one_value_is_one)

@@ -1,5 +1,5 @@
 /* test_sigma.c - the snapshot of a correction, and a rest that moves the constant. */
-#include "test_num.h"
+#include "test_image.h"
 
 #if TEST_Q31
 typedef gtc_q31_snapshot_t snapshot_t;
@@ -371,16 +371,15 @@ TEST(a_table_without_uncertainties_gives_neither_snapshot_nor_shift)
 TEST(words_of_uncertainty_are_all_there_or_none)
 {
     table_t table = TABLE;
-    state_t state;
 
     table.n_sigma = TABLE.n_sigma - 1U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.n_sigma = TABLE.n_sigma;
     table.sigma_cells[0] = 0U;
     table.sigma_cells[1] = 0U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.n_sigma = GTC_SIGMA_RULES; /* as many as rules alone are */
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
 
 /* The widest words that `init` accepts: sums of squares stay within their numbers, the root is a sigma. */

@@ -1,5 +1,5 @@
 /* test_terms.c - extension terms, narrow widths and harmonics, in what they do to the correction. */
-#include "test_num.h"
+#include "test_image.h"
 
 #define STEP C(0.015625)
 
@@ -526,35 +526,34 @@ TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
     gtc_word_t terms[4U * GTC_TERM_WORDS];
     gtc_word_t *const head = &terms[(3U * GTC_TERM_WORDS) + 1U];
     table_t table = without_stand_in(terms);
-    state_t state;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK(checked(&table) != GTC_E_LAYOUT);
     table.n_centers = TERMS.n_centers;
     table.n_stand_ins = 1U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U + (2UL << 16);
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK(checked(&table) != GTC_E_LAYOUT);
     head->bits = 1U + (1UL << 16); /* the map's own */
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U + (3UL << 16);
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U + (0xFFFFUL << 16);
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U;
     terms[1].bits = 2UL << 16; /* of a term without a channel */
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     terms[1].bits = 0U;
     head->bits = 1U + (2UL << 16);
     table.n_networks = 0U;
     table.n_stand_ins = 2U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.n_networks = 0xFFFFFFFFUL;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U + (1UL << 16); /* a stand-in, and no network of the map before it */
     table.n_networks = 0U;
     table.n_stand_ins = 1U;
     table.n_centers = TERMS.networks[0].bits;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
 
 TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
@@ -757,14 +756,14 @@ TEST(a_reading_of_a_channel_that_sticks_or_jumps_is_held)
     guards[GTC_GUARD_WORDS + 7U] = guards[GTC_GUARD_WORDS + 1U];
 #if TEST_Q31
     guards[GTC_GUARD_WORDS + 7U].integer++;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     guards[GTC_GUARD_WORDS + 7U].integer = guards[GTC_GUARD_WORDS].integer - 1;
 #else
     guards[GTC_GUARD_WORDS + 7U].value += 1.0F;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     guards[GTC_GUARD_WORDS + 7U].value = guards[GTC_GUARD_WORDS].value - 1.0F;
 #endif
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&a, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
 
 #if TEST_Q31
@@ -800,17 +799,16 @@ TEST(a_slope_that_a_memory_makes_saturates)
 TEST(terms_without_their_code_or_channel_are_refused)
 {
     table_t table = TERMS;
-    state_t state;
 
     table.term_code[1] = NULL;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.term_code[1] = TERMS.term_code[0];
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table = TERMS;
     table.n_channels = 1U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.n_channels = GTC_MAX_TERMS + 2U;
-    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
 
 int main(void)

@@ -117,7 +117,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const uint_least32_t start = next_byte(&in);
     gtc_word_t words[IMAGE_MAX];
     uint_least32_t n;
-    const gtc_word_t *const from = kept_image(start % 4U, &n);
+    const gtc_word_t *const from = kept_image(start % 5U, &n);
     uint_least32_t k;
     table_t table;
 
