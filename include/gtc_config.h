@@ -19,8 +19,9 @@
 #define GTC_MAX_SLOPE_BLOCKS 20
 #endif
 
-/* Most extension terms of one table. Diagnosis ships at most three causes; four leaves room for
- * one that is known beforehand. Each costs four numbers of RAM in the state. */
+/* Most extension terms of one table, and most auxiliary channels. Diagnosis ships at most three causes; four leaves
+ * room for one that is known beforehand. Each costs 60 bytes of RAM in the state; 0 leaves the code of terms and
+ * channels out. */
 #ifndef GTC_MAX_TERMS
 #define GTC_MAX_TERMS 4
 #endif
@@ -61,8 +62,11 @@
 #if (GTC_MAX_SLOPE_BLOCKS < 2) || (GTC_MAX_SLOPE_BLOCKS > 32)
 #error "GTC_MAX_SLOPE_BLOCKS must lie in 2 ... 32 (one bit of a 32-bit word each)"
 #endif
-#if (GTC_MAX_TERMS < 1) || (GTC_MAX_TERMS > 8)
-#error "GTC_MAX_TERMS must lie in 1 ... 8"
+#if (GTC_MAX_TERMS < 0) || (GTC_MAX_TERMS > 8)
+#error "GTC_MAX_TERMS must lie in 0 ... 8"
 #endif
+
+/* Places for terms in tables and states: C has no arrays without any. */
+#define GTC_TERM_SLOTS ((GTC_MAX_TERMS > 0) ? GTC_MAX_TERMS : 1)
 
 #endif /* GTC_CONFIG_H_INCLUDED */

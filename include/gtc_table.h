@@ -94,7 +94,7 @@ typedef struct {
     const gtc_word_t *sigma;       /* [covered, uncovered][slope cell][T cell] deg/h, 1 sigma; rules; terms */
     const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
     uint_least32_t crc;            /* CRC-32 over all of the above */
-    const struct gtc_f32_term_code *term_code[GTC_MAX_TERMS]; /* one for each term, else NULL */
+    const struct gtc_f32_term_code *term_code[GTC_TERM_SLOTS]; /* one for each term, else NULL */
 } gtc_f32_table_t;
 
 /* Table in fixed point. Words are two's complement 32-bit integers in `bits`. */
@@ -133,7 +133,7 @@ typedef struct {
     const gtc_word_t *sigma;
     const gtc_word_t *probes;
     uint_least32_t crc;
-    const struct gtc_q31_term_code *term_code[GTC_MAX_TERMS];
+    const struct gtc_q31_term_code *term_code[GTC_TERM_SLOTS];
 } gtc_q31_table_t;
 
 #endif /* GTC_TABLE_H_INCLUDED */

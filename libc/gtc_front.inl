@@ -77,7 +77,7 @@ static void FN(step_terms)(STATE *state, NUM seen)
     const TABLE *const table = state->table;
     uint_least32_t i;
 
-    for (i = 0U; i < table->n_terms; i++) {
+    for (i = 0U; i < FN(n_terms)(table); i++) {
         table->term_code[i]->step(state, i, seen);
     }
     FN(doubt_step)(state, seen);
@@ -99,13 +99,13 @@ static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32
     effect.known = state->doubt.known;
     effect.edge = NUM_ZERO;
     effect.remarks = (FN(bits)(seen) != FN(bits)(temp)) ? (remarks | GTC_CLAMPED) : remarks;
-    for (i = 0U; i < table->n_terms; i++) {
+    for (i = 0U; i < FN(n_terms)(table); i++) {
         table->term_code[i]->apply(state, i, seen, &effect);
     }
     status = FN(map)(table, effect.temp, effect.slope, &bias);
     FN(doubt_input)(state, &effect, slope);
     total = bias;
-    if (table->n_terms != 0U) {
+    if (FN(n_terms)(table) != 0U) {
         total = FN(add)(total, FN(added)(table, &effect));
     }
     FN(put)(state, total, effect.remarks | (int_least32_t)status);
@@ -122,7 +122,7 @@ static void FN(forget_terms)(STATE *state)
 {
     uint_least32_t i;
 
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
         FN(forget)(state, i);
     }
 }
@@ -141,7 +141,7 @@ static void FN(restart)(STATE *state, NUM x, int is_first)
         FN(forget_terms)(state);
     }
     FN(doubt_begin)(state, seen);
-    for (i = 0U; i < table->n_terms; i++) {
+    for (i = 0U; i < FN(n_terms)(table); i++) {
         table->term_code[i]->begin(state, i, seen);
     }
     FN(correct)(state, x, seen, NUM_ZERO, GTC_WARMING);
@@ -399,7 +399,7 @@ static void FN(close_channels)(STATE *state)
 {
     uint_least32_t c;
 
-    for (c = 1U; c < state->table->n_channels; c++) {
+    for (c = 1U; c < FN(n_channels)(state->table); c++) {
         INPUT *const in = &state->input[c];
         const gtc_word_t *const guard = FN(guard)(state, c);
 
@@ -536,7 +536,7 @@ static void FN(clear)(STATE *state)
     }
     for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
         FN(clear_input)(&state->input[i]);
-        if ((i >= 1U) && (i < state->table->n_channels)) {
+        if ((i >= 1U) && (i < FN(n_channels)(state->table))) {
             state->input[i].mean = ELEMENT(FN(guard)(state, i)[GUARD_FALLBACK]);
         }
     }
@@ -554,7 +554,7 @@ static void FN(start)(STATE *state, const TABLE *table, uint_least32_t period_us
     FN(rezero_clear)(state);
     for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
         state->input[i].near = LIMIT_ZERO;
-        if (i < table->n_channels) {
+        if (i < FN(n_channels)(table)) {
             state->input[i].near = FN(limit)(FN(guard)(state, i), period_us);
         }
     }
@@ -583,7 +583,7 @@ static int FN(run_sample)(STATE *state, const NUM *channels)
         FN(close)(state);
     }
     state->position++;
-    for (c = 1U; c < state->table->n_channels; c++) {
+    for (c = 1U; c < FN(n_channels)(state->table); c++) {
         FN(take_channel)(state, c, channels[c]);
     }
     remark = FN(take_temperature)(state, channels[0]);
@@ -596,7 +596,7 @@ static int FN(all_lost)(const STATE *state)
     int lost = 1;
     uint_least32_t c;
 
-    for (c = 0U; c < state->table->n_channels; c++) {
+    for (c = 0U; c < FN(n_channels)(state->table); c++) {
         lost &= FN(is_lost)(&state->input[c], FN(guard)(state, c));
     }
     return lost;
@@ -607,7 +607,7 @@ static void FN(miss)(STATE *state, uint_least32_t samples)
 {
     uint_least32_t c;
 
-    for (c = 0U; c < state->table->n_channels; c++) {
+    for (c = 0U; c < FN(n_channels)(state->table); c++) {
         FN(refuse)(&state->input[c], samples * state->period_us);
     }
 }

@@ -127,7 +127,7 @@ static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from
     at.to = to;
     at.from = from;
     FN(carry_front)(&at, state);
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
         FN(carry)(&at, &state->term[i][0]);
         FN(carry)(&at, &state->term[i][1]);
     }
@@ -211,7 +211,7 @@ static int FN(is_temperature)(NUM x)
 /* Whether a term has remembered something since the first temperature. */
 static int FN(remembers)(const STATE *state, uint_least32_t i)
 {
-    return ((state->input[0].gap_us != 0U) && (i < state->table->n_terms)
+    return ((state->input[0].gap_us != 0U) && (i < FN(n_terms)(state->table))
             && (state->table->term_code[i]->survives != 0U)) ? 1 : 0;
 }
 
@@ -220,7 +220,7 @@ static int FN(terms_are_sound)(const STATE *state)
     int sound = 1;
     uint_least32_t i;
 
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
         const NUM z = state->term[i][0];
 
         if (FN(is_missing)(z) != 0) {
@@ -259,7 +259,7 @@ static int FN(is_sound)(const STATE *state)
               && (state->elapsed <= MAX_ELAPSED) && (state->status >= 0)
               && (state->status < (2 * GTC_CHANNEL_LOST))) ? 1 : 0;
 
-    for (i = 0U; i < state->table->n_channels; i++) {
+    for (i = 0U; i < FN(n_channels)(state->table); i++) {
         sound &= FN(input_fits)(state, &state->input[i], FN(guard)(state, i));
     }
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
@@ -282,8 +282,8 @@ static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
     if (off_blocks != 0U) {
         FN(rezero_clear)(state);
     }
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
-        if ((i >= state->table->n_terms) || (state->table->term_code[i]->survives == 0U)) {
+    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
+        if ((i >= FN(n_terms)(state->table)) || (state->table->term_code[i]->survives == 0U)) {
             FN(forget)(state, i);
         }
     }

@@ -62,7 +62,7 @@ static void FN(doubt_begin)(STATE *state, NUM x)
     uint_least32_t i;
 
     state->doubt.known = 0U;
-    for (i = 0U; i < state->table->n_terms; i++) {
+    for (i = 0U; i < FN(n_terms)(state->table); i++) {
         if (!FN(is_missing)(state->term[i][0])) {
             state->doubt.known |= (uint_least32_t)1U << i;
         }
@@ -177,7 +177,7 @@ static SQUARE FN(variance_of_terms)(const STATE *state)
     SQUARE sum = FN(squared)(state->doubt.edge);
     uint_least32_t i;
 
-    for (i = 0U; i < table->n_terms; i++) {
+    for (i = 0U; i < FN(n_terms)(table); i++) {
         const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
         const NUM word = FN(rule)(table, GTC_SIGMA_RULES + i);
         const NUM first = FN(parameter)(state, i, 0U);

@@ -481,7 +481,7 @@ static void FN(find_terms)(volatile TABLE *table)
 #endif
     uint_least32_t i;
 
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
         table->term_code[i] = NULL;
 #if GTC_OPEN_TERMS
         if (i < table->n_terms) {

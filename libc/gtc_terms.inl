@@ -5,6 +5,17 @@
  * SPDX-License-Identifier: MIT
  */
 
+/* Terms of a table, and its channels with the temperature: a build without terms leaves the code of both out. */
+static inline uint_least32_t FN(n_terms)(const TABLE *table)
+{
+    return (GTC_MAX_TERMS > 0) ? table->n_terms : 0U;
+}
+
+static inline uint_least32_t FN(n_channels)(const TABLE *table)
+{
+    return (GTC_MAX_TERMS > 0) ? table->n_channels : 1U;
+}
+
 /* The channel that a term reads, and the number of its stand-in among the networks, from 1 on; 0: it has none. */
 static uint_least32_t FN(channel_of)(const gtc_word_t *term)
 {

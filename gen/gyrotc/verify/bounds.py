@@ -394,6 +394,7 @@ def _bounds(
     lines = (c_folder / "gtc.c").read_text("ascii").splitlines()
     headers = "\n".join((c_folder / name).read_text("ascii") for name in ("gtc.h", "gtc.c"))
     macros = {name: int(number) for name, number in _MACRO.findall(headers)}
+    macros["GTC_TERM_SLOTS"] = max(macros["GTC_MAX_TERMS"], 1)
     macros["GTC_SAVE_WORDS"] = next(s.size // 4 for s in linked if s.name == "gtc_bound_saved")
     found: Bounds = {}
     for numeric, known in counts.items():

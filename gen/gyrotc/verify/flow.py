@@ -394,7 +394,8 @@ class LoopText:
         return max(0, -(-n // int(found["by"] or 1)))
 
     def _number(self, text: str) -> int | None:
-        word = re.sub(r"^\(uint_least32_t\)", "", text).rsplit("->", 1)[-1]
+        word = re.sub(r"^\(uint_least32_t\)|^FN\((?=n_\w+\)\()", "", text)
+        word = word.partition(")(")[0].rsplit("->", 1)[-1]
         if word == "network[0].bits":
             return self.counts.centers
         if number := re.fullmatch(r"(\d+)U?L?", word):

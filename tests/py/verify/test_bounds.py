@@ -23,7 +23,7 @@ from bench.bounds import bounds_of, gaussian_instructions, model_of, section
 
 COUNTS = Counts({"n_terms": 3, "slope_blocks": 10}, 4, False, 5, 100, ())
 TEXT = [
-    "for (i = 0U; i < table->n_terms; i++) {",
+    "for (i = 0U; i < FN(n_terms)(state->table); i++) {",
     "    for (k = 0U; k < (uint_least32_t)GTC_MAX_TERMS; k++) {",
     "        while (queue != 0U) {",
     "            x++;",
