@@ -10,6 +10,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         688 bytes of read-only data, 224 of them parameters; |error| <= 1.16e-07 deg/h against the model (terms excluded)
  * q31:         688 bytes of read-only data, 224 of them parameters; |error| <= 1.24e-06 deg/h against the model (terms excluded)
+ * Options:     -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 dcfdd3e112ccad432a2d62c8b3766cf7ca205f064fedcb87e6932911ea1c901c

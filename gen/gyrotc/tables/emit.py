@@ -214,6 +214,7 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(model, emission)),
+        "needs": _needs(model, emission.tables[numerics[0]]),
         "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
         **example_values(model),
@@ -248,6 +249,12 @@ def _facts(model: Model) -> Iterator[str]:
 def _valid(model: Model) -> str:
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     return f"{t0:.2f} ... {t1:.2f} C, {r0:.3f} ... {r1:.3f} C/min"
+
+
+def _needs(model: Model, table: Table) -> dict[str, int]:
+    """The least options of the runtime that hold a table."""
+    terms = max(len(model.terms), table.n_channels - 1)
+    return {"slope_blocks": table.slope_blocks, "terms": terms, "bank": int(len(model.networks) > 1)}
 
 
 def _sizes(model: Model, emission: Emission) -> Iterator[str]:

@@ -7,6 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         564 bytes of read-only data, 84 of them parameters; |error| <= 5.94e-06 deg/h against the model (terms excluded)
  * q31:         564 bytes of read-only data, 84 of them parameters; |error| <= 9.72e-05 deg/h against the model (terms excluded)
+ * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 1b449dd90d9843007d772275ca4f61d4dabfde0f854247f2db208404e9715e4f

@@ -7,6 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         664 bytes of read-only data, 132 of them parameters; |error| <= 5.51e-06 deg/h against the model (terms excluded, curves and products of channels: 3.74e-06)
  * q31:         664 bytes of read-only data, 132 of them parameters; |error| <= 9.37e-05 deg/h against the model (terms excluded, curves and products of channels: 1.76e-05)
+ * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 4c32da67ac31e58cc72a06b76fef5ea5c9930215ae810dd1868e2ce94d4363dc

@@ -13,6 +13,10 @@
 #error "gtc_test_h.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
+#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 2)
+#error "gtc_test_h.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 or more"
+#endif
+
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 

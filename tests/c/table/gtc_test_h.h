@@ -7,6 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         544 bytes of read-only data, 112 of them parameters; |error| <= 3.86e-05 deg/h against the model (terms excluded)
  * q31:         544 bytes of read-only data, 112 of them parameters; |error| <= 6.70e-04 deg/h against the model (terms excluded)
+ * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 a6ca9f40548225b74f2d1e43b12ab312cbd0dace3692ad95ebd7989de54d7c23

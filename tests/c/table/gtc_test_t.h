@@ -9,6 +9,7 @@
  * f32 stand-ins: 32 of these parameters stand in for channels that are lost; of each |error| <= 1.26e-06 deg/h
  * q31:         788 bytes of read-only data, 212 of them parameters; |error| <= 9.37e-05 deg/h against the model (terms excluded)
  * q31 stand-ins: 32 of these parameters stand in for channels that are lost; of each |error| <= 1.93e-05 deg/h
+ * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=4 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 c24b36fa44754e0c385adc70f5397d3585ed4feec00487c7e3320198c869d125
