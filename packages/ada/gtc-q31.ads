@@ -102,7 +102,7 @@ private
 
    type Contents is limited record
       Of_Table : System.Address := System.Null_Address;
-      Numbers  : Words (1 .. 23 + Max_Slope_Blocks + 2 * Max_Terms);
+      Numbers  : Words (1 .. 25 + Max_Slope_Blocks + 2 * Max_Terms);
       Channel  : Inputs;
    end record
    with Convention => C;

@@ -26,6 +26,8 @@ is
    E_Image      : constant Status := -4;
    E_Id         : constant Status := -5;
    E_Period     : constant Status := -6;
+   E_Absent     : constant Status := -7;
+   E_Rest       : constant Status := -8;
 
    Max_Slope_Blocks : constant := 20;
    Max_Terms        : constant := 4;

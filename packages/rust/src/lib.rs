@@ -59,6 +59,10 @@ pub enum Error {
     Id,
     /// No whole number of samples of this period makes a block of the table.
     Period,
+    /// The table does not hold what the call needs: uncertainties, or a re-zero.
+    Absent,
+    /// A re-zero beyond 4 sigma of what is known: the vehicle moved, or Earth's rate is in it.
+    Rest,
     /// A status of a later runtime.
     Unknown(i32),
 }
@@ -71,6 +75,8 @@ fn done(status: core::ffi::c_int) -> Result<Remarks, Error> {
         -4 => Err(Error::Image),
         -5 => Err(Error::Id),
         -6 => Err(Error::Period),
+        -7 => Err(Error::Absent),
+        -8 => Err(Error::Rest),
         other => u32::try_from(other).map(Remarks).map_err(|_| Error::Unknown(other)),
     }
 }
@@ -388,7 +394,7 @@ struct FixedInput {
 arithmetic! {
     /// float32: C, C per block, deg/h; increments in arcsec over seconds.
     float32, number f32, age f32, interval f32,
-    state words 51, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
+    state words 53, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
     "gtc_f32_check_20blocks_4terms" "gtc_f32_open_20blocks_4terms" "gtc_f32_map_20blocks_4terms"
     "gtc_f32_init_20blocks_4terms" "gtc_f32_sample_20blocks_4terms" "gtc_f32_sample_at_20blocks_4terms"
     "gtc_f32_missed_20blocks_4terms" "gtc_f32_bias_20blocks_4terms" "gtc_f32_snapshot_20blocks_4terms"
@@ -399,7 +405,7 @@ arithmetic! {
 arithmetic! {
     /// Fixed point: 2^-16 C, 2^-16 C per block, 2^-`bias_frac_bits` deg/h; increments over microseconds.
     q31, number i32, age i32, interval i32,
-    state words 51, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
+    state words 53, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
     "gtc_q31_check_20blocks_4terms" "gtc_q31_open_20blocks_4terms" "gtc_q31_map_20blocks_4terms"
     "gtc_q31_init_20blocks_4terms" "gtc_q31_sample_20blocks_4terms" "gtc_q31_sample_at_20blocks_4terms"
     "gtc_q31_missed_20blocks_4terms" "gtc_q31_bias_20blocks_4terms" "gtc_q31_snapshot_20blocks_4terms"

@@ -375,6 +375,22 @@ def test_rust_gives_the_bits_of_c(ramp: str, archives: Path) -> None:
     assert _run(cargo, "run", "-q", cwd=PACKAGES / "rust" / "example", CARGO_TARGET_DIR=target) == ramp
 
 
+def test_bindings_reserve_the_words_of_a_state(tmp_path: Path) -> None:
+    """Rust and Ada hold a state of C by its size; in Ada and Rust the numbers before the channels are one array."""
+    (tmp_path / "size.c").write_text(
+        '#include <stddef.h>\n#include <stdio.h>\n#include "gtc.h"\n'
+        "int main(void)\n{\n"
+        '    printf("%d", (int)((offsetof(gtc_f32_state_t, window) - sizeof(void *)) / 4));\n    return 0;\n}\n'
+    )
+    _run("gcc", "-std=c99", f"-I{ROOT / 'include'}", "size.c", "-o", "size", cwd=tmp_path)
+    first = int(_run(str(tmp_path / "size"), cwd=tmp_path))
+    rust = (PACKAGES / "rust" / "src" / "lib.rs").read_text()
+    assert re.findall(r"state words (\d+),", rust) == [str(first + 20 + 2 * 4)] * 2
+    for numeric in ("f32", "q31"):
+        ada = (PACKAGES / "ada" / f"gtc-{numeric}.ads").read_text()
+        assert re.findall(r"\(1 \.\. (\d+) \+ Max_Slope_Blocks \+ 2 \* Max_Terms\)", ada) == [str(first)]
+
+
 @pytest.mark.slow
 def test_rust_has_every_option_at_its_default_and_every_status() -> None:
     text = (PACKAGES / "rust" / "src" / "lib.rs").read_text()
