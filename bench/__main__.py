@@ -69,6 +69,13 @@ def _faults(docs: Path) -> None:
     write(docs, "faults", faults(_say), section)
 
 
+def _sizes(docs: Path) -> None:
+    """Flash and RAM of whole programs."""
+    from .sizes import section, sizes
+
+    write(docs, "sizes", sizes(), section)
+
+
 def _bounds(docs: Path) -> None:
     """Static bounds on instructions, beside what an emulator counts."""
     from .bounds import bounds, section
@@ -117,6 +124,7 @@ _ALONE = {
     "raw": _raw,
     "sigma": _sigma,
     "faults": _faults,
+    "sizes": _sizes,
     "bounds": _bounds,
     "fleet": _fleet,
     "lot": _lot,

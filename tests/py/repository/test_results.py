@@ -20,7 +20,7 @@ import prove_page  # noqa: E402
 import self_test_page  # noqa: E402
 import targets_page  # noqa: E402
 
-from bench import bounds, budget, faults, fleet, importing, lot_prior, runtime, sigma  # noqa: E402
+from bench import bounds, budget, faults, fleet, importing, lot_prior, runtime, sigma, sizes  # noqa: E402
 from bench import page as bench_page  # noqa: E402
 from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
@@ -49,6 +49,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "runtime": runtime.section,
     "self-test": self_test_page.section,
     "sigma": sigma.section,
+    "sizes": sizes.section,
     "faults": faults.section,
     "targets": targets_page.section,
 }

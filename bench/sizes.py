@@ -1,0 +1,190 @@
+"""What a program takes of the runtime: flash and RAM of six programs, beside a map and a cubic written by hand.
+
+`python -m bench docs --only sizes`; docs/results.md has the table. Everything that the linker keeps counts: code,
+constants, the table with its uncertainties, helpers of the compiler; not start-up code or stack.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gyrotc.model import load_model
+from gyrotc.tables.emit import emit_texts, quantise_all
+from results import table as markdown
+
+__all__ = ["CORES", "PROGRAMS", "Program", "section", "size", "sizes"]
+
+ROOT = Path(__file__).resolve().parents[1]
+_MODEL = ROOT / "examples" / "nav_loop" / "filter_model.json"  # of a simulated gyro, with uncertainties
+CORES = {
+    "Cortex-M0": ("-mcpu=cortex-m0",),
+    "Cortex-M4F": ("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+    "Cortex-M7": ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
+}
+LEVELS = ("-Os", "-O2")
+_COMPILER = ("arm-none-eabi-gcc", "-std=c99", "-ffp-contract=off", "-mthumb", "-ffunction-sections", "-fdata-sections", "-fno-tree-loop-distribute-patterns")
+_LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
+
+_MAIN = """#include "gtc_{id}.h"
+gtc_f32_state_t state;
+gtc_f32_snapshot_t snapshot;
+gtc_word_t saved[GTC_SAVE_WORDS];
+gtc_f32_table_t opened;
+gtc_f32_angle_t angle;
+const gtc_word_t image[64];
+volatile float in;
+volatile float out;
+volatile int status;
+int main(void)
+{{
+    float c = in;
+    float b = 0.0F;
+    status = gtc_f32_init(&state, &gtc_{symbol}_f32, 1000000UL);
+{calls}
+    for (;;) {{
+        c = in;
+        status = gtc_f32_sample(&state, &c);
+        status = gtc_f32_bias(&state, &b);
+        out = b;
+    }}
+}}
+"""
+_CALLS = {
+    "check": "gtc_f32_check(&gtc_{symbol}_f32)",
+    "snapshot": "gtc_f32_snapshot(&state, &snapshot)",
+    "rezero": "gtc_f32_rezero(&state, c, 60UL)",
+    "save": "gtc_f32_save(&state, saved)",
+    "restore": "gtc_f32_restore(&state, &gtc_{symbol}_f32, 1000000UL, saved, 0UL)",
+    "unzero": "gtc_f32_unzero(&state)",
+    "sample_at": "gtc_f32_sample_at(&state, 9UL, &c)",
+    "missed": "gtc_f32_missed(&state, 9UL)",
+    "map": "gtc_f32_map(&gtc_{symbol}_f32, c, c, &b)",
+    "open": "gtc_f32_open(&opened, image, 64UL, 1UL)",
+    "angle": "gtc_f32_angle(&angle, b, 0.5F, &c)",
+}
+#: Block means of a minute's samples, least-squares slope over ten of them, four Gaussians; nothing is tested.
+_MAP = """/* 2^-u by a cubic of its fraction, 1e-4 */
+static float exp2_of_minus(float u)
+{{
+    union {{ float value; unsigned bits; }} power;
+    const int whole = (u < 120.0F) ? (int)u : 120;
+    const float f = (float)whole - u;
+    power.bits = (unsigned)(127 - whole) << 23;
+    return power.value * (1.0F + f * (0.6930F + f * (0.2362F + f * 0.0432F)));
+}}
+static const float centers[4][5] = {{ {{1.0F,2.0F,3.0F,4.0F,5.0F}}, {{2.0F,2.0F,3.0F,4.0F,5.0F}},
+                                      {{3.0F,2.0F,3.0F,4.0F,5.0F}}, {{4.0F,2.0F,3.0F,4.0F,5.0F}} }};
+float window[10], sum, bias;
+int n, filled;
+volatile float in, out;
+int main(void)
+{{
+    for (;;) {{
+        sum += in;
+        if (++n == 10) {{
+            float slope = 0.0F;
+            for (int i = 9; i > 0; i--) {{ window[i] = window[i - 1]; }}
+            window[0] = sum / 10.0F;
+            if (filled < 10) {{ filled++; }}
+            for (int i = 0; i < 10; i++) {{ slope += (4.5F - (float)i) * window[i]; }}
+            slope = (filled == 10) ? slope / 82.5F : 0.0F;
+            bias = 0.01F + 0.02F * window[0] + 0.03F * slope;
+            for (int i = 0; i < 4; i++) {{
+                const float a = (window[0] - centers[i][0]) * centers[i][1];
+                const float b = (slope - centers[i][2]) * centers[i][3];
+                bias += centers[i][4] * exp2_of_minus(a * a + b * b);
+            }}
+            sum = 0.0F;
+            n = 0;
+        }}
+        out = bias;
+    }}
+}}
+"""
+_CUBIC = """volatile float in, out;
+int main(void)
+{{
+    for (;;) {{
+        const float t = in;
+        out = 0.01F + t * (0.02F + t * (0.03F + t * 0.04F));
+    }}
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Program:
+    """Functions that are called beside init, sample and bias; options: as the table needs, or the defaults."""
+
+    name: str
+    calls: tuple[str, ...] = ()
+    is_fitted: bool = True
+    text: str = _MAIN
+
+
+PROGRAMS = (
+    Program("init, sample, bias; default options", is_fitted=False),
+    Program("init, sample, bias"),
+    Program("with check", ("check",)),
+    Program("with check and snapshot", ("check", "snapshot")),
+    Program("with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")),
+    Program("every function, default options", tuple(_CALLS), is_fitted=False),
+    Program("by hand: mean, slope, four Gaussians", text=_MAP),
+    Program("by hand: a cubic of each sample", text=_CUBIC),
+)
+
+
+def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, int]:
+    """Bytes of flash and of RAM of a program.
+
+    Raises:
+        subprocess.CalledProcessError: It does not compile.
+    """
+    model = load_model(_MODEL)
+    for name, data in emit_texts(model, quantise_all(model, None)).items():
+        (folder / name).write_bytes(data)
+    calls = "\n".join(f"    status = {_CALLS[name].format(symbol=model.symbol)};" for name in program.calls)
+    text = program.text.format(id=model.id, symbol=model.symbol, calls=calls)
+    (folder / "program.c").write_text(text, encoding="ascii")
+    fitted = (f"-DGTC_MAX_SLOPE_BLOCKS={model.slope_blocks}", "-DGTC_MAX_TERMS=0") if program.is_fitted else ()
+    sources = ["program.c", *(("gtc.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
+    command = [*_COMPILER, *CORES[core], level, *fitted, *sources, *_LINKED, "-o", "program.elf"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    told = subprocess.run(
+        ["arm-none-eabi-size", "program.elf"], cwd=folder, check=True, capture_output=True, text=True
+    ).stdout.splitlines()[1]
+    text_bytes, data_bytes, zero_bytes = (int(word) for word in told.split()[:3])
+    return text_bytes + data_bytes, data_bytes + zero_bytes
+
+
+def sizes() -> dict[str, Any]:
+    """Every program on every core at every level."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for program in PROGRAMS:
+            found = {
+                f"{core} {level}": size(program, core, level, Path(folder)) for core in CORES for level in LEVELS
+            }
+            rows.append({"name": program.name, **found})
+    version = subprocess.run([_COMPILER[0], "-dumpversion"], check=True, capture_output=True, text=True).stdout
+    return {"centers": len(load_model(_MODEL).networks[0].centers), "compiler": version.strip(), "rows": rows}
+
+
+_HEAD = """## Sizes: flash and RAM of whole programs (`python -m bench docs --only sizes`)
+
+A table of {centers} Gaussians in float32 with its uncertainties, coverage and known answers; arm-none-eabi-gcc {compiler}.
+Flash is all that is linked: code, constants, table, helpers of the compiler. RAM is the state and what the program
+hands over. Options are those that the header of the table names, unless the row says otherwise; what is not called
+is not linked (`-ffunction-sections -fdata-sections -Wl,--gc-sections`). Bytes, flash / RAM:
+"""
+
+
+def section(result: dict[str, Any]) -> str:
+    """Section of docs/results.md."""
+    columns = [f"{core} {level}" for core in CORES for level in LEVELS]
+    rows = [(row["name"], *(f"{row[c][0]} / {row[c][1]}" for c in columns)) for row in result["rows"]]
+    return _HEAD.format(**result) + "\n" + markdown(("program", *(f"{c} " for c in columns)), rows)

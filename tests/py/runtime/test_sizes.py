@@ -1,0 +1,20 @@
+"""What a firmware engineer pays for the smallest useful program: flash with the table, and RAM."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from bench.sizes import PROGRAMS, size
+
+FLASH, RAM = 4096, 256  # bytes: a correction that takes more is not worth it on the smallest parts
+
+
+@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="arm-none-eabi-gcc is not installed")
+def test_a_map_of_four_centers_takes_less_than_4_kb_of_flash_and_256_bytes_of_ram(tmp_path: Path) -> None:
+    program = next(p for p in PROGRAMS if p.name == "init, sample, bias")
+    flash, ram = size(program, "Cortex-M4F", "-Os", tmp_path)
+    print(f"{flash} bytes of flash, {ram} of RAM")
+    assert flash <= FLASH
+    assert ram <= RAM
