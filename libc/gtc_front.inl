@@ -475,8 +475,9 @@ static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t pe
  * Its other words are those that gtc_<n>_check() or gtc_<n>_open() found sound. */
 static int FN(fits_build)(const TABLE *table)
 {
-    return ((table->layout == GTC_TABLE_LAYOUT) && (table->slope_blocks <= GTC_MAX_SLOPE_BLOCKS)
-            && (table->n_terms <= GTC_MAX_TERMS) && (table->n_channels <= (GTC_MAX_TERMS + 1U))
+    return ((table->layout == GTC_TABLE_LAYOUT) && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
+            && (table->n_terms <= (uint_least32_t)GTC_MAX_TERMS)
+            && (table->n_channels <= ((uint_least32_t)GTC_MAX_TERMS + 1U))
             && ((GTC_WITH_BANK != 0) || (table->n_networks == 1U))) ? 1 : 0;
 }
 

@@ -191,7 +191,8 @@ _TABLE_C = (
     "#if GTC_TABLE_LAYOUT != [0-9]{{1,3}}",
     r'#error "gtc_{id}\.c was written for table layout [0-9]{{1,3}}: emit it again with the gyrotc of this runtime"',
     r"#if \(GTC_MAX_SLOPE_BLOCKS < [0-9]{{1,2}}\) \|\| \(GTC_MAX_TERMS < [0-9]\)",
-    r'#error "gtc_{id}\.c needs -DGTC_MAX_SLOPE_BLOCKS=[0-9]{{1,2}} -DGTC_MAX_TERMS=[0-9](?: -DGTC_WITH_BANK=1)? or more"',
+    r'#error "gtc_{id}\.c needs -DGTC_MAX_SLOPE_BLOCKS=[0-9]{{1,2}} -DGTC_MAX_TERMS=[0-9]'
+    '(?: -DGTC_WITH_BANK=1)? or more"',
     r"#define V\(x\) \{{ \.value = \(x\) \}} /\* a float32 number \*/",
     r"#define B\(x\) \{{ \.bits = \(x\) \}}  /\* an integer \*/",
     r"static const gtc_word_t <n>_[a-z]{{1,10}}\[[0-9]{{1,6}}\] = \{{",

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+
 from bench.sizes import PROGRAMS, size
 
 FLASH, RAM = 4096, 256  # bytes: a correction that takes more is not worth it on the smallest parts
