@@ -18,13 +18,13 @@ from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.table import Table
+from gyrotc.target.table import Numeric, Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from libc_build import runtime
 from numpy.typing import NDArray
 from results import table as markdown
 
-__all__ = ["CLASSES", "Unit", "faults", "outcome", "section", "unit"]
+__all__ = ["CLASSES", "Unit", "faults", "outcome", "outcomes", "section", "unit"]
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -72,8 +72,8 @@ class Unit:
     rate_dph: Floats
 
 
-def unit(seed: int) -> Unit:
-    """The gyro that a seed draws."""
+def unit(seed: int, numeric: Numeric = "f32") -> Unit:
+    """The gyro that a seed draws, with its table in an arithmetic."""
     with tempfile.TemporaryDirectory() as place:
         plan = Path(place) / "plan.toml"
         plan.write_text(_PLAN, "utf-8")
@@ -84,7 +84,7 @@ def unit(seed: int) -> Unit:
     assert model.uncertainty_dph is not None
     names = [term.channel for term in model.terms if term.channel]
     return Unit(
-        table=quantise(model, "f32"),
+        table=quantise(model, numeric),
         between_dph=model.uncertainty_dph.rules.between_dph,
         readings=np.column_stack([record.reading_c, *(record.channels[name] for name in names)])[part],
         truth_dph=np.diff(record.true_arcsec)[part],
@@ -285,6 +285,10 @@ def _driven(unit: Unit, calls: Calls) -> tuple[Floats, Floats, NDArray[np.int32]
     """Error and sigma of every call, deg/h, and its status with that of the correction."""
     table = unit.table
     values = table.encode_inputs(calls.values)
+    if table.numeric == "q31":  # a mean rate is in units of the bias
+        rates = np.rint(calls.values[calls.kind == REZERO, 0] * 2.0**table.bias_frac_bits)
+        words = np.clip(rates, -(2.0**31) + 1.0, 2.0**31 - 1.0).astype(np.int64)
+        values[calls.kind == REZERO, 0] = (words & 0xFFFFFFFF).astype(np.uint32)
     status, bits = runtime().calls(table, calls.kind, calls.number, values, _BLOCK)
     assert np.all(status[:, 1] >= 0)
     truth = unit.truth_dph[np.minimum(calls.row, len(unit.truth_dph) - 1)] + calls.offset_dph
@@ -292,9 +296,9 @@ def _driven(unit: Unit, calls: Calls) -> tuple[Floats, Floats, NDArray[np.int32]
     return error, table.decode_bias(bits[:, 1]), np.maximum(status[:, 0], 0) | status[:, 1]
 
 
-def _looked_at(seed: int) -> list[Outcome]:
-    """Empty for a gyro whose supply was not taken as an input."""
-    own = unit(seed)
+def outcomes(seed: int, numeric: Numeric = "f32") -> list[Outcome]:
+    """One of every class; none for a gyro whose supply was not taken as an input."""
+    own = unit(seed, numeric)
     if own.readings.shape[1] < 2:
         return []
     healthy, _, _ = _driven(own, Calls.of(own.readings))
@@ -307,15 +311,15 @@ def faults(say: Say, gyros: int = _GYROS, workers: int | None = None) -> dict[st
     seeds = range(FIRST_SEED, FIRST_SEED + gyros)
     found = []
     with ProcessPoolExecutor(workers) as pool:
-        for seed, outcomes in zip(seeds, pool.map(_looked_at, seeds), strict=True):
+        for seed, own in zip(seeds, pool.map(outcomes, seeds), strict=True):
             say(f"faults of gyro {seed}")
-            found += [outcomes] if outcomes else []
+            found += [own] if own else []
     return {"gyros": len(found), "classes": list(_figures(found))}
 
 
 def _figures(found: list[list[Outcome]]) -> Iterator[dict[str, Any]]:
     for k, name in enumerate(CLASSES):
-        own = [outcomes[k] for outcomes in found]
+        own = [each[k] for each in found]
         ratio = np.abs(np.concatenate([o.ratio for o in own]))
         rms = [float(np.sqrt(np.mean(o.ratio**2))) for o in own]
         late = [o.silent_s for o in own]
