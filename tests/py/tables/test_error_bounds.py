@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_MODELS = 12
+_TABLES, _MOST_DRAWN = 12, 500  # many extreme models are refused
 
 
 @pytest.mark.parametrize("make", [extreme_model, extreme_bank])
@@ -35,7 +35,9 @@ def test_the_bound_holds_for_any_legal_model(make: Callable[[int], Model]) -> No
     first = random.SystemRandom().randrange(2**31)
     print(f"seeds from {first}")
     tables = 0
-    for seed in range(first, first + _MODELS):
+    for seed in range(first, first + _MOST_DRAWN):
+        if tables >= _TABLES:
+            break
         model = make(seed)
         for numeric in NUMERICS:
             try:
@@ -44,7 +46,7 @@ def test_the_bound_holds_for_any_legal_model(make: Callable[[int], Model]) -> No
                 continue
             tables += 1
             assert worst_error_dph(model, table, seed) <= table.error_bound_dph, (seed, numeric)
-    assert tables >= _MODELS // 2
+    assert tables >= _TABLES
 
 
 @pytest.mark.parametrize(
