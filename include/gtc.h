@@ -114,7 +114,7 @@ typedef struct {
  *   unzero           120     10        120     10
  *   angle            340      0        180     30
  *   save             630     40        630     40
- *   restore         2260    620       2050    660 */
+ *   restore         2270    620       2200    690 */
 
 /* Boot self-test of a compiled-in table, before gtc_<n>_init(), which relies on it: layout, arithmetic (f32:
  * rounding, ties, no fused products, no excess precision, order of sums, subnormals), checksum, range of every word
