@@ -5,11 +5,14 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <memory>
+
 #include "evidence.hpp"
 #include "equal_gaussians.hpp"
 #include "fingerprints.hpp"
 #include "kohonen.hpp"
 #include "ols.hpp"
+#include "posteriors.hpp"
 #include "varpro.hpp"
 
 namespace nb = nanobind;
@@ -40,6 +43,7 @@ VariableProjection projection(VectorXd t, VectorXd r, VectorXd weight, VectorXd 
     return VariableProjection({std::move(t), std::move(r), std::move(weight), std::move(target)}, ridge);
 }
 
+using Stack = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Column = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // The numbers as an array that owns them.
@@ -172,6 +176,25 @@ NB_MODULE(_core, m) {
         "in_order"_a = false);
     m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
     m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);
+    m.def(
+        "posteriors",
+        [](const MatrixXd &prior, const Stack &precision) {
+            const std::size_t units = precision.shape(0), n = precision.shape(1);
+            same_length({static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(precision.shape(2)), prior.rows(),
+                         prior.cols()});
+            auto covariance = std::make_unique<double[]>(units * n * n);
+            std::vector<double> log_determinant(units);
+            {
+                const nb::gil_scoped_release released;
+                posteriors(prior, precision.data(), static_cast<Eigen::Index>(units), covariance.get(),
+                           log_determinant.data());
+            }
+            double *kept = covariance.release();
+            const nb::capsule owner(kept, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+            return std::make_tuple(nb::ndarray<nb::numpy, double, nb::ndim<3>>(kept, {units, n, n}, owner),
+                                   array_of(std::move(log_determinant)));
+        },
+        "prior"_a, "precision"_a);
     m.def(
         "windows_of",
         [](const Column &temperature, const std::vector<Column> &rates, std::vector<std::size_t> lengths, std::uint64_t mask,

@@ -127,6 +127,13 @@ def select_columns(
 ) -> OlsPath: ...
 def errors_along(path: OlsPath, dictionary: EqualGaussians, samples: Samples) -> _Floats: ...
 def least_squares(samples: Samples, gaussians: _Floats, ridge: float) -> _Floats: ...
+def posteriors(prior: _Floats, precision: _Floats) -> tuple[_Floats, _Floats]:
+    """Inverses of prior (n, n) + precision (units, n, n; contiguous), and their log determinants (units,).
+
+    Raises:
+        ValueError: A sum is not positive definite.
+    """
+
 def windows_of(
     temperature_c: _Floats,
     rates: Sequence[_Floats],

@@ -34,6 +34,7 @@ _PRIOR_SD = np.array([3.0, 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5])  # as kPriorSd th
 CONSTANT = np.log(10.0)  # of the mean of a lot: as kConstVariance there, nothing is known of it
 _OF_T, _COUPLED = 40, (10, 8)  # as there: 121 functions
 _REACH = 1.4  # as kReach there: the functions vanish at the edge of the domain
+_FREQUENCIES: FloatArray = np.asarray(np.pi * (np.arange(_OF_T) + 1.0) / (2.0 * _REACH), dtype=np.float64)
 _FLOOR = 1e-10  # as kVarianceFloor there
 _STEPS = 15  # of a search that goes on in the next round
 _BOUND = 5.0  # prior standard deviations: no parameter of use lies beyond
@@ -65,7 +66,7 @@ class LotBasis:
 
     def variance(self, log_parameters: FloatArray) -> FloatArray:
         """Variance of each coefficient under a smooth process, shape (n,)."""
-        return np.asarray(_variance(log_parameters)[self.kept])
+        return np.asarray(_variance(log_parameters)[0][self.kept])
 
     @staticmethod
     def over(temperature_c: tuple[float, float], slope_c_per_min: tuple[float, float]) -> LotBasis:
@@ -110,36 +111,48 @@ def fitted_parameters(
 
     seen = np.maximum(squares, 1e-14)
 
-    def cost(x: FloatArray) -> float:
-        variance = basis.variance(x)
-        fit = 0.5 * units * float(np.sum(np.log(variance) + seen / variance))
-        return fit + 0.5 * float(np.sum(((x - PRIOR_LOG) / _PRIOR_SD) ** 2))
+    def cost(x: FloatArray) -> tuple[float, FloatArray]:
+        variance, slope = _variance(x)
+        variance, slope = variance[basis.kept], slope[:, basis.kept]
+        off = (x - PRIOR_LOG) / _PRIOR_SD
+        fit = 0.5 * units * float(np.sum(np.log(variance) + seen / variance)) + 0.5 * float(off @ off)
+        gradient = 0.5 * units * (slope @ (1.0 / variance - seen / variance**2)) + off / _PRIOR_SD
+        if not free:
+            gradient[0] = 0.0
+        return fit, gradient
 
     bounds = [(m - _BOUND * s, m + _BOUND * s) for m, s in zip(PRIOR_LOG, _PRIOR_SD, strict=True)]
     if not free:
         bounds[0] = (start[0], start[0])
-    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
+    found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
     return np.asarray(found.x)
 
 
-def _frequencies(n: int) -> FloatArray:
-    return np.asarray(np.pi * (np.arange(n) + 1.0) / (2.0 * _REACH))
-
-
 def _sines(x: FloatArray, n: int) -> FloatArray:
-    return np.asarray(np.sin(np.outer(x + _REACH, _frequencies(n))) / np.sqrt(_REACH))
+    return np.asarray(np.sin(np.outer(x + _REACH, _FREQUENCIES[:n])) / np.sqrt(_REACH))
 
 
-def _density(size: float, scale: float, w: FloatArray) -> FloatArray:
-    """Spectral density of a squared-exponential process."""
-    return np.asarray(size**2 * np.sqrt(2.0 * np.pi) * scale * np.exp(-0.5 * (scale * w) ** 2))
+def _density(size: float, scale: float, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Spectral density of a squared-exponential process, and its derivative by the logarithm of the scale."""
+    reach = (scale * w) ** 2
+    density = size**2 * np.sqrt(2.0 * np.pi) * scale * np.exp(-0.5 * reach)
+    return np.asarray(density), np.asarray(density * (1.0 - reach))
 
 
-def _variance(log_parameters: FloatArray) -> FloatArray:
+def _variance(log_parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Variances of all functions, shape (121,), and their derivatives by the parameters, shape (8, 121).
+
+    By the logarithm of a standard deviation a variance changes by twice itself.
+    """
     constant, short, short_scale, long, long_scale, size, scale_t, scale_r = np.exp(log_parameters)
-    of_t = _frequencies(_OF_T)
-    alone = _density(short, short_scale, of_t) + _density(long, long_scale, of_t)
-    coupled = np.outer(
-        _density(size, scale_t, of_t[: _COUPLED[0]]), _density(1.0, scale_r, _frequencies(_COUPLED[1]))
-    )
-    return np.concatenate([[constant**2], alone, coupled.ravel()]) + _FLOOR
+    near, near_slope = _density(short, short_scale, _FREQUENCIES)
+    far, far_slope = _density(long, long_scale, _FREQUENCIES)
+    of_t, of_t_slope = _density(size, scale_t, _FREQUENCIES[: _COUPLED[0]])
+    of_r, of_r_slope = _density(1.0, scale_r, _FREQUENCIES[: _COUPLED[1]])
+    coupled = np.outer(of_t, of_r).ravel()
+    slope = np.zeros((len(PARAMETERS), 1 + _OF_T + coupled.size))
+    slope[0, 0] = 2.0 * constant**2
+    slope[1:5, 1 : 1 + _OF_T] = 2.0 * near, near_slope, 2.0 * far, far_slope
+    products = np.outer(of_t_slope, of_r), np.outer(of_t, of_r_slope)
+    slope[5:, 1 + _OF_T :] = 2.0 * coupled, products[0].ravel(), products[1].ravel()
+    return np.concatenate([[constant**2], near + far, coupled]) + _FLOOR, slope

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
 
+from .._core import posteriors
 from ..common.arrays import FloatArray, Progress
 from ..train.means import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
@@ -106,7 +107,6 @@ def inflation(found: list[tuple[FloatArray, FloatArray]]) -> float:
     return max(1.0, float(np.mean((squares * (1.0 + ratio) - 1.0) / ratio)))
 
 
-_TOGETHER = 64  # units whose matrices are inverted together: bounds memory
 _EVERY = 4  # rounds between two fits of the processes' parameters: each is a search
 
 
@@ -189,11 +189,12 @@ def fitted(
         state = replace(state, rest=start.rest, of_mean=start.of_mean, directions=start.directions)
     for number in range(rounds):
         state = _round(units, state, rank, fit=number % _EVERY == _EVERY - 1)
-    return _weighed(units, *_conditioned(units, state)[:2])
+    state, posterior, _ = _conditioned(units, state)
+    return replace(state, evidence=_log_evidence(units, state, *posterior))
 
 
 def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotState:
-    state, posterior, moved = _conditioned(units, state)
+    state, (posterior, _), moved = _conditioned(units, state)
     n, basis = len(units), state.basis
     second = posterior.sum(axis=0) + moved.T @ moved  # of the deviations from the clusters' means
     directions, rest = state.directions, state.rest
@@ -217,40 +218,45 @@ def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotStat
     return replace(state, directions=directions, rest=rest, of_mean=of_mean)
 
 
-def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, FloatArray, FloatArray]:
-    """The clusters' means, and of each unit the covariance of its coefficients and their deviation from the mean.
+def _conditioned(
+    units: UnitSums, state: LotState
+) -> tuple[LotState, tuple[FloatArray, FloatArray], FloatArray]:
+    """The clusters' means; of each unit the covariance of its coefficients, its log determinant, their deviation.
 
     With S the spread, G the precision of a unit and P = (S⁻¹ + G)⁻¹ its posterior covariance, what a unit says of its
-    cluster's mean has the precision G − G P G = S⁻¹ − S⁻¹ P S⁻¹ and the moment b − G P b = S⁻¹ P b: their sums need
-    that of P alone, and an inverse is all that each unit costs.
+    cluster's mean m has the precision G − G P G = S⁻¹ − S⁻¹ P S⁻¹ and the moment b − G P b = S⁻¹ P b; its deviation
+    from m is P (b − G m) = P (b + S⁻¹ m) − m. One inverse is all that a unit costs.
     """
-    spread = state.spread()
-    inverse = np.linalg.inv(spread)
-    posterior = np.empty(units.precision.shape)
-    for k in range(0, len(units), _TOGETHER):
-        posterior[k : k + _TOGETHER] = np.linalg.inv(inverse + units.precision[k : k + _TOGETHER])
-    alone = _times(posterior, units.moment)
+    inverse: FloatArray = np.asarray(np.linalg.inv(state.spread()), dtype=np.float64)
+    posterior, log_determinant = posteriors(inverse, units.precision)
     known = state.basis.variance(state.of_mean)
-    groups = [state.cluster == c for c in range(int(state.cluster.max()) + 1)]
-    shared = [g.sum() * inverse - inverse @ posterior[g].sum(axis=0) @ inverse for g in groups]
-    covariances = np.array([np.linalg.inv(np.diag(1.0 / known) + one) for one in shared])
-    totals = np.array([inverse @ alone[g].sum(axis=0) for g in groups])
+    member = np.eye(int(state.cluster.max()) + 1)[:, state.cluster]  # 1 where a unit is in a cluster
+    summed = np.tensordot(member, posterior, 1)
+    shared = member.sum(axis=1)[:, None, None] * inverse - inverse @ summed @ inverse
+    covariances = np.linalg.inv(np.diag(1.0 / known) + shared)
+    totals = member @ _times(posterior, units.moment) @ inverse
     means = np.einsum("cij,cj->ci", covariances, totals)
-    moved = np.subtract(alone, _times(posterior, _times(units.precision, means[state.cluster])))
-    return replace(state, means=means, covariances=covariances), posterior, np.asarray(moved)
+    own = means[state.cluster]
+    moved = np.subtract(_times(posterior, units.moment + own @ inverse), own)
+    return (
+        replace(state, means=means, covariances=covariances),
+        (posterior, log_determinant),
+        np.asarray(moved),
+    )
 
 
-def _weighed(units: UnitSums, state: LotState, posterior: FloatArray) -> LotState:
-    """The state with its log evidence, which no round of a fit asks for: a determinant for each unit."""
-    spread, known = state.spread(), state.basis.variance(state.of_mean)
+def _log_evidence(
+    units: UnitSums, state: LotState, posterior: FloatArray, log_determinant: FloatArray
+) -> float:
+    """Log evidence of the units, up to a constant of the recordings; arguments as `_conditioned` gives them."""
+    known = state.basis.variance(state.of_mean)
     totals = np.linalg.solve(state.covariances, state.means[..., None])[..., 0]
     value = 0.5 * float(np.sum(units.moment * _times(posterior, units.moment)))
-    value += 0.5 * float(np.linalg.slogdet(posterior)[1].sum())
-    value -= 0.5 * len(units) * float(np.linalg.slogdet(spread)[1])
+    value += 0.5 * float(log_determinant.sum())
+    value -= 0.5 * len(units) * float(np.linalg.slogdet(state.spread())[1])
     value += 0.5 * float(np.sum(totals * state.means))
     value += 0.5 * float(np.linalg.slogdet(state.covariances)[1].sum())
-    value -= 0.5 * len(state.means) * float(np.sum(np.log(known)))
-    return replace(state, evidence=value)
+    return value - 0.5 * len(state.means) * float(np.sum(np.log(known)))
 
 
 def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
@@ -266,10 +272,10 @@ def predictive(state: LotState, scale: float = 1.0) -> list[tuple[FloatArray, Fl
 
 def evidence(units: UnitSums, mean: FloatArray, covariance: FloatArray) -> FloatArray:
     """Log evidence of each unit's recordings where w ~ N(mean, covariance), up to the constant of the recordings."""
-    precision = np.linalg.inv(covariance) + units.precision
     moment = units.moment - units.precision @ mean
-    solved = np.linalg.solve(precision, moment[..., None])[..., 0]
-    value = 0.5 * np.sum(moment * solved, axis=1) - 0.5 * np.linalg.slogdet(precision)[1]
+    inverse: FloatArray = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+    posterior, log_determinant = posteriors(inverse, units.precision)
+    value = 0.5 * np.sum(moment * _times(posterior, moment), axis=1) + 0.5 * log_determinant
     value = value - 0.5 * float(np.linalg.slogdet(covariance)[1])
     return np.asarray(
         value + units.moment @ mean - 0.5 * np.einsum("i,uij,j->u", mean, units.precision, mean)
@@ -288,6 +294,7 @@ _ROUNDS = (
     16,
     20,
 )  # with all functions, with those that count, for each model: the evidence changes by < 1 then
+_SAMPLE = 256  # units at most that say which functions count: a variance from so many is known to a tenth
 _AGAIN = 6  # rounds of a model that starts from another of nearly the same units
 _COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing
 _FOLDS = 5  # each leaves four fifths of the units, enough to stand for the lot
@@ -330,12 +337,12 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
     center = float(np.average(bias, weights=count))
     unit = float(np.sqrt(np.average((bias - center) ** 2, weights=count))) or 1.0
     every = LotBasis.over(*envelope)
-    sums = sums_of(units, every, center, unit)
-    together = np.zeros(len(units), dtype=np.int64)
     say("smoothness of the maps")
-    first = fitted(sums, every, 0, together, _ROUNDS[0])
-    used = that_count(sums, every.variance(first.rest) + every.variance(first.of_mean))
-    sums, basis = sums.only(used), every.only(used)
+    sample = sums_of(units[:: -(-len(units) // _SAMPLE)], every, center, unit)
+    first = fitted(sample, every, 0, np.zeros(len(sample), dtype=np.int64), _ROUNDS[0])
+    used = that_count(sample, every.variance(first.rest) + every.variance(first.of_mean))
+    basis = every.only(used)
+    sums = sums_of(units, basis, center, unit)
     inside = np.ones(len(units), dtype=bool)
     state = _chosen(sums, basis, say)
     say("every unit left out")
@@ -405,9 +412,9 @@ def _with_directions(
 
 def _freedom(sums: UnitSums, state: LotState) -> float:
     """How many numbers recordings of a unit tell of its deviation."""
-    shrunk = np.linalg.inv(np.linalg.inv(state.spread()) + sums.precision)
-    told = len(state.basis.kept) - np.einsum("ij,uji->u", np.linalg.inv(state.spread()), shrunk)
-    return float(np.mean(told))
+    inverse: FloatArray = np.asarray(np.linalg.inv(state.spread()), dtype=np.float64)
+    shrunk = np.sum(inverse * posteriors(inverse, sums.precision)[0].mean(axis=0))
+    return len(state.basis.kept) - float(shrunk)
 
 
 def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
@@ -439,9 +446,7 @@ def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np
     """Candidates: units along the directions in which they differ most, parted by k-means from a few starts."""
     from scipy.cluster.vq import kmeans2
 
-    spread = plain.spread()
-    posterior = np.linalg.inv(np.linalg.inv(spread) + sums.precision)
-    moved = np.einsum("uij,uj->ui", posterior, sums.moment - sums.precision @ plain.means[0])
+    moved = _conditioned(sums, plain)[2]
     _, vectors = np.linalg.eigh(moved.T @ moved)
     found: dict[bytes, NDArray[np.int64]] = {}
     for start in range(_STARTS):

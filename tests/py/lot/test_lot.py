@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gyrotc._core import posteriors
 from gyrotc.common.errors import InputError
 from gyrotc.lot import basis as lot_basis
 from gyrotc.lot.basis import PRIOR_LOG, LotBasis
@@ -389,3 +390,31 @@ def test_what_is_no_price_is_told(price: Price, option: str) -> None:
     known = known_of(np.random.default_rng(6), np.zeros(5))
     with pytest.raises(InputError, match=option):
         next_run(random_model(1), known, NOISE_OF_RUNS, MEAN_S, "paper", price)
+
+
+@pytest.mark.parametrize("n", [1, 15, 16, 47, 121])
+def test_posterior_covariances_are_inverses_of_the_sums(n: int) -> None:
+    rng = np.random.default_rng(n)
+    prior = np.diag(rng.uniform(0.5, 2.0, n))
+    factor = rng.normal(size=(3, n, n + 2))
+    precision = factor @ factor.transpose(0, 2, 1)
+    covariance, log_determinant = posteriors(prior, precision)
+    np.testing.assert_allclose(
+        covariance @ (prior + precision), np.broadcast_to(np.eye(n), precision.shape), atol=1e-9
+    )
+    np.testing.assert_array_equal(covariance, covariance.transpose(0, 2, 1))
+    np.testing.assert_allclose(log_determinant, -np.linalg.slogdet(prior + precision)[1], rtol=1e-12)
+
+
+def test_a_sum_that_is_no_precision_is_refused() -> None:
+    with pytest.raises(ValueError, match="not positive definite"):
+        posteriors(-np.eye(2), np.zeros((1, 2, 2)))
+
+
+def test_the_search_for_a_process_finds_the_process() -> None:
+    basis = LotBasis.over(*ENVELOPE)
+    truth = PRIOR_LOG + np.array([0.3, -0.4, 0.2, 0.3, -0.1, 0.5, 0.2, -0.2])
+    found = lot_basis.fitted_parameters(basis, basis.variance(truth), 1e6, PRIOR_LOG)
+    for _ in range(5):  # each search goes on where the last one ended
+        found = lot_basis.fitted_parameters(basis, basis.variance(truth), 1e6, found)
+    np.testing.assert_allclose(basis.variance(found)[:20], basis.variance(truth)[:20], rtol=0.01)
