@@ -17,7 +17,7 @@ override export SET_EACH := $(or $(value EACH),36)
 override export SET_SETS := $(or $(value SETS),2000)
 override export SET_MEGABYTES := $(value MEGABYTES)
 override export SET_TAG := $(value TAG)
-override export SET_REAL := $(or $(value GYROTC_REAL_DATA),../shared/data/real)
+override export SET_REAL := $(or $(value DATA),$(value GYROTC_REAL_DATA),../shared/data/real)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -116,7 +116,7 @@ picture: demo
 paper: setup
 	@$(PYTHON) -m gyrotc.paper docs
 
-## measured recordings with runs or spans left out: docs/real.md, docs/diagnosis-real.md (GYROTC_REAL_DATA names their folder)
+## measured recordings with runs or spans left out: docs/real.md (DATA=folder of the sets)
 real: setup
 	@$(PYTHON) -c "import sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@$(PYTHON) tools/real.py "$$SET_REAL" docs build/real
@@ -152,7 +152,7 @@ faults: setup
 oracle: setup
 	@$(PYTHON) -m tests.oracle --real "$$SET_REAL"
 
-## what channels gain on simulated gyros, beside other methods (in build/bench, minutes a gyro): docs/results-channels.md
+## what channels gain on simulated gyros, beside other methods (in build/bench, minutes a gyro): docs/results.md
 signals:
 	@tools/setup.sh test
 	@[ -x build/bench/bin/python ] || python3 -m venv build/bench

@@ -141,7 +141,7 @@ def main() -> None:
     parts = _PARTS if chosen.only is None else {chosen.only: (_PARTS | _ALONE)[chosen.only]}
     for part in parts.values():
         part(chosen.docs)
-    print(chosen.docs / "results.md")
+    print(chosen.docs / "results" / "summary.json")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from gyrotc.causes.base import Scene
 from gyrotc.model import Model
+from gyrotc.paper.summary import keep
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows, joined_runs
 from gyrotc.simulate.campaign import simulate
@@ -360,7 +361,7 @@ def section(found: list[dict[str, Any]], seconds: float, drawn: bool) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Writes docs/results-channels.md."""
+    """Writes build/results/signals.md, and the figures of pages into docs/results/summary.json."""
     worlds = int(arguments[1]) if len(arguments) > 1 else _WORLDS
     drawn = len(arguments) < 3
     seed = int(np.random.default_rng().integers(*_SEEDS)) if drawn else int(arguments[2])
@@ -370,8 +371,24 @@ def main(arguments: list[str]) -> int:
             found.append(world(seed + k, Path(work)))
         print(json.dumps(found[-1]), flush=True)
         text = section(found, time.monotonic() - start, drawn)
-        (ROOT / arguments[0] / "results-channels.md").write_text(text, "utf-8")
+        page = ROOT / "build" / "results" / "signals.md"
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(text, "utf-8")
+    keep(ROOT / arguments[0], "signals", headlines(found))
     return 0
+
+
+def headlines(found: list[dict[str, Any]]) -> dict[str, float]:
+    """What docs/results.md has of it."""
+    gains = [(w["plain"] ** 2 - w["channels"] ** 2) / (w["plain"] ** 2 - w["oracle"] ** 2) for w in found]
+    lost = [rms / w["plain"] - 1.0 for w in found for rms in w["lost"].values()]
+    return {
+        "worlds": len(found),
+        "gain": round(float(np.mean(gains)), 4),
+        "reached": sum(gain >= _AIM for gain in gains),
+        "useless_taken": sum(w["useless_taken"] for w in found),
+        "lost_worst": round(max(lost), 4),
+    }
 
 
 if __name__ == "__main__":

@@ -7,8 +7,8 @@ sources' tracked files, with gyrotc of the environment on the PATH. A command wh
 the page says `$? = N` in the line behind its output. `needs: program` in the fence skips a block where it is missing.
 A block whose fence is ```` ```c file: lab/main.c ```` (any language) is a file: it is written there.
 
-    python tools/documents.py docs/trust.md            runs a page; exit status 1 and the difference if it is wrong
-    python tools/documents.py --times docs/trust.md    also tells how long each command takes
+    python tools/documents.py docs/tutorial.md            runs a page; exit status 1 and the difference if it is wrong
+    python tools/documents.py --times docs/tutorial.md    also tells how long each command takes
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Diagnosis of measured recordings: tables of docs/diagnosis-real.md (part of `make real`).
+"""Diagnosis of measured recordings: tables of docs/real.md (part of `make real`).
 
 usage: python tools/real_diagnosis.py FOLDER-OF-DATA-SETS DOCS WORK
 """
@@ -161,7 +161,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
         cycles[axis] = diagnosed(data, axis, work / f"diagnosis-{axis}")
     rest = _data(source, work, ISOTHERMAL)
     still = {axis: diagnosed(rest, axis, work / f"diagnosis-still-{axis}") for axis in "xyz"}
-    page = docs / "diagnosis-real.md"
+    page = docs / "real.md"
     cubics = {axis: cubic(data, axis) for axis in cycles}
     parts: dict[str, Sequence[str]] = {
         "gains": list(gains(cycles, {axis: of_sizes(data, axis) for axis in cycles}, cubics)),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import html
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -154,7 +155,10 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File
 
     with tempfile.TemporaryDirectory() as folder:
-        reference.write(Path(folder), ROOT / ".venv" / "bin" / "python")
+        python = ROOT / ".venv" / "bin" / "python"
+        reference.write(Path(folder), python)
+        results = [python, ROOT / "tests" / "py" / "sections.py", Path(folder) / "results-all.md"]
+        subprocess.run(results, check=True)
         for path in sorted(Path(folder).iterdir()):
             written = files.get_file_from_path(path.name)  # without tables
             if written is not None:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The way of a newcomer on this machine, timed step by step: README's first command, then every command of
-# docs/tutorial.md (own files, firmware in QEMU). Prints a section for docs/walk.md;
+# docs/tutorial.md (own files, firmware in QEMU). Prints a section for docs/install.md;
 # what the commands say goes to build/walk.log. For a machine on which nothing is installed yet; exit status 1 if a
 # step fails, with the end of the log.
 set -euo pipefail

@@ -1,5 +1,5 @@
-"""What campaigns leave: everything in build/results/, what pages quote in docs/results/summary.json, and the sections
-of docs/results.md that are made from it. Nobody edits them by hand.
+"""What campaigns leave: everything in build/results/, what pages quote in docs/results/summary.json, and the figures of
+pages that are taken from it by name. Nobody edits them by hand.
 
 `pytest ... --results docs` writes them when every test passed.
 """
@@ -9,15 +9,18 @@ from __future__ import annotations
 import json
 import platform
 import re
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from gyrotc.paper.summary import keep, recorded, shortened
 
-__all__ = ["Results", "filled", "machine", "recorded", "table", "write"]
+__all__ = ["Results", "machine", "recorded", "table", "write"]
 
-_HEAD = "# Results\n\nFigures that programs wrote; nobody edits them by hand.\n"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "promises"))
+
+import figures
 
 
 class Results:
@@ -44,15 +47,6 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-def filled(page: str | None, name: str, section: str) -> str:
-    """The page (None: a new one) with the section between the marks `name` replaced, or added at its end."""
-    marks = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
-    text = _HEAD if page is None else page
-    if not marks.search(text):
-        text = f"{text.rstrip()}\n\n<!-- {name} -->\n<!-- /{name} -->\n"
-    return marks.sub(lambda found: found[1] + section + found[2], text)
-
-
 def write(
     docs: Path,
     name: str,
@@ -60,20 +54,19 @@ def write(
     section: Callable[[Any], str],
     quoted: Callable[[Any], Any] = lambda result: result,
 ) -> None:
-    """Keeps the result, and makes the section `name` of `docs/results.md` from what is quoted of it.
+    """Keeps the result, writes its tables to `build/results/<name>.md`, and fills the figures of pages again.
 
     Args:
         docs: The folder docs.
         name: Of the campaign.
         result: Everything that it found; goes to `build/results/<name>.json`, which is not tracked.
-        section: The text, from what `quoted` leaves.
+        section: Its tables as text, from what `quoted` leaves.
         quoted: What of the result stands in `docs/results/summary.json`, in as many digits as the section needs.
     """
     whole = docs.parent / "build" / "results" / f"{name}.json"
     whole.parent.mkdir(parents=True, exist_ok=True)
     whole.write_text(json.dumps(result, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    told = json.loads(json.dumps(quoted(result)))
-    keep(docs, name, shortened(told, section))
-    page = docs / "results.md"
-    before = page.read_text(encoding="utf-8") if page.exists() else None
-    page.write_text(filled(before, name, section(recorded(docs, name))), encoding="utf-8")
+    kept = json.loads(json.dumps(quoted(result)))
+    keep(docs, name, shortened(kept, section))
+    whole.with_suffix(".md").write_text(section(recorded(docs, name)), encoding="utf-8")
+    figures.write(docs.parent)

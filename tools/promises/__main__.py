@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import analysers
+import figures
 import objects
 import oldest
 import origins
@@ -20,6 +21,7 @@ CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "words": source.forbidden_words,
     "functions": source.long_functions,
     "origins": origins.unexplained_numbers,
+    "figures": figures.stale_figures,
     "oldest": oldest.younger_than_supported,
     "warnings": objects.warnings,
     "cplusplus": objects.cplusplus,

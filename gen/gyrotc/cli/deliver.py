@@ -21,7 +21,7 @@ def certificate(
     folder: DirArg,
     out: OutOption,
     facts: Annotated[
-        Path | None, typer.Option("--facts", help="What the laboratory states (TOML, docs/certificate.md).")
+        Path | None, typer.Option("--facts", help="What the laboratory states (TOML, docs/delivery.md).")
     ] = None,
     number: Annotated[str | None, typer.Option("--number", help="Number of the certificate.")] = None,
     draft: Annotated[

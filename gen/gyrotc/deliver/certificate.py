@@ -166,7 +166,7 @@ def print_to_pdf(page: Path, pdf: Path) -> bool:
     return True
 
 
-_EXPECTED = "a facts file (docs/certificate.md)"
+_EXPECTED = "a facts file (docs/delivery.md)"
 Line = Annotated[str, Field(min_length=1, max_length=300)]
 _NEEDED = {
     "number": "number of the certificate (--number)",
@@ -279,7 +279,7 @@ def certificate(
     if missing and not draft:
         raise InputError(
             str(folder), f"{len(missing)} things are missing for a certificate: " + "; ".join(missing),
-            "them in a facts file (--facts, docs/certificate.md) or in [meta], or --draft",
+            "them in a facts file (--facts, docs/delivery.md) or in [meta], or --draft",
         )  # fmt: skip
     for place, unit in zip(places, units, strict=True):
         _as_built(place, unit)

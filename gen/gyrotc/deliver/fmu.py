@@ -31,7 +31,7 @@ _HOST = "host-gcc-O2"
 _PLATFORMS = {"x86_64": "x86_64-linux", "aarch64": "aarch64-linux"}  # FMI 3.0, section 2.5.1.4
 _FLAGS, _LINK = ("-fPIC", "-fvisibility=hidden"), ("-shared", "-s")
 _WHOLE = (1980, 1, 1, 0, 0, 0)  # the earliest date that a ZIP file has, for every file in it
-_FIRST_INPUT, _OUTPUTS = 2, 3  # value references: docs/export.md, and fmu.c
+_FIRST_INPUT, _OUTPUTS = 2, 3  # value references: docs/delivery.md, and fmu.c
 _RAD_PER_S = "4.84813681109536e-06"  # 1 deg/h
 
 

@@ -1,6 +1,6 @@
 """The catalogue of a fleet: every calibration of every gyro in SQLite, tables and models apart under their hashes.
 
-Calibrations are only ever added; a payload is written once and never changed. `docs/catalogue.md` documents the
+Calibrations are only ever added; a payload is written once and never changed. `docs/fleet.md` documents the
 tables for other programs.
 """
 

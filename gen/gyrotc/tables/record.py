@@ -1,7 +1,7 @@
 """The record that `emit` leaves in `c/`: of which model, with which options, and the hash of every file.
 
 `verify` makes the files again with the options that stand here, and then this record itself, so a changed record
-does not pass either. A release, which is what is signed (docs/signing.md), names its hash. docs/FORMAT.md, section 6.
+does not pass either. A release, which is what is signed (docs/delivery.md), names its hash. docs/FORMAT.md, section 6.
 """
 
 from __future__ import annotations

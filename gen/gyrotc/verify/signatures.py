@@ -1,4 +1,4 @@
-"""Signatures of a release: Ed25519 over the bytes of `c/release.json` (docs/signing.md).
+"""Signatures of a release: Ed25519 over the bytes of `c/release.json` (docs/delivery.md).
 
 It names verdict, limits, uncertainty and dates, and the hashes of what they rest on and of the record of the emission;
 `verify` proves that the emitted files are what gyrotc makes; the signature says who released them. Raw 64 bytes, as

@@ -74,7 +74,7 @@ def test_what_is_done_before_is_entered_once(fleet: Path) -> None:
 
 
 def test_the_documented_sql_answers_the_same_and_its_tables_are_those_of_the_file(fleet: Path) -> None:
-    page = (ROOT / "docs" / "catalogue.md").read_text("utf-8")
+    page = (ROOT / "docs" / "fleet.md").read_text("utf-8")
     query, tables = re.findall(r"```sql\n(.*?)```", page, re.DOTALL)
     assert tables.strip() == SCHEMA.strip()
     with sqlite3.connect(fleet / "catalogue" / "catalogue.sqlite") as base:

@@ -1,75 +1,66 @@
-"""docs/results.md is made of docs/results/summary.json, no figure by hand, and holds what the project promises."""
+"""Figures of pages are those of docs/results/summary.json, and it holds what the project promises."""
 
 from __future__ import annotations
 
 import copy
+import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from gyrotc.paper.summary import keep
-from results import filled, recorded, write
+from results import recorded, write
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCS = ROOT / "docs"
-sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / name) for name in ("targets", "prove"))]
+sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "promises")]
 
-import prove_page  # noqa: E402
-import self_test_page  # noqa: E402
-import targets_page  # noqa: E402
+import figures  # noqa: E402
+from sections import SECTIONS, page  # noqa: E402
 
-from bench import bounds, budget, faults, fleet, importing, lot_prior, runtime, sigma, sizes  # noqa: E402
 from bench import page as bench_page  # noqa: E402
+from bench import runtime  # noqa: E402
 from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
 from tests.blind.table import _gains  # noqa: E402
-from tests.kills import page as kills  # noqa: E402
 from tests.kills.driver import ACTIONS  # noqa: E402
-from tests.mutants import page as mutants  # noqa: E402
 
-SECTIONS: dict[str, Callable[[Any], str]] = {
-    "bench": bench_page.section,
-    "blind": blind.section,
-    "blind-other": other.section,
-    "bounds": bounds.section,
-    "budget": budget.section,
-    "catalogue": fleet.catalogue_section,
-    "fleet": fleet.section,
-    "import": importing.section,
-    "kills": kills.section,
-    "lot": fleet.lot_section,
-    "lot-prior": lot_prior.section,
-    "mutants": mutants.section,
-    "prove": prove_page.section,
-    "runtime": runtime.section,
-    "self-test": self_test_page.section,
-    "sigma": sigma.section,
-    "sizes": sizes.section,
-    "faults": faults.section,
-    "targets": targets_page.section,
-}
 WRITING = {
     "build", "check", "compare", "diagnose", "emit", "evaluate", "fit", "fleet", "import", "plan", "report", "sign",
     "simulate", "stamp", "verify",
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SECTIONS)
-def test_the_section_is_made_of_what_is_recorded(name: str) -> None:
-    page = (DOCS / "results.md").read_text("utf-8")
-    assert filled(page, name, SECTIONS[name](recorded(DOCS, name))) == page
+def test_the_figures_of_pages_are_those_of_the_summary() -> None:
+    assert list(figures.stale_figures(ROOT)) == []
+    assert sum(len(figures._MARK.findall(p.read_text("utf-8"))) for p in figures.documents(ROOT)) >= 50
 
 
-def test_no_section_stands_without_a_record() -> None:
-    marks = {
-        line[5:-4] for line in (DOCS / "results.md").read_text("utf-8").splitlines() if line[:5] == "<!-- "
-    }
-    assert {mark for mark in marks if not mark.startswith("/")} == set(SECTIONS)
+def test_a_stale_figure_and_a_name_that_leads_nowhere_are_seen(tmp_path: Path) -> None:
+    keep(tmp_path / "docs", "one", {"rows": [{"name": "a b", "x": 1.25}, {"name": "c", "x": 2.0}]})
+    (tmp_path / "README.md").write_text("no figure\n")
+    lines = [
+        "1.2<!--= one/rows/name=a b/x; .1f -->",
+        "7<!--= one/rows/*/x; .0f; max -->",
+        "1<!--= one/no; d -->",
+    ]
+    (tmp_path / "docs" / "a.md").write_text("\n".join(lines))
+    wrong = [text.partition(": ")[0] for text in figures.stale_figures(tmp_path)]
+    assert wrong == ["docs/a.md:2", "docs/a.md:3"]
+    (tmp_path / "docs" / "a.md").write_text("\n".join(lines[:2]))
+    figures.write(tmp_path)
+    assert list(figures.stale_figures(tmp_path)) == []
+
+
+def test_every_record_has_a_section_and_the_page_of_the_site_holds_all() -> None:
+    pages = {"paper", "signals"}  # records of pages of their own
+    assert set(json.loads((DOCS / "results" / "summary.json").read_text("utf-8"))) <= set(SECTIONS) | pages
+    text = page()
+    assert all(SECTIONS[n](recorded(DOCS, n)) in text for n in SECTIONS if recorded(DOCS, n) is not None)
 
 
 def test_other_figures_give_another_section() -> None:
@@ -95,10 +86,7 @@ def test_a_campaign_leaves_everything_in_build_and_what_is_quoted_in_the_summary
     write(docs, "one", {"kept": 1, "left": 2}, str, lambda found: {"kept": found["kept"]})
     assert (recorded(docs, "one"), recorded(docs, "other")) == ({"kept": 1}, [1.5])
     assert '"left": 2' in (tmp_path / "build" / "results" / "one.json").read_text("utf-8")
-    page = (docs / "results.md").read_text("utf-8")
-    assert page.startswith("# Results") and "<!-- one -->\n{'kept': 1}<!-- /one -->" in page
-    assert "two" in filled(page, "one", "two\n") and "kept" not in filled(page, "one", "two\n")
-    assert "kept" in filled(page, "two", "two\n")
+    assert (tmp_path / "build" / "results" / "one.md").read_text("utf-8") == "{'kept': 1}"
 
 
 def test_the_default_method_is_as_accurate_and_small_as_promised() -> None:

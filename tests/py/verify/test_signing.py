@@ -23,7 +23,7 @@ def _openssl(*arguments: object) -> subprocess.CompletedProcess[bytes]:
 
 @pytest.fixture
 def key(tmp_path: Path) -> Path:
-    """A key pair as docs/signing.md makes it: lab.pem, lab.pub."""
+    """A key pair as docs/delivery.md makes it: lab.pem, lab.pub."""
     return _pair(tmp_path, "lab", "ed25519")
 
 
