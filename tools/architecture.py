@@ -16,9 +16,10 @@ PAGE = ROOT / "docs" / "architecture.md"
 
 _HEAD = """# Which package imports which
 
-Made from the imports of `gen/gyrotc` by `tools/architecture.py`; a test compares them. What each package is for stands
-in [design.md](design.md). An arrow points from a package to one that imports it. Arrows that follow from longer paths
-are left out of the drawing; the table has all imports.
+Made from the imports of `gen/gyrotc` by `tools/architecture.py`; a test compares them.
+What each package is for stands in [design.md](design.md).
+An arrow points from a package to one that imports it.
+Arrows that follow from longer paths are left out of the drawing; the table has all imports.
 
 """
 
