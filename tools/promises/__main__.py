@@ -15,6 +15,7 @@ import figures
 import objects
 import oldest
 import origins
+import prose
 import source
 
 CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
@@ -22,6 +23,8 @@ CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "functions": source.long_functions,
     "origins": origins.unexplained_numbers,
     "figures": figures.stale_figures,
+    "sentences": prose.long_sentences,
+    "vocabulary": prose.private_words,
     "oldest": oldest.younger_than_supported,
     "warnings": objects.warnings,
     "cplusplus": objects.cplusplus,
