@@ -218,7 +218,7 @@ site: setup
 	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
 	@build/site-tools/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
-## packages of the C library for Arduino, ESP-IDF, CMSIS and Rust: build/packages (others take the sources as they are)
+## packages of the C library for ESP-IDF and Rust: build/packages (others take the sources as they are)
 packages:
 	@python3 tools/packages.py build/packages
 

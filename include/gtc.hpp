@@ -57,6 +57,7 @@ struct F32 {
     typedef gtc_f32_table_t Table;
     typedef gtc_f32_state_t State;
     typedef gtc_f32_angle_t Sum;
+    typedef gtc_f32_snapshot_t Snapshot;
     static int check(const Table *table) noexcept { return gtc_f32_check(table); }
     static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
     {
@@ -71,6 +72,12 @@ struct F32 {
     }
     static int missed(State *state, uint_least32_t n) noexcept { return gtc_f32_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_f32_bias(state, b); }
+    static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_f32_snapshot(state, all); }
+    static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
+    {
+        return gtc_f32_rezero(state, rate, seconds);
+    }
+    static int unzero(State *state) noexcept { return gtc_f32_unzero(state); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_f32_save(state, words); }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
@@ -86,6 +93,7 @@ struct Q31 {
     typedef gtc_q31_table_t Table;
     typedef gtc_q31_state_t State;
     typedef gtc_q31_angle_t Sum;
+    typedef gtc_q31_snapshot_t Snapshot;
     static int check(const Table *table) noexcept { return gtc_q31_check(table); }
     static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
     {
@@ -100,6 +108,12 @@ struct Q31 {
     }
     static int missed(State *state, uint_least32_t n) noexcept { return gtc_q31_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_q31_bias(state, b); }
+    static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_q31_snapshot(state, all); }
+    static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
+    {
+        return gtc_q31_rezero(state, rate, seconds);
+    }
+    static int unzero(State *state) noexcept { return gtc_q31_unzero(state); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_q31_save(state, words); }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
@@ -113,6 +127,8 @@ struct Q31 {
 template <class A> struct Runtime {
     typedef typename A::Number Number;
     typedef typename A::Table Table;
+    typedef typename A::State State;
+    typedef typename A::Snapshot Snapshot;
     typedef Quantity<unit::Celsius, Number> Celsius;
     typedef Quantity<unit::CelsiusPerBlock, Number> CelsiusPerBlock;
     typedef Quantity<unit::DegPerHour, Number> DegPerHour;
@@ -164,6 +180,17 @@ template <class A> struct Runtime {
             bias = DegPerHour(result);
             return status;
         }
+        /* Correction, its uncertainty and more, as a filter takes them; the numbers as in gtc.h. */
+        Status snapshot(Snapshot &all) const noexcept { return Status(A::snapshot(&state_, &all)); }
+        /* After a rest of so many seconds: the mean of the compensated rate. */
+        Status rezero(DegPerHour mean_rate, uint_least32_t seconds) noexcept
+        {
+            return Status(A::rezero(&state_, mean_rate.value(), seconds));
+        }
+        Status unzero() noexcept { return Status(A::unzero(&state_)); }
+        /* The state of gtc.h, to copy it or to hand it to C. */
+        State &state() noexcept { return state_; }
+        const State &state() const noexcept { return state_; }
         Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, words)); }
         Status restore(const Table &table, uint_least32_t period_us, const gtc_word_t (&words)[GTC_SAVE_WORDS],
                        uint_least32_t off_blocks) noexcept

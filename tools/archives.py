@@ -32,7 +32,7 @@ PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name !
 LIBRARIES = (
     # Compiled into the core: name, licence, where it comes from.
     ("Eigen", "MPL-2.0", "pkg:generic/eigen"),
-    ("NLopt", "MIT", "pkg:generic/nlopt"),
+    ("NLopt", "MIT AND LGPL-2.1-or-later", "pkg:generic/nlopt"),
     ("nanobind", "BSD-3-Clause", "pkg:pypi/nanobind"),
     ("robin-map", "MIT", "pkg:generic/robin-map"),
 )
@@ -73,10 +73,11 @@ def pkg_info() -> str:
     text = (ROOT / "gen" / "pyproject.toml").read_text("utf-8")
     summary = re.search(r'^description = "(.*)"$', text, re.MULTILINE)
     python = re.search(r'^requires-python = "(.*)"$', text, re.MULTILINE)
-    assert summary is not None and python is not None
+    licence = re.search(r'^license = "(.*)"$', text, re.MULTILINE)
+    assert summary is not None and python is not None and licence is not None
     return (
         f"Metadata-Version: 2.4\nName: gyrotc\nVersion: {version.header_version(ROOT)}\nSummary: {summary[1]}\n"
-        f"License-Expression: MIT\nLicense-File: LICENSE\nRequires-Python: {python[1]}\n"
+        f"License-Expression: {licence[1]}\nLicense-File: LICENSE\nRequires-Python: {python[1]}\n"
     )
 
 

@@ -1,14 +1,13 @@
 """Firmware packages that are archives of their own, made from `include/`, `libc/` and `packages/`: `make packages`.
 
-Writes into OUT: `gyrotc-<version>-arduino.zip`, `gyrotc-<version>-esp-idf.zip`, `gyrotc-<version>-crate.zip` and
-`gyrotc.gtc.<version>.pack`, each beside the folder that it was made of. Equal sources give equal bytes.
+Writes into OUT: `gyrotc-<version>-esp-idf.zip` and `gyrotc-<version>-crate.zip`, each beside the folder that it was
+made of. Equal sources give equal bytes.
 CMake, Meson, Zephyr and PlatformIO take the sources as they are: packages/README.md. Standard library only.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import shutil
 import sys
 import zipfile
@@ -25,16 +24,6 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 MODE = 0o100644 << 16
 
 
-def _amalgamated() -> tuple[str, str]:
-    """Header and source by the generator that lies beside this file, whichever is installed."""
-    spec = importlib.util.spec_from_file_location("amalgamate", ROOT / "gen/gyrotc/tables/amalgamate.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    header, source = module.amalgamate(ROOT / "include", ROOT / "libc")
-    return header, source
-
-
 def _runtime(out: Path) -> None:
     shutil.copytree(ROOT / "include", out / "include")
     shutil.copytree(ROOT / "libc", out / "libc")
@@ -46,34 +35,11 @@ def _copy(out: Path, *paths: Path) -> None:
         shutil.copy(path, out)
 
 
-def arduino(out: Path) -> None:
-    """A library in the 1.5 layout: the runtime as one source, which keeps to C99 arithmetic without a flag."""
-    header, source = _amalgamated()
-    _copy(out / "src", ROOT / "include" / "gtc.hpp")
-    (out / "src" / "gtc.h").write_text(header, "ascii")
-    # The builder compiles as gnu11 with its own flags, which let GCC fuse products into sums.
-    guard = (
-        '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize("fp-contract=off")\n#endif\n\n'
-    )
-    (out / "src" / "gtc.c").write_text(guard + source, "ascii")
-    _copy(out, PACKAGES / "arduino" / "library.properties", ROOT / "LICENSE", ROOT / "CHANGELOG.md")
-    example = out / "examples" / "Minimal"
-    tables = [ROOT / "examples" / "minimal" / f"gtc_rlg_0042.{ending}" for ending in "ch"]
-    _copy(example, PACKAGES / "arduino" / "examples" / "Minimal" / "Minimal.ino", *tables)
-
-
 def esp_idf(out: Path) -> None:
     """A component that needs nothing beside it."""
-    names = ("CMakeLists.txt", "Kconfig", "idf_component.yml")
-    _copy(out, *(PACKAGES / "esp-idf" / name for name in names), ROOT / "LICENSE", ROOT / "CHANGELOG.md")
-    _copy(out, ROOT / "libc" / "README.md")
-    _runtime(out)
-
-
-def cmsis(out: Path) -> None:
-    """What a CMSIS pack holds."""
-    _copy(out, PACKAGES / "cmsis" / "gyrotc.gtc.pdsc", ROOT / "LICENSE", ROOT / "CHANGELOG.md")
-    _copy(out, ROOT / "libc" / "README.md")
+    _copy(out, PACKAGES / "esp-idf" / "CMakeLists.txt", PACKAGES / "Kconfig")
+    shutil.copy(PACKAGES / "esp-idf" / "idf_component.yml.in", out / "idf_component.yml")
+    _copy(out, ROOT / "LICENSE", ROOT / "CHANGELOG.md", ROOT / "libc" / "README.md")
     _runtime(out)
 
 
@@ -87,9 +53,7 @@ def crate(out: Path) -> None:
 
 #: Kind: who fills its folder, and the name of its archive.
 KINDS: dict[str, tuple[Callable[[Path], None], str]] = {
-    "arduino": (arduino, "gyrotc-{}-arduino.zip"),
     "esp-idf": (esp_idf, "gyrotc-{}-esp-idf.zip"),
-    "cmsis": (cmsis, "gyrotc.gtc.{}.pack"),
     "crate": (crate, "gyrotc-{}-crate.zip"),
 }
 
@@ -115,7 +79,7 @@ def assemble(out: Path, kinds: list[str]) -> list[Path]:
         shutil.rmtree(folder, ignore_errors=True)
         fill(folder)
         made.append(out / name.format(version.header_version(ROOT)))
-        archive(folder, made[-1], "" if kind == "cmsis" else "gyrotc")
+        archive(folder, made[-1], "gyrotc")
     return made
 
 

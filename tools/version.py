@@ -22,9 +22,7 @@ PLACES = {
     "meson.build": rf"^  version: '{_NUMBER}',$",
     "library.json": rf'^  "version": "{_NUMBER}",$',
     "packages/meson/gyrotc.wrap": rf"^revision = v{_NUMBER}$",
-    "packages/esp-idf/idf_component.yml": rf'^version: "{_NUMBER}"$',
-    "packages/arduino/library.properties": rf"^version={_NUMBER}$",
-    "packages/cmsis/gyrotc.gtc.pdsc": rf'(?:<release version|Cversion)="{_NUMBER}"',
+    "packages/esp-idf/idf_component.yml.in": rf'^version: "{_NUMBER}"$',
     "packages/rust/Cargo.toml": rf'^version = "{_NUMBER}"$',
 }
 

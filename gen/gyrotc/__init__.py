@@ -1,4 +1,16 @@
-"""gyrotc: from thermal-chamber recordings of a gyro to verified C tables that compensate its bias."""
+"""gyrotc: from thermal-chamber recordings of a gyro to verified C tables that compensate its bias.
+
+The command does the whole job (`gyrotc --help`, or `python -m gyrotc --help`):
+
+    gyrotc import log.csv --out data        recordings of a logger to a data set
+    gyrotc check data                       errors and warnings about recordings
+    gyrotc build data --out result          fit, C source, proof on every target, report
+    gyrotc diagnose data --out diagnosis    what the model does not explain, and the cause
+    gyrotc simulate paper --out data        a data set to try it with
+
+From Python: `gyrotc.model.load_model("result/model.json")` reads a fitted model, and
+`gyrotc.RBFNetworkRegressor` is the network as an estimator of scikit-learn.
+"""
 
 from __future__ import annotations
 

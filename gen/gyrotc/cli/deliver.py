@@ -11,6 +11,7 @@ from typing import Annotated, cast, get_args
 import typer
 
 from ..common.errors import InputError
+from ..common.inputs import read_input
 from .base import AcceptOption, DirArg, OutOption, app, progress, tell, written_place
 
 _MOST_POINTS = 1000  # of an axis: a table of a million is more than any control unit holds
@@ -114,6 +115,10 @@ def sign(
             "--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."
         ),
     ] = None,
+    passphrase_file: Annotated[
+        Path | None,
+        typer.Option("--key-passphrase-file", help="Its first line is the passphrase of an encrypted key."),
+    ] = None,
     accept_fail: AcceptOption = None,
 ) -> None:
     """Sign verdict, limits, uncertainty, dates and DIR/c (with --axis all: of every axis, too): DIR/c/release.json and
@@ -128,7 +133,7 @@ def sign(
     from ..tables.record import RELEASE, SIGNATURE
     from ..verify.signatures import load_private_key, sign_record
 
-    private = load_private_key(key, lambda: _passphrase(key)) if key else None
+    private = load_private_key(key, lambda: _passphrase(key, passphrase_file)) if key else None
     with progress() as say:
         check_emitted(folder, "not signed", say)
         releases = release_of(folder, accept_fail)
@@ -144,9 +149,14 @@ def sign(
         tell(f"{written}; {verdict}{f', accepted: {accept_fail}' if release.accepted_fail else ''}")
 
 
-def _passphrase(key: Path) -> str:
+def _passphrase(key: Path, file: Path | None) -> str:
+    if file is not None:
+        lines = read_input(file, "text_mib", "a passphrase").decode("utf-8", "replace").splitlines()
+        if not lines or not lines[0]:
+            raise InputError(str(file), "has an empty first line", "a passphrase")
+        return lines[0]
     if not sys.stdin.isatty():
-        raise InputError(str(key), "is encrypted, and there is no terminal to ask", "a terminal")
+        raise InputError(str(key), "is encrypted, and there is no terminal to ask", "--key-passphrase-file")
     return str(typer.prompt(f"passphrase of {key}", hide_input=True, err=True))
 
 

@@ -14,7 +14,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -187,7 +187,12 @@ _NEEDED = {
 
 
 def _day(value: object) -> object:
-    return value.isoformat() if isinstance(value, date) else value
+    """Dates of TOML as JSON writes them, in tables and lists, too."""
+    if isinstance(value, Mapping):
+        return {key: _day(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_day(one) for one in value]
+    return value.isoformat() if isinstance(value, date | time) else value
 
 
 Day = Annotated[str, BeforeValidator(_day), Field(pattern=r"^\d{4}-\d{2}-\d{2}")]
@@ -308,7 +313,10 @@ def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:
     budget = units[0].budget
     instruments = budget.instruments if budget else ()
     if budget and not any(one.quantity == "temperature" and one.certificate for one in instruments):
-        yield 'instrument (a thermometer with its certificate: [[meta.instrument]], quantity = "temperature")'
+        yield (
+            "a thermometer with its certificate (only dataset.toml states instruments: [[meta.instrument]],"
+            ' quantity = "temperature"; then build again)'
+        )
 
 
 def _as_built(folder: Path, unit: UnitResults) -> None:

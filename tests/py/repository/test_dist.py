@@ -173,11 +173,11 @@ def test_from_tag_to_archives(clone: Path) -> None:
         p.name for p in made.iterdir()
     }
     packages = list((made / "packages").iterdir())
-    assert len(packages) == 4 and all(p.is_file() and "0.2.0" in p.name for p in packages)
-    (arduino,) = (p for p in packages if "arduino" in p.name)
-    with zipfile.ZipFile(arduino) as archive:
-        source = archive.read("gyrotc/src/gtc.c").decode()
-    assert "in one file of the tag;" in source and "not of the tag" not in source
+    assert len(packages) == 2 and all(p.is_file() and "0.2.0" in p.name for p in packages)
+    (crate,) = (p for p in packages if "crate" in p.name)
+    with zipfile.ZipFile(crate) as archive:
+        assert "not of the tag" not in archive.read("gyrotc/c/libc/gtc_crc.c").decode()
+        assert "gyrotc/LICENSE" in archive.namelist()
     page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
     assert "fish of the tag." in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
     _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
@@ -217,3 +217,24 @@ def test_a_tag_of_another_version_is_refused(clone: Path) -> None:
     _run("git", "tag", "v9.9.9", cwd=clone)
     assert "holds another version" in _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2)
     assert not (clone / "build" / "release").exists()
+
+
+@pytest.mark.slow
+def test_pip_from_the_sources_carries_runtime_and_licences(tmp_path: Path) -> None:
+    """As `pip install ./gen`, or from git with `#subdirectory=gen`, builds it: a wheel that can emit."""
+    made = tmp_path / "made"
+    _run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(made), "./gen", cwd=ROOT)
+    (wheel,) = made.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (name,) = (n for n in names if n.endswith(".dist-info/METADATA"))
+        metadata = archive.read(name).decode()
+    assert {
+        "gyrotc/runtime/include/gtc.h",
+        "gyrotc/runtime/libc/gtc_f32.c",
+        "gyrotc/runtime/LICENSE",
+    } <= names
+    texts = {n.rpartition("/")[2] for n in names if ".dist-info/licenses/" in n}
+    assert {"LICENSE", "LGPL-2.1.txt", "MPL-2.0.txt", "NLopt.txt", "nanobind.txt", "robin-map.txt"} <= texts
+    for word in ("LGPL-2.1-or-later", "MPL-2.0", "BSD-3-Clause", "Project-URL: Source", "# gyrotc"):
+        assert word in metadata, word

@@ -16,7 +16,6 @@ import pytest
 from gyrotc.model import Model, load_model
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.history import replay
 from gyrotc.target.maps import evaluate_map
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -143,43 +142,17 @@ def test_two_slots_as_its_page_says(tmp_path: Path) -> None:
     _run(tmp_path / "two_slots")
 
 
-def _simulink(folder: Path) -> Path:
-    """The S-function with stand-ins for Simulink, as a program."""
+def test_a_filter_in_cpp_integrates_the_corrected_rate(tmp_path: Path) -> None:
+    """0.01 deg/h beside the bias, over ten minutes."""
     own = EXAMPLES / "minimal"
-    quiet = [flag for flag in FLAGS if flag != "-Wconversion"]  # of the stand-ins
-    sources = [EXAMPLES / "simulink" / "sfun_gtc.c", own / "gtc_rlg_0042.c", *RUNTIME]
-    includes = [f"-I{ROOT / 'tests' / 'py' / 'simulink'}", f"-I{own}"]
-    _run("gcc", *quiet, *includes, *sources, "-o", folder / "block")
-    return folder / "block"
-
-
-def test_a_block_of_simulink_gives_the_bits_of_the_reference(tmp_path: Path) -> None:
-    """Two blocks of one model have a state each; the one that is read sees every tenth reading missing."""
-    table = quantise(load_model(EXAMPLES / "minimal" / "model.json"), "f32")
-    x = 20.0 + 15.0 * np.sin(np.arange(400) / 40.0)
-    x[::10] = np.nan
-    text = "\n".join(f"{t!r} 0.5" for t in x.astype(np.float32).tolist())
-    done = subprocess.run(
-        [_simulink(tmp_path), str(table.block_s / 4.0)],
-        input=text,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    rows = np.array([[float(word) for word in line.split()] for line in done.stdout.splitlines()])
-    want = replay(
-        table, table.encode_inputs(x[:, None]), missed=np.zeros(400, dtype=np.int64), samples_per_block=4
-    )
-    bias = table.decode_bias(want.bits)
-    assert np.array_equal(rows[:, 1], bias)
-    assert np.array_equal(rows[:, 0], 0.5 - bias)
-    assert np.ptp(bias) > 0.0
-
-
-def test_a_block_of_simulink_refuses_a_period_that_makes_no_block(tmp_path: Path) -> None:
-    block = _simulink(tmp_path)
-    assert "no whole number of sample periods" in _run(block, "7.3", status=1)
-    assert "between a microsecond and 4294 s" in _run(block, "0", status=1)
+    flags = [f"-I{ROOT / 'include'}", f"-I{own}", "-Wall", "-Wextra", "-Werror"]
+    objects = [tmp_path / f"{source.stem}.o" for source in (*RUNTIME, own / "gtc_rlg_0042.c")]
+    for source, made in zip((*RUNTIME, own / "gtc_rlg_0042.c"), objects, strict=True):
+        _run("gcc", "-std=c99", *flags, "-c", source, "-o", made)
+    _run("g++", "-std=c++11", *flags, EXAMPLES / "filter" / "main.cpp", *objects, "-o", tmp_path / "filter")
+    found = re.fullmatch(r"heading (\S+) deg, variance (\S+) deg\^2\n", _run(tmp_path / "filter"))
+    assert found is not None
+    assert abs(float(found[1]) - 0.01 / 6.0) < 1e-5 and float(found[2]) >= 1e-6 / 6.0
 
 
 @pytest.mark.slow

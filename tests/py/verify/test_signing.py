@@ -107,6 +107,15 @@ def test_an_encrypted_key_asks_and_says_when_the_passphrase_is_wrong(
     assert load_private_key(locked, lambda: "right").public_key() == load_public_key(key.with_suffix(".pub"))
     with pytest.raises(InputError, match="passphrase"):
         load_private_key(locked, lambda: "wrong")
+    word = tmp_path / "word"
+    word.write_text("right\n")
+    found = gyrotc("sign", tmp_path / "absent", "--key", locked, "--key-passphrase-file", word)
+    assert found.returncode == 2 and "absent" in found.stderr, "the key was opened, the folder is missing"
+    word.write_text("wrong\n")
+    found = gyrotc("sign", tmp_path / "absent", "--key", locked, "--key-passphrase-file", word)
+    assert found.returncode == 2 and "passphrase" in found.stderr
+    word.write_text("")
+    assert gyrotc("sign", tmp_path / "absent", "--key", locked, "--key-passphrase-file", word).returncode == 2
 
 
 def test_a_model_changed_on_purpose_is_stamped(tmp_path: Path, gyrotc: Command) -> None:
