@@ -146,6 +146,8 @@ def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Pa
         ("schema = 1\ncountry = 'Germany'", "country"),
         ("laboratory = 'x'", "field schema"),
         ("schema = 1\ncalibrated_on = 'in March'", "calibrated_on"),
+        ("schema = 1\ncalibrated_on = { day = 2026-03-02 }", "calibrated_on"),
+        ("schema = 1\nissued = [2026-03-02, 10:00:00]", "issued"),
     ],
 )
 def test_wrong_facts_are_refused(tmp_path: Path, text: str, told: str) -> None:

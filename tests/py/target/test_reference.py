@@ -18,7 +18,7 @@ from gyrotc.target.maps import evaluate_map
 from gyrotc.target.q31 import GAUSS_ERROR, exp2
 from gyrotc.target.status import HELD
 from gyrotc.target.table import ARRAYS, Table, f32_words
-from libc_build import ROOT, runtime
+from libc_build import ROOT, UNGUARDED, runtime
 from models import bank_of, bank_with_channels, random_channels, random_history, random_model, random_terms
 
 COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
@@ -148,8 +148,13 @@ def test_self_test_finds_a_changed_weight_by_its_checksum_and_a_changed_probe_by
     assert c.check(replace(table, probes=probes)) == -3
 
 
-def test_self_test_finds_fused_multiply_add() -> None:
+def test_the_sources_forbid_fused_multiply_add_whatever_the_flags() -> None:
     fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma"))
+    assert fused.check(quantise(random_model(0), "f32")) == 0
+
+
+def test_self_test_finds_fused_multiply_add() -> None:
+    fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma", *UNGUARDED))
     assert fused.check(quantise(random_model(0), "f32")) == -3
 
 

@@ -17,6 +17,7 @@ from gyrotc.model import load_model
 from gyrotc.verify.board import Job, board_entries
 from gyrotc.verify.toolchain import Target
 from jobs import job_of
+from libc_build import UNGUARDED
 from models import bank_of, random_model, random_terms
 
 pytestmark = pytest.mark.slow
@@ -24,7 +25,7 @@ pytestmark = pytest.mark.slow
 SELF_TEST_FAILED = "vector 0: status fffffffd"  # GTC_E_SELF_TEST
 LAYOUT_REFUSED = "vector 0: status fffffffe"  # GTC_E_LAYOUT
 IMAGE_REFUSED = "vector 0: status fffffffc"  # GTC_E_IMAGE
-CONTRACTED = ("-std=gnu99", "-ffp-contract=fast")
+CONTRACTED = ("-std=gnu99", "-ffp-contract=fast", *UNGUARDED)
 # Macros that gcc sets with -ffast-math, which the runtime refuses to compile with.
 FAST_MATH = ("-ffast-math", "-U__FAST_MATH__")
 
