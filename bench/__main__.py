@@ -106,7 +106,7 @@ def _lot_speed(docs: Path) -> None:
 
 
 def _lot_strangers(docs: Path) -> None:
-    """What a run of 2.5 h can show of a stranger in a lot."""
+    """What a run of 2.5 h can show of a foreign unit in a lot."""
     from .lot_learning import write_strangers
 
     write_strangers(docs)

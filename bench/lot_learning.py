@@ -1,10 +1,10 @@
-"""What a short run can show of a stranger in a lot, and what a lot costs to learn: parts of `python -m bench docs`.
+"""What a short run can show of a foreign unit in a lot, and what a lot costs to learn: parts of `python -m bench docs`.
 
 Strangers: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
 lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
 knows from what distribution strangers are drawn (the likelihood ratio of that against the lot's; the distribution is
-taken from the whole calibrations of the strangers of all other draws), and one that knows each stranger's map.
+taken from the whole calibrations of the foreign units of all other draws), and one that knows each such unit's map.
 
 Cost: the units are simulated from physics, each for itself: copies of a few with noise of their own would be as many
 clusters, and what was measured were the search for these. Each number of units has a process of its own, so that its
@@ -80,7 +80,7 @@ def ratio_test(
     Args:
         prior: The lot; of clusters the first.
         own, strange: Short runs.
-        known: Whole calibrations of other strangers, which tell the distribution of theirs.
+        known: Whole calibrations of other foreign units, which determine the distribution of theirs.
     """
     mean, covariance = prior.means[0], prior.covariances[0]
     short = [_sums(prior, units) for units in (own, strange)]

@@ -150,7 +150,7 @@ def seen(data: TrainingData) -> UnitMeans:
 
 
 def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:
-    """Probability that a test which knows a stranger's map refuses it from its short run (Neyman and Pearson).
+    """Probability that a test which knows a foreign unit's map refuses it from its short run (Neyman and Pearson).
 
     Args:
         prior: The lot.

@@ -413,7 +413,7 @@ def _strangers(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def section(record: dict[str, Any]) -> str:
-    """The section: every draw, what a run shows of a stranger, and what learning costs."""
+    """The section: every draw, what a run shows of a foreign unit, and what learning costs."""
     draws = record["draws"]
     parts = [_HEAD, _coverage(draws)]
     for seed, cases in draws.items():
@@ -423,7 +423,7 @@ def section(record: dict[str, Any]) -> str:
 
 
 def write_page(docs: Path, part: dict[str, Any]) -> None:
-    """Adds a draw, or replaces what is known of strangers or of speed, and makes the section anew."""
+    """Adds a draw, or replaces what is known of foreign units or of speed, and makes the section anew."""
     record = recorded(docs, "lot-prior") or {"draws": {}}
     draws = dict(sorted({**record["draws"], **part.pop("draws", {})}.items()))
     write(docs, "lot-prior", record | part | {"draws": draws}, section)

@@ -483,7 +483,7 @@ def check_header(model: Model, image: Image, name: str, header: str) -> Iterator
         "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
         "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
         "N_CHANNELS": 1 + len(model.channels()),
-        # 13 pointers, number of stand-ins; neither magic nor arithmetic and length
+        # 13 pointers, number of fallback models; neither magic nor arithmetic and length
         f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 11),
     }  # fmt: skip
     if image.numeric == "q31":

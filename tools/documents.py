@@ -84,7 +84,7 @@ def agrees(printed: str, wanted: list[str]) -> bool:
 def run(page: Path, timed: Callable[[Step, float], None] = lambda step, seconds: None) -> Iterator[str]:
     """What is wrong with a page: one text for each command that prints or ends otherwise.
 
-    Missing programs are told as `skipped: ...`; `timed` is told how long each command took, in s.
+    Missing programs are reported as `skipped: ...`; `timed` is given how long each command took, in s.
     """
     with tempfile.TemporaryDirectory() as folder:
         work = _copy(Path(folder))

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Results whose objects are told in the tables of another result on the page.
+#: Results whose objects are reported in the tables of another result on the page.
 TOLD_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
 #: Where FORMAT.md has the table of a result's fields.
 PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)

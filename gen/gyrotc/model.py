@@ -130,7 +130,7 @@ class Rules(_Frozen):
         start_dph: Nothing is known of the slope.
         beyond_dph_per_c, beyond_dph_per_c_per_min: For each C and C/min beyond the envelope.
         fallback_dph: About the constant correction.
-        none_dph: Of the bias itself, before anything is believed.
+        none_dph: Of the bias itself, before any reading is accepted.
         between_dph: Of the constant from power-on to power-on; part of every cell.
         noise_deg_per_sqrt_h: Angle random walk of the rate.
         correlation_s: Correlation time of the error of the compensated bias, s.
@@ -239,10 +239,10 @@ class Term(_Frozen):
 
 
 class Guard(_Frozen):
-    """What is believed of an auxiliary channel, in its unit; times in s.
+    """What is accepted of an auxiliary channel, in its unit; times in s.
 
-    Beyond `low` ... `high` the edge is taken. A change is believed up to `max_step`, and `max_rate_per_min` for the
-    time since the last reading that was believed; anything else must agree with itself for `agree_s`, and so must the
+    Beyond `low` ... `high` the edge is taken. A change is accepted up to `max_step`, and `max_rate_per_min` for the
+    time since the last reading that was accepted; anything else must agree with itself for `agree_s`, and so must the
     first readings. A reading that stays the same for `stuck_s` is none (0: never). After `missing_s` without enough
     readings `fallback` stands for the channel.
     """
@@ -399,7 +399,7 @@ class Model(_Frozen):
     def network_dph(
         self, network: Network, temperature_c: ArrayLike, slope_c_per_min: ArrayLike
     ) -> NDArray[np.float64]:
-        """One network alone, as a stand-in is: float64, deg/h; inputs as for the map."""
+        """One network alone, as a fallback model is: float64, deg/h; inputs as for the map."""
         return self._network_dph(network, self.normalise(temperature_c, slope_c_per_min))
 
     def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:

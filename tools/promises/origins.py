@@ -41,7 +41,7 @@ def unexplained_numbers(root: Path) -> Iterator[str]:
 
 
 def _python(text: str) -> Iterator[tuple[str, int, bool]]:
-    """Name, line, and whether its origin is told, of every constant of a module."""
+    """Name, line, and whether its origin is reported, of every constant of a module."""
     lines = text.splitlines()
     body = ast.parse(text).body
     for node, after in zip(body, [*body[1:], None], strict=True):

@@ -242,7 +242,7 @@ def _of_means(*evaluations: Evaluation | None) -> float | None:
 
 
 def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
-    """How far the maps lie apart where both were calibrated, deg/h; None where nothing is common.
+    """How far the maps differ where both were calibrated, deg/h; None where nothing is common.
 
     Args:
         of_means: What two means differ by although nothing moved; it stands in where a map states no uncertainty.

@@ -24,7 +24,7 @@ from .limits import Limits, held_against
 __all__ = ["check_budget", "check_figures", "check_limits"]
 
 _EXPECTED = "what gyrotc build wrote; build it again"
-_ROUNDING = 1e-9  # relative: of sums in another order, far below any digit that is told
+_ROUNDING = 1e-9  # relative: of sums in another order, far below any digit that is reported
 
 
 def check_figures(evaluation: Evaluation, where: str) -> None:

@@ -37,7 +37,7 @@ _UNSEEN_TO_FLOOR = 3.0  # below it most of what is left is noise, whatever train
 _WEIGHTS_TO_RANGE = 10.0  # times the swing: a digit of the correction is then lost to cancelling
 _LEAST_COVERAGE = 0.25  # below it three quarters of the envelope are interpolation
 _OUTLIER_SIGMAS = 6.0  # once in 5e8 normal runs
-_OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not told
+_OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not reported
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
 _OF_TRAINING = (
     "does_not_generalise",

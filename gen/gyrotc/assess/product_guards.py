@@ -44,8 +44,8 @@ class ProductGuard(BaseModel):
     range: Annotated[tuple[_Value, _Value], BeforeValidator(_as_tuple), AfterValidator(_ascending)] | None = (
         None
     )
-    step: _Change = None  # believed from one reading to the next ...
-    rate_per_min: _Change = None  # ... and this much more a minute since the last one that was believed
+    step: _Change = None  # accepted from one reading to the next ...
+    rate_per_min: _Change = None  # ... and this much more a minute since the last one that was accepted
     agree_s: _Seconds = None  # how long readings must agree at start, after a jump, after a loss
     stuck_s: _Seconds = None  # how long a reading may stay the same; 0: for ever
     missing_s: Annotated[float, Field(gt=0.0, le=1e6)] | None = None  # how long it may be missing

@@ -96,8 +96,8 @@ class SearchRule:
         needed_d: Signal-to-noise ratio that is found in 95 % of cases at a familywise level of 1 % (docs/diagnosis.md).
         width: About one point of the grid at a value of the parameter, for recordings that span some C.
         step: Step of the derivative to the parameter, in its unit; None: 2 % of its value.
-        twice: It may be there twice, with parameters far apart.
-        imitates: Whether a cause that is found is compared with it: from which d the two can be told apart.
+        twice: It may be there twice, with parameters far from one another.
+        imitates: Whether a cause that is found is compared with it: from which d the two can be distinguished.
         planned: Whether a profile without rates says anything of it.
         shown: Values of `over` at which it stands for itself in a plan.
         rival_every: A plan looks at one point in this many of its grid as a rival.

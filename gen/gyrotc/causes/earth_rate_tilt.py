@@ -1,7 +1,7 @@
 """Earth rate through thermal twist of the fixture: an east axis turns out of east with temperature.
 
 An east axis that is twisted by psi about the vertical and tilted by theta towards north sees
-Omega (cos(lat) psi + sin(lat) theta): 5e-5 deg/h for each arcsec at 45 degrees. On one axis it cannot be told
+Omega (cos(lat) psi + sin(lat) theta): 5e-5 deg/h for each arcsec at 45 degrees. On one axis it cannot be determined
 from the static map, which holds it; it is a simulation of the bench, with nothing to fit.
 """
 

@@ -56,7 +56,7 @@ _PERIOD = Parameter("period_c", "C", 3.0, 60.0)
 
 
 def _grid(reach: Reach) -> list[Values]:
-    """Even in waves over the range: from 0.7 of it on a wave is no longer told from the map."""
+    """Even in waves over the range: from 0.7 of it on a wave is no longer distinguished from the map."""
     longest = min(_PERIOD.high, 0.7 * reach.span_c)
     if longest <= _PERIOD.low:
         return []

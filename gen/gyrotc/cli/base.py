@@ -40,7 +40,7 @@ __all__ = [
     "time_left",
 ]
 
-_SILENT_S = 2.0  # before a time left is told
+_SILENT_S = 2.0  # before a time left is reported
 
 Stages = Sequence[tuple[str, float]]
 """How the text of a stage begins, and its share of the time; a later text never tells less than an earlier one."""
@@ -146,7 +146,7 @@ app = typer.Typer(
 
 
 class _Loudness:
-    """How much is told, for this process."""
+    """How much is reported, for this process."""
 
     quiet = False
     verbose = False
@@ -365,10 +365,11 @@ def _main(
         ),
     ] = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Tell nothing but what went wrong; also after the command.")
+        bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Tell every stage with its time on stderr; also after it.")
+        bool,
+        typer.Option("--verbose", "-v", help="Print every stage with its time on stderr; also after it."),
     ] = False,
 ) -> None:
     _Loudness.quiet, _Loudness.verbose = quiet, verbose

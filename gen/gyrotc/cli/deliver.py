@@ -68,7 +68,7 @@ def export(
     for a control unit (ASAP2 A2L and its values as ASAM CDF) or any program (CSV, JSON); a unit of co-simulation
     (FMU, FMI 3.0) with the same C inside.
 
-    What the other form loses against the map is told, and stands in the file.
+    What the other form loses against the map is reported, and stands in the file.
 
     Example: gyrotc export result --format px4 --out gyro.params
     """

@@ -62,7 +62,7 @@ def fleet(
     lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Many serials: read, fit, emit and check each; one summary, and those that stand apart.
+    """Many serials: read, fit, emit and check each; one summary, and those that are outliers.
 
     What is done is not done again, and one that fails does not stop the others.
 
@@ -166,11 +166,11 @@ def _tell_comparison(summary: FleetSummary) -> None:
     from ..pages.words import words
 
     for reason in summary.apart:
-        tell(f"stands apart: {reason.name}: {reason.text}")
+        tell(f"outlier: {reason.name}: {reason.text}")
     named = {reason.name for reason in summary.apart}
     for outlier in (outlier for outlier in summary.outliers if outlier.name not in named):
         tell(
-            f"stands apart: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
+            f"outlier: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
             f"axis {outlier.median:.3g} ({outlier.sigmas:.0f} robust standard deviations)"
         )
     for copy in summary.copies:

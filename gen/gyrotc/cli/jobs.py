@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from ..jobs.build import Built
     from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
 
-_RARE = 0.01  # the familywise level of the search: rarer statistics are told
+_RARE = 0.01  # the familywise level of the search: rarer statistics are reported
 
 
 def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
@@ -128,7 +128,7 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
         odds = ", ".join(f"{name} {share:.0%}" for name, share in cause.probabilities.items())
         yield f"  probabilities: {odds}"
     if cause.separate_by:
-        yield f"  to tell them apart: {cause.separate_by}"
+        yield f"  to separate them: {cause.separate_by}"
     if cause.repair:
         yield f"  repair, a line of dataset.toml: {cause.repair}"
     if cause.gain:

@@ -99,7 +99,7 @@ def _quiet_start() -> None:
 
 
 def _flushed(status: int) -> int:
-    """What is still to be printed is: the command's status, or that of what went wrong, which is told once."""
+    """What is still to be printed is: the command's status, or that of what went wrong, which is reported once."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()
@@ -135,7 +135,7 @@ def _without_warnings() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
         os.environ.setdefault("PYTHONWARNINGS", "ignore")
-        logging.disable()  # of Dask: what becomes of a gyro is told by the fleet
+        logging.disable()  # of Dask: what becomes of a gyro is reported by the fleet
 
 
 _COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`

@@ -42,7 +42,7 @@ def limits_of(texts: Sequence[str]) -> dict[str, float]:
 
 
 def pair_of(text: str | None) -> tuple[str, str] | None:
-    """Reads `cause,cause`: two causes that are to be told apart.
+    """Reads `cause,cause`: two causes that are to be distinguished.
 
     Raises:
         InputError: Not two different names.
@@ -69,7 +69,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
     for hard in result.hard_to_separate:
         a, b = hard.pair
         never = " or never" if hard.d > _NEVER else ""
-        yield f"{a} and {b} are told apart only from d = {hard.d:.0f}{never}; add {hard.add}"
+        yield f"{a} and {b} are separated only from d = {hard.d:.0f}{never}; add {hard.add}"
     yield _accuracy(result)
     if result.shortest:
         yield from _shortest(result.shortest)
@@ -80,7 +80,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
 
 
 def _places(found: Sequence[ThermometerPlace]) -> Table:
-    title = "Where a further thermometer would tell most"
+    title = "Where a further thermometer would add most"
     table = _table(title, "node", "apart, C", "not seen so far, C", "shows from, deg/h/C")
     for place in found:
         limit = "never" if place.limit_dph_per_c is None else f"{place.limit_dph_per_c:.2g}"
@@ -128,7 +128,7 @@ def _separability(result: Plan) -> Table:
 
     rows = result.separability
     others = [i for i in CATALOGUE if any(i in row.d for row in rows)]
-    title = "d at which a cause (row) is told from another (column); detection itself takes d = 6"
+    title = "d at which a cause (row) is separated from another (column); detection itself takes d = 6"
     table = _table(title, "cause", *(CATALOGUE[o].words.short for o in others))
     for row in rows:
         at = "" if row.value is None else f" {row.value:.4g}"
@@ -168,7 +168,7 @@ def _shortest(found: Shortest) -> Iterator[str]:
 
 def _additions(found: Additions) -> Iterator[str]:
     first, *further = found.runs
-    yield f"{' and '.join(found.pair)}: told apart from d = {first.d:.1f} as it is; with one run more:"
+    yield f"{' and '.join(found.pair)}: separated from d = {first.d:.1f} as it is; with one run more:"
     for run in further[:3]:
         yield f"  {run.profile} ({run.hours:g} h): from d = {run.d:.1f}"
 
@@ -194,7 +194,7 @@ def plan(
         ),
     ] = None,
     add_thermometer: Annotated[
-        bool, typer.Option("--add-thermometer", help="Where a further thermometer would tell most.")
+        bool, typer.Option("--add-thermometer", help="Where a further thermometer would add most.")
     ] = False,
     lot: LotOption = None,
     unit: Annotated[
@@ -216,7 +216,7 @@ def plan(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Say what a programmed profile will be able to tell, before it is run; with a lot, the shortest programme.
+    """Predict what a programmed profile can detect, before it is run; with a lot, the shortest programme.
 
     Example: gyrotc plan paper --require hysteresis=5e-5 --separate hysteresis,turn_on_offset
     Example: gyrotc plan paper --lot lot.json --require accuracy=2e-4 --out programme

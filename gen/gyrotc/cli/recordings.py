@@ -81,7 +81,7 @@ def import_(
     ] = None,
     trust_units: TrustUnitsOption = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only tell how the files would be read.")
+        bool, typer.Option("--dry-run", help="Only show how the files would be read.")
     ] = False,
     json_file: JsonOption = None,
 ) -> None:
@@ -273,7 +273,7 @@ def check(
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Tell everything that is wrong or doubtful about recordings, at once; also while they still grow.
+    """Report all errors and warnings of recordings at once, also while they still grow.
 
     Example: gyrotc check recordings --plots check.html
     """

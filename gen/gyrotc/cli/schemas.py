@@ -67,7 +67,7 @@ def tables(kind: type[BaseModel], told: Collection[type[BaseModel]] = ()) -> str
     """A table of fields for a result, and one for each object inside it, in Markdown.
 
     Args:
-        told: Results whose tables stand on the same page: their objects are not told again.
+        told: Results whose tables stand on the same page: their objects are not reported again.
     """
     seen: dict[type[BaseModel], None] = {kind: None}
     above = {inner for one in told for inner in _in_order({one: None})}

@@ -5,7 +5,7 @@ recognisable, and without a meaning to whatever reads the result. Names of colum
 findings come from whoever made a recording, so all of them are foreign.
 
 The templates for C take nothing but whole numbers, words and `CText`, so a forgotten filter stops the emission
-instead of writing a stranger's code; those for HTML escape, and take as it is only what `checked_svg` returned.
+instead of writing a foreign unit's code; those for HTML escape, and take as it is only what `checked_svg` returned.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Both are made of the same rows, so that a figure has the same digits in both.
 
-What is missing is told before anything is written. Figures are those of the page, digit by digit.
+What is missing is reported before anything is written. Figures are those of the page, digit by digit.
 """
 
 from __future__ import annotations

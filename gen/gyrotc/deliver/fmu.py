@@ -224,7 +224,7 @@ def _xml(root: Element) -> bytes:
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:
-    """The description comes first, and as it is: so it can be told who wrote the file (`store/files.py`)."""
+    """The description comes first, and as it is: so it can be determined who wrote the file (`store/files.py`)."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for k, (name, data) in enumerate(files.items()):

@@ -231,7 +231,7 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
 
 
 def _believed(gains: Gains, causes: tuple[Refined, ...]) -> bool:
-    """Whether no cause is larger than is believed: the third one comes from the search, which asks for no size."""
+    """Whether no cause is larger than is accepted: the third one comes from the search, which asks for no size."""
     return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate))
 
 
@@ -287,7 +287,7 @@ _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
 
 
 def overlap(gains: Gains, cause: Refined, rivals: list[str]) -> dict[str, float]:
-    """d from which a cause can be told from each rival: √(10/(1 − R²)), R² what the rival can mimic of it."""
+    """d from which a cause can be distinguished from each rival: √(10/(1 − R²)), R² what the rival can mimic of it."""
     search = gains.search
     total = gains.whiten(_fitted(gains, cause))
     own = total - gains.map_q @ (gains.map_q.T @ total)

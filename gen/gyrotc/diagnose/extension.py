@@ -1,6 +1,6 @@
 """The compensation model extended with the named causes: terms, overtones, and whether it is shipped.
 
-States beside a map are one rung more on the ladder of corrections (`train.selection`): every stretch of thermal history
+States beside a map are one candidate more in model selection (`train.selection`): every stretch of thermal history
 is left out in turn, and the rung is taken where it is clearly better than the rung that the ladder would emit
 without states, and better than a constant. Causes and their parameters are those of all training runs, as the
 parameters of the evidence process are; the map beside them is fitted anew without each stretch.
@@ -67,7 +67,7 @@ __all__ = [
 def stand_ins_of(
     plain: Model, samples: TrainingData, runs: Sequence[Played], effects: Sequence[Effect]
 ) -> dict[str, StandIn]:
-    """A stand-in for the term of each channel, by channel; none where none can be fitted.
+    """A fallback model for the term of each channel, by channel; none where none can be fitted.
 
     Args:
         plain: The model with its map, without terms.
@@ -129,7 +129,7 @@ class Refitting:
     def fit(
         self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None
     ) -> Fit:
-        """The map beside the effects (`beside`: as if there were any); fits on all samples are remembered."""
+        """The map beside the effects (`beside`: as if there were any); fits on all samples are cached."""
         whole = kept is None or all(m.all() for m in kept)
         rate = not (self.single_cycle and (bool(effects) if beside is None else beside))
         for fitted_beside, with_rate, fitted in self._fits:
@@ -211,7 +211,7 @@ class Shipping:
 
     Attributes:
         shipped: Effects of the extended model.
-        rung: What the ladder would emit without them.
+        rung: What model selection would emit without them.
         left_out: What was left out, in words.
         before_dph, after_dph: RMS over these stretches without and with the effects, all stretches counting alike;
             None where nothing can be left out, or nothing was to be added.
@@ -253,7 +253,7 @@ def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
 
 
 def _ladder(refitting: Refitting, effects: Sequence[Effect], like: Ladder | None) -> Ladder:
-    """Every rung beside the effects, without each stretch of history (those of `like`, where it is given)."""
+    """Every candidate beside the effects, without each stretch of history (those of `like`, where it is given)."""
     data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
     scaling = scaling_of(data)
     try:

@@ -6,7 +6,7 @@ wave adds. Such a model fits, and is no explanation; on other temperatures it go
 
 All at the likeliest noise colour. A gain is twice the difference of log-likelihood to the map alone; for a
 change of the map's input the same number of map functions is fitted before and after (equal flexibility),
-on the blocks where the changed input is known. A cause that would have to be larger than is believed (`SizeLimit`)
+on the blocks where the changed input is known. A cause that would have to be larger than is accepted (`SizeLimit`)
 gains nothing.
 """
 
@@ -36,7 +36,7 @@ _MOST_SPREAD = (
 
 
 class SizeLimit:
-    """The largest effect that is believed for one search.
+    """The largest effect that is accepted for one search.
 
     Attributes:
         spread_dph: Largest standard deviation of what a cause adds to the block means, deg/h.
@@ -58,7 +58,7 @@ class SizeLimit:
         return np.asarray(columns.std(axis=0) * self.noise / max(self.spread_dph, 1e-300))
 
     def allows(self, contribution: FloatArray) -> bool:
-        """Whether a fitted effect, deg/h, shape (N,), is believed."""
+        """Whether a fitted effect, deg/h, shape (N,), is accepted."""
         return bool(contribution.std() <= self.spread_dph)
 
 
@@ -109,7 +109,7 @@ class _Taken:
     shares: FloatArray
 
     def allows(self, at: slice, weights: FloatArray) -> bool:
-        """Whether they are still believed beside other columns with these weights."""
+        """Whether they are still accepted beside other columns with these weights."""
         left = self.weights - self.less[:, at] @ weights
         return float(((self.shares * left) ** 2).sum()) <= 1.0
 
@@ -224,7 +224,7 @@ class Gains:
             yield from self._on(base, (base.candidate,))
 
     def _gain(self, base: _Base, at: slice, before: FloatArray) -> float:
-        """What one column or two add; 0 where they have nothing of their own, or no size that is believed."""
+        """What one column or two add; 0 where they have nothing of their own, or no size that is accepted."""
         own, a = base.gram[at, at], base.a[at]
         if a.size == 1:
             if own[0, 0] <= _INDEPENDENT * before[0]:
@@ -278,7 +278,7 @@ state with another parameter."""
 
 
 def makes_sense(point: Point) -> bool:
-    """Pairs that make sense: one shape of the map; two of a kind only where that may be, and far apart."""
+    """Pairs that make sense: one shape of the map; two of a kind only where that may be, and far from one another."""
     a, b = point.members
     if a.id != b.id:
         return not all(CATALOGUE[m.id].family == "static_map" for m in point.members)

@@ -45,7 +45,7 @@ class Analysis:
         attribution: What was found.
         noise: Findings of the family `noise`, from screens and from the declaration.
         limits: Detection limits by cause.
-        separations: For every cause found, d from which it can be told from each rival.
+        separations: For every cause found, d from which it can be distinguished from each rival.
         ensemble: Measured against simulated residuals.
         after: The search with the causes found taken out.
         extended: Measured against simulated residuals when the simulation has causes and noise as found; None

@@ -157,7 +157,7 @@ def _key(candidate: Candidate) -> _Key:
 
 
 def sized(candidate: Candidate) -> bool:
-    """Whether a cause has amplitudes, which are believed up to a size."""
+    """Whether a cause has amplitudes, which are accepted up to a size."""
     return candidate.role == "columns" and terms.CATALOGUE[candidate.id].kind != "static"
 
 
@@ -190,7 +190,7 @@ class _Fit:
         return self._cache[key]
 
     def energy(self, members: list[Candidate]) -> float:
-        """Energy of the data that the members explain beyond the map; 0 where one would be larger than is believed."""
+        """Energy of the data that the members explain beyond the map; 0 where one would be larger than is accepted."""
         white = [self.white(m) for m in members]
         q = orthonormal(*white)
         if not self._believed(members, white):

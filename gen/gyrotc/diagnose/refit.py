@@ -148,7 +148,7 @@ class Played:
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
     def outcome(self, effect: Effect) -> TermOutcome:
-        """What a term makes of every correction; the last few are remembered."""
+        """What a term makes of every correction; the last few are cached."""
         for known, outcome in self._outcomes:
             if known == effect:
                 return outcome

@@ -46,7 +46,7 @@ _TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
 """How much of a difference of the criterion counts in odds: so that one other explanation at the edge of what counts as
 equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
 
-_SURE = 0.9  # probability from which one cause is told as the explanation
+_SURE = 0.9  # probability from which one cause is reported as the explanation
 _TOLD = 0.01  # smaller ones are not worth a line
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
@@ -58,7 +58,7 @@ class Rival:
 
     Attributes:
         distance: How far its criterion is behind, 0 is equal.
-        odds: Against the chosen one, where simulation has told them; None: those of the distance.
+        odds: Against the chosen one, where simulation has given them; None: those of the distance.
     """
 
     id: str
@@ -68,7 +68,7 @@ class Rival:
 
 
 def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
-    """Of the causes in one place, by id, the chosen one first; those below 1 in 100 are not told."""
+    """Of the causes in one place, by id, the chosen one first; those below 1 in 100 are not reported."""
     odds = {chosen: 1.0}
     for rival in ranked:
         if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause

@@ -3,7 +3,7 @@
 Where every temperature is visited only two or three times, each time at another rate, a map of (T, dT/dt)
 can imitate any memory in the runs that it is fitted to and fails on the next. So the map has no dT/dt here,
 and one or two states stand beside it, by an information criterion that counts independent blocks: first-order
-states, which every package has, unless plays are clearly better. What explains the recordings as well is told.
+states, which every package has, unless plays are clearly better. What explains the recordings as well is reported.
 
 A static dT/dt, f(T) + g(T) dT/dt and flows that saturate, is a rival like any other: memory is named only where it
 is clearly better than every one of them, and never where the temperature does not turn. States that are not named may

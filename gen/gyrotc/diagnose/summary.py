@@ -160,7 +160,7 @@ _MISFITS = ((0.05, 0.5), (0.01, 0.8))
 """p-value of what is left (`Misfit.worst`), and share of the structure below which the causes then explain too little.
 
 However clear the remainder: where four fifths are a cause and no other shape does better, it is that cause in another
-form than the catalogue's (relays in place of a play), and the remainder is told beside it.
+form than the catalogue's (relays in place of a play), and the remainder is reported beside it.
 """
 
 _REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much

@@ -78,7 +78,7 @@ ORDER BY axis
 def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     """Adds what a fleet has made and the catalogue does not have yet; returns how many calibrations that are.
 
-    Gyros under one serial are not told apart by it, so none of them is entered.
+    Gyros under one serial are not distinguished by it, so none of them is entered.
 
     Args:
         out: The fleet's folder; each entry's result lies in the folder of its name.
@@ -149,7 +149,7 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
     folder = out / entry.name
     if not (
         folder / ENTRY
-    ).is_file():  # a name with bytes that are no character: it is told, but lies elsewhere
+    ).is_file():  # a name with bytes that are no character: it is reported, but lies elsewhere
         return 0
     unit = unit_of(folder)
     model, budget = unit.model, unit.budget

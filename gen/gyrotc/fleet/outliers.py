@@ -108,7 +108,7 @@ def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
 
 
 def _shown(runs: Sequence[ComparedRun]) -> int:
-    """The run that is drawn if the gyro stands apart: one much noisier than its others, else the likeliest step."""
+    """The run that is drawn if the gyro is an outlier: one much noisier than its others, else the likeliest step."""
     noise = np.array([run.noise_dph for run in runs])
     if noise.max() > NOISY_RUN * median(noise):
         return int(np.argmax(noise))
@@ -203,7 +203,7 @@ def spread(entries: Sequence[FleetUnit], figure: str) -> Spread | None:
 
 
 def outliers(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
-    """Serials that stand apart from those of their axis, each with each figure that does, the farthest first."""
+    """Serials that are outliers among those of their axis, each with each figure that does, the farthest first."""
     kinds: dict[str | None, list[FleetUnit]] = defaultdict(list)
     for entry in entries:
         kinds[entry.axis].append(entry)

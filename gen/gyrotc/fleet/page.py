@@ -28,7 +28,7 @@ _COLUMNS = (
     "centers", "table_bytes", "error_bound_dph", "findings", "model_hash", "reason",
 )  # fmt: skip
 
-_PICTURES = 60  # of gyros that stand apart; of more, the words say enough
+_PICTURES = 60  # of outliers; of more, the words say enough
 
 
 def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:

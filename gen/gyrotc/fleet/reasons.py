@@ -1,4 +1,4 @@
-"""Why a gyro stands apart from its lot, in words: each axis is compared with its own kind (x with x).
+"""Why a gyro is an outlier in its lot, in words: each axis is compared with its own kind (x with x).
 
 A lot of gyros that go through one programme of temperatures shows what is usual. A gyro is named where its distance
 from the median of its kind is beyond five robust standard deviations; the reason is what takes that distance away.
@@ -20,9 +20,9 @@ __all__ = ["reasons", "with_reasons"]
 
 
 _LEAST = 8  # gyros of a kind; fewer do not say what is usual
-_FAR = 5.0  # robust standard deviations beyond which one stands apart
+_FAR = 5.0  # robust standard deviations beyond which one is an outlier
 _NEAR = 3.0  # and within which a supposed fault must bring it back
-_LEAST_BINS = 4  # cells of 5 C: a shift of a shorter curve is not told from an offset
+_LEAST_BINS = 4  # cells of 5 C: a shift of a shorter curve is not distinguished from an offset
 _LEAST_SHIFT_C = 1.0  # thermometers of a kind agree to this
 _LEAST_SCALE = 1.5  # factor: less is the scatter of a lot
 _LEAST_NOISE = 1.5  # times the usual noise: less is the scatter of a lot
@@ -60,7 +60,7 @@ class _Kind:
         return float(max(np.sqrt(np.mean(level**2)), np.sqrt(np.mean(shape**2))))
 
     def factors(self) -> FloatArray:
-        """Least-squares factor of each curve against the usual one; 0 where it cannot be told."""
+        """Least-squares factor of each curve against the usual one; 0 where it cannot be determined."""
         both = np.isfinite(self.curves) & self.seen
         usual = np.where(both, self.median, 0.0)
         power = (usual**2).sum(axis=1)
@@ -69,7 +69,7 @@ class _Kind:
 
 
 def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[Reason]:
-    """The likeliest reason of every gyro that stands apart, in the order of the entries."""
+    """The likeliest reason of every gyro that is an outlier, in the order of the entries."""
     found: dict[str, Reason] = {}
     by_name = {entry.name: entry for entry in entries}
     axis = {entry.name: entry.axis for entry in entries}

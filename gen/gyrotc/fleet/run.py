@@ -1,6 +1,6 @@
 """A fleet: units that are done stay, the rest is done on processes of this machine or on a Dask cluster.
 
-What is done is told by the results themselves. So a job of an array can do a share of the units and write nothing
+What is done is reported by the results themselves. So a job of an array can do a share of the units and write nothing
 else, and a call that gathers finds what all of them did.
 """
 
@@ -44,7 +44,7 @@ _NO_RESULT = "no share has made it: give its share again, which says why where i
 def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
     """Every task's number with its entry, as they come.
 
-    A process that dies takes its pool with it. Whose process it was is not told; the pool hands tasks out in their
+    A process that dies takes its pool with it. Whose process it was is unknown; the pool hands tasks out in their
     order, so that it is among the first that are not done: these are done each in a process of its own, the rest
     in a new pool.
     """

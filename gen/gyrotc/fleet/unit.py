@@ -150,7 +150,7 @@ def made_before(task: Task) -> FleetEntry | None:
 
 
 def do_unit(task: Task) -> FleetEntry:
-    """Does the job. Whatever goes wrong is told in the entry: it concerns this serial alone."""
+    """Does the job. Whatever goes wrong is reported in the entry: it concerns this serial alone."""
     try:
         if task.unit.refused:
             raise InputError(task.unit.name, task.unit.refused)

@@ -40,7 +40,7 @@ class _Held:
     environment: str
     samples: TrainingData
     seen: NDArray[np.bool_]
-    from_s: float | None = None  # where its means begin: with the run, also where nothing is believed yet
+    from_s: float | None = None  # where its means begin: with the run, also where nothing is accepted yet
 
 
 def compare(

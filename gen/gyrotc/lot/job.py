@@ -245,4 +245,4 @@ def _told(names: Sequence[tuple[str, str]], found: Learned) -> str:
     if len(size) > 1:
         text += f"; {len(size)} clusters of {', '.join(map(str, size))} units"
     apart = [name for (name, _), kept in zip(names, found.inside, strict=True) if not kept]
-    return text + (f"; set aside, for they stand apart: {', '.join(apart)}" if apart else "")
+    return text + (f"; excluded as outliers: {', '.join(apart)}" if apart else "")

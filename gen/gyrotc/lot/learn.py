@@ -310,7 +310,7 @@ class Learned:
         state: Model of the units in it.
         center_dph, unit_dph: Zero and unit of its coefficients, deg/h.
         scale: By what its covariances are multiplied (cross-validation).
-        inside: Units that it is made of, shape (units,); the others stand apart.
+        inside: Units that it is made of, shape (units,); the others are outliers.
         p_values: Of each unit under the lot without it.
         left_out_dph: RMS of what the lot leaves of units that it has not seen, and what their own mean leaves, deg/h.
     """
@@ -349,7 +349,7 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
     p, scale, apart = _left_out(sums, state)
     if apart.any() and (~apart).sum() >= LEAST_UNITS:
         inside = ~apart
-        say("without those that stand apart")
+        say("without the outliers")
         state = _chosen(sums.select(inside), basis, say)
         again, scale, _ = _left_out(sums.select(inside), state)
         p[inside] = again
@@ -476,7 +476,7 @@ def _told(cluster: NDArray[np.int64]) -> float:
 
 
 def _left_out(sums: UnitSums, state: LotState) -> tuple[FloatArray, float, NDArray[np.bool_]]:
-    """p-value of each unit under the lot without its fold, the inflation that they ask for, and who stands apart."""
+    """p-value of each unit under the lot without its fold, the inflation that they ask for, and who is an outlier."""
     n = len(sums)
     folds = np.arange(n) % folds_of(n)
     found: list[tuple[FloatArray, FloatArray]] = [(np.zeros(0), np.zeros(0))] * n

@@ -96,7 +96,7 @@ class LotPrior(MapPrior):
         Args:
             samples: Cleaned samples of the unit.
             own: Their scaling.
-            serial: The unit's serial: one of the lot is told.
+            serial: The unit's serial: one of the lot is reported.
             seed: Of the Kohonen network.
             average_s: Averaging of RMS figures, s.
         """

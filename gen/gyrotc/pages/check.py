@@ -134,7 +134,7 @@ def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Pi
     """Writes the page of a check.
 
     Args:
-        pictures: Of each problem, then of each doubt.
+        pictures: Of each problem, then of each warning.
         title: Of a data set whose serial could not be read.
 
     Raises:

@@ -47,7 +47,7 @@ def temperatures(result: Plan) -> str:
 
 
 def separability_matrix(result: Plan) -> str:
-    """d from which the row's cause can be told from the column's, on a logarithmic scale of grey."""
+    """d from which the row's cause can be distinguished from the column's, on a logarithmic scale of grey."""
     rows = result.separability
     others = list(dict.fromkeys([*(row.id for row in rows), *(o for row in rows for o in row.d)]))
     d = np.array([[row.d.get(o, np.nan) for o in others] for row in rows])

@@ -323,7 +323,7 @@ _FIRST_C, _BIN_C = -90.0, 5.0  # of the curves of entries
 
 
 def lot_picture(entries: Sequence[FleetEntry], apart: set[str]) -> str | None:
-    """RMS of every gyro before and after, those that stand apart ringed; None for fewer than two."""
+    """RMS of every gyro before and after, those that are outliers ringed; None for fewer than two."""
     if len(entries) < 2:
         return None
     ordered = sorted(entries, key=lambda e: e.after_rms_dph or 0.0)
@@ -346,7 +346,7 @@ def lot_picture(entries: Sequence[FleetEntry], apart: set[str]) -> str | None:
 
 
 def unit_apart(known: Mapping[str, FleetEntry], reason: Reason) -> str:
-    """What shows why a gyro stands apart.
+    """What shows why a gyro is an outlier.
 
     Args:
         known: Entries with facts by name.

@@ -92,7 +92,7 @@ def limit_words(limit: str) -> str:
 
 
 def words_of_rung(id: str) -> str:
-    """A correction of the ladder."""
+    """A correction of model selection."""
     return _RUNGS.get(id, id.replace("_", " "))
 
 

@@ -151,7 +151,7 @@ def places(
 
 _AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for
 _PICTURE_POINTS = 200  # of a run: as many as a picture a few centimetres wide shows
-_HARD = 10.0  # d above which two causes count as hard to tell apart
+_HARD = 10.0  # d above which two causes count as hard to separate
 
 
 def plan(
@@ -172,7 +172,7 @@ def plan(
         seed: Draws the simulated gyro, on whose bias the limits of `cavity_lag` and `time_misalignment` depend.
         required: Detection limits to reach, by cause, for the shortest profile.
         pair: Two causes; further runs are ranked by how they part them.
-        add_thermometer: Say where a further thermometer would tell most.
+        add_thermometer: Say where a further thermometer would add most.
         progress: Called with what is being done.
 
     Raises:

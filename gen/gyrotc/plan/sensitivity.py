@@ -1,9 +1,9 @@
-"""Planned runs: detection limits, accuracy of the map, and which causes can be told apart.
+"""Planned runs: detection limits, accuracy of the map, and which causes can be distinguished.
 
 Everything follows from whitened inner products of map and signatures, one matrix for each run: those of a
 choice of runs are their sum.
 
-d from which A can be told from B: √(10/(1 − R²)), R² the share of A's signature that B can mimic beside the
+d from which A can be distinguished from B: √(10/(1 − R²)), R² the share of A's signature that B can mimic beside the
 map (docs/diagnosis.md).
 """
 
@@ -269,7 +269,7 @@ _LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
 
 @dataclass(frozen=True)
 class Row:
-    """A cause at one value of its parameter, and d from which it can be told from every other cause."""
+    """A cause at one value of its parameter, and d from which it can be distinguished from every other cause."""
 
     id: str
     parameter: str | None

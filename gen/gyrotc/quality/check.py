@@ -1,7 +1,7 @@
 """`gyrotc check`: all errors and warnings about recordings at once.
 
-A problem is what `fit` refuses. A doubt is what it takes and a person should look at. A recording that still grows
-can be checked: its unfinished last line is left out, and that is a doubt.
+A problem is what `fit` refuses. A warning is what it takes and a person should look at. A recording that still grows
+can be checked: its unfinished last line is left out, and that is a warning.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class CheckResult:
     datasets: tuple[tuple[str | None, Dataset], ...]
 
     def lines(self) -> Iterator[str]:
-        """For a person: a line for each problem, doubt (and what to do next) and run, and one that sums up."""
+        """For a person: a line for each problem, warning (and what to do next) and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
         for doubt in self.doubts:
@@ -111,14 +111,14 @@ def check(
     earlier: Mapping[str, Model] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CheckResult:
-    """Checks a data set as `fit` would read it, and looks for what is doubtful.
+    """Checks a data set as `fit` would read it, and looks for what is suspect.
 
     Args:
         folder: The data set.
         axis: Axis of three-axis recordings, or "all".
         envelope: Temperatures and rates that the training runs should cover.
         applied: Model that was subtracted while recording, if the data set says that there was one.
-        trust_units: Values that contradict their units are a doubt, not a problem.
+        trust_units: Values that contradict their units are a warning, not a problem.
         earlier: Models of an earlier calibration of this gyro, by axis ("" where the recordings have one rate).
 
     Raises:
@@ -160,7 +160,7 @@ def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:
 
 
 def _of_axes(doubt: Doubt, seen: Sequence[str | None], axes: int) -> Doubt:
-    """Says for which axes a doubt holds, where that is not for all."""
+    """Says for which axes a warning holds, where that is not for all."""
     if len(seen) == axes:
         return replace(doubt, axes=tuple(seen))
     return replace(doubt, where=f"{doubt.where}, axis {', '.join(map(str, seen))}", axes=tuple(seen))

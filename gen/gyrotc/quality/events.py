@@ -4,7 +4,7 @@ Each has its run, its time and size with 95 % limits where they can be known, wh
 leaves it out. A step or a burst that is left in looks like several causes.
 
 A unit with hysteresis or a late temperature has another curve on every branch. A branch that ends looks like a gain
-that changed, and a run with few branches does not tell the two apart; evidence does, where they can be told.
+that changed, and a run with few branches does not separate the two; evidence does, where they can be distinguished.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ _ADVICE = {
 
 
 def advice_of(id: str) -> str:
-    """What to do next; empty where the doubt's own text says it."""
+    """What to do next; empty where the warning's own text says it."""
     return _ADVICE.get(id, "")
 
 
@@ -76,7 +76,7 @@ Envelope = tuple[tuple[float, float], tuple[float, float]]
 _COARSE_STEP_C = 0.25  # at 1 C/min a slope over 100 s then rests on fewer than seven steps
 _HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
 _STUCK_S = 60.0  # longer than any thermometer waits between two readings
-_STUCK_ROWS = 30  # and not fewer rows, so that slow loggers are not doubted
+_STUCK_ROWS = 30  # and not fewer rows, so that slow loggers are not questioned
 _LATE_S = 3.0e8  # ten years: a time since some epoch, not since power-on
 _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
 _PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample rate by more
@@ -88,7 +88,7 @@ _LINES = 20  # that are offered to be pasted: more are a fault of the recording
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """Something doubtful: a stable id, where, what, the rows, and the axes that show it."""
+    """Something suspect: a stable id, where, what, the rows, and the axes that show it."""
 
     id: str
     where: str
@@ -111,7 +111,7 @@ def where_of(file: str, from_s: float | None) -> str:
 
 
 def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
-    """Facts of a run, and the doubts that its rows alone raise."""
+    """Facts of a run, and the warnings that its rows alone raise."""
     rows = run.rows()
     f = facts_of(run, rows)
     where = where_of(f.file, f.from_s)

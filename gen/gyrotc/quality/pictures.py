@@ -1,4 +1,4 @@
-"""What the pictures of `gyrotc check --plots` show of each problem and each doubt."""
+"""What the pictures of `gyrotc check --plots` show of each problem and each warning."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Columned:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """Mean rates over temperature: of the runs that are told of, and of the others."""
+    """Mean rates over temperature: of the runs that are reported, and of the others."""
 
     told: tuple[Curve, ...]
     others: tuple[Curve, ...]
@@ -80,7 +80,7 @@ Picture = Seen | Columned | Compared | Covered
 
 
 def pictured(folder: Path, result: CheckResult) -> list[list[Picture]]:
-    """Pictures of every problem, then of every doubt, of a check of `folder`.
+    """Pictures of every problem, then of every warning, of a check of `folder`.
 
     Raises:
         InputError: A recording changed meanwhile.

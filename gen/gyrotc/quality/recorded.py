@@ -202,7 +202,7 @@ _STUCK_ROWS = 60  # that differ from the one before: fewer do not show the steps
 _FEWEST_VALUES = 10  # a channel of fewer values says nothing
 
 
-_COARSE_ROWS = 2**17  # rows that the resolution is told from
+_COARSE_ROWS = 2**17  # rows that the resolution is recognised from
 _REPEATS = 0.6  # share of rows that repeat the one before: the noise is below a third of a step
 _ONE_STEP = 1.5  # a reading that moves by less at a time moves by one step of its resolution
 

@@ -33,7 +33,7 @@ _STUCK_S = 60.0  # a thermometer that stands still for longer; readings come fas
 _STUCK_ROWS = 10  # where half of the rows differ from the one before, as many alike come once in a thousand
 _OFTEN = 0.5  # of the rows differ from the one before: else repeating is what the thermometer does
 _LONGER = 4.0  # than what else repeats in the run; holds of one programme, in which a converter waits, differ by less
-_MOST = 5  # stuck stretches of a run that are told apart from a thermometer that often repeats
+_MOST = 5  # stuck stretches of a run that are distinguished from a thermometer that often repeats
 _RELEASE = 3.0  # times the steps that rows make on ramps: the temperature went on meanwhile
 _ON_RAMPS = 0.95  # quantile of the steps
 
@@ -76,7 +76,7 @@ class _Followed:
 
 
 def thermometer_findings(dataset: Dataset) -> Iterator[dict[str, Any]]:
-    """A finding for each thermometer and run that stand apart; none of fewer than three runs."""
+    """A finding for each thermometer and run that are outliers; none of fewer than three runs."""
     names = [n for n in dataset.channels if channel_kind(n, dataset.units) == "temperature"]
     if not names or len(dataset.runs) < _LEAST_RUNS:
         return

@@ -27,12 +27,12 @@ _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
 # Of a row period, and of the rows: a clock of coarser ticks than the rows
 _COARSE, _COARSE_SHARE = 0.4, 0.05
 _EVEN_ROWS, _EVEN, _EVEN_SHARE = 400, 1.25, 0.8  # parts in which even rows stay so near a line, in units
-_TOLD = 20  # that are told: enough to see a pattern
+_TOLD = 20  # that are reported: enough to see a pattern
 _HOUR_S = 3600.0  # a change of summer time
 
 
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
-    """What is doubtful about the times of a run; `evidence` has the file, the rows as marks, and figures."""
+    """What is suspect about the times of a run; `evidence` has the file, the rows as marks, and figures."""
     inside = run.in_span(rows.time_s)
     time, temperature, at = rows.time_s, rows.temperature_c, range(len(rows))
     together: NDArray[np.bool_] = np.broadcast_to(np.True_, max(len(rows) - 1, 0))

@@ -215,7 +215,7 @@ def load(
         trust_units: Values that contradict their units are taken nevertheless.
 
     Raises:
-        InputError: Something is wrong; the first thing found is told.
+        InputError: Something is wrong; the first thing found is reported.
     """
     problems = Problems(collect=False)
     dataset = survey(
@@ -249,7 +249,7 @@ def survey(
     exam_only: bool = False,
     trust_units: bool = False,
 ) -> Dataset | None:
-    """As `load`, with problems told to `problems`.
+    """As `load`, with problems reported to `problems`.
 
     Returns:
         The data set of the runs that are in order; None if there is none.

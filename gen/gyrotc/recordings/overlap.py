@@ -1,4 +1,4 @@
-"""Runs that hold the same rows: an exam on training data is refused, rows that count twice are told."""
+"""Runs that hold the same rows: an exam on training data is refused, rows that count twice are reported."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .shared_rows import windows_in_common
 __all__ = ["shared_rows"]
 
 _PART = 2**20  # rows that are compared at once
-_MOST = 20  # stretches of two runs that are told
+_MOST = 20  # stretches of two runs that are reported
 _TOLERANCE = 2.0**-22  # relative; rows are compared as float32
 
 

@@ -1,7 +1,7 @@
 """What the values of a recording look like, compared with the units that are declared for them.
 
 Each test rests on what no gyro, no chamber and no thermometer does, not on what is usual; what merely looks odd
-passes. Values in another unit than the declared one that break none of these bounds cannot be told, and pass.
+passes. Values in another unit than the declared one that break none of these bounds cannot be detected, and pass.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ _FEWEST_CELLS = 30  # less is not judged
 _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
 _TRIAD = 0.03  # relative; how near three means come to Earth's rate by chance is of this order
 _ALONG = 0.1  # relative; a bias is that much of Earth's component
-_SMALLEST_ALONG_DPH = 1.0  # deg/h: a smaller component of Earth's rate is not told from a bias
+_SMALLEST_ALONG_DPH = 1.0  # deg/h: a smaller component of Earth's rate is not distinguished from a bias
 _RATES = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 648000.0 / np.pi}  # in deg/h
 _TIMES = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0}  # in s
 

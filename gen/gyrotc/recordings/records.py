@@ -237,7 +237,7 @@ class SharedRows:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Rows that something is told of.
+    """Rows that something is reported of.
 
     Attributes:
         file: Their file.

@@ -271,7 +271,7 @@ class At(Part):
 
 
 class Apart(Part):
-    """How far the maps lie apart where both were calibrated."""
+    """How far the maps differ where both were calibrated."""
 
     rms_dph: float = Field(description="deg/h")
     mean_dph: float = Field(description="deg/h")

@@ -115,7 +115,7 @@ class FleetUnit(Part):
         default=None, description="folder of an earlier result of the gyro that somebody had changed"
     )
     copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows")
-    apart: str | None = Field(default=None, description="why it stands apart, as in `apart` of the fleet")
+    apart: str | None = Field(default=None, description="why it is an outlier, as in `apart` of the fleet")
 
 
 class LikelyStep(Part):
@@ -191,7 +191,7 @@ class Spread(Part):
 
 
 class FleetOutlier(Part):
-    """A figure of a gyro that stands apart from those of its axis."""
+    """A figure of a gyro that is an outlier among those of its axis."""
 
     name: str = Field(description="of the gyro")
     figure: str = Field(description="name of the figure, a field of `FleetUnit`")
@@ -201,7 +201,7 @@ class FleetOutlier(Part):
 
 
 class Reason(Part):
-    """The likeliest reason why a gyro stands apart from those of its axis."""
+    """The likeliest reason why a gyro is an outlier among those of its axis."""
 
     name: str = Field(description="of the gyro")
     id: str = Field(
@@ -240,8 +240,8 @@ class FleetSummary(Result):
     figures: dict[str, Spread | None] = Field(
         description="figures over the fleet by their names; null where no gyro has it"
     )
-    outliers: tuple[FleetOutlier, ...] = Field(description="figures that stand apart, the farthest first")
-    apart: tuple[Reason, ...] = Field(description="gyros that stand apart, in the order of the manifest")
+    outliers: tuple[FleetOutlier, ...] = Field(description="figures that are outliers, the farthest first")
+    apart: tuple[Reason, ...] = Field(description="gyros that are outliers, in the order of the manifest")
     copies: tuple[Copy, ...] = Field(
         description="pairs of gyros of different serials with the same rows, in the order of the manifest"
     )

@@ -59,7 +59,7 @@ class LotCluster(Part):
 
 
 class LotUnit(Part):
-    """A unit that the lot was learnt from, or that was set aside."""
+    """A unit that the lot was learnt from, or that was excluded."""
 
     serial: str = Field(description="gyro serial")
     model_hash: str = Field(description="hash of its model")
@@ -90,7 +90,7 @@ class Lot(Result):
     schema_: Annotated[Literal["gyrotc.lot/1"], Field(alias="schema")] = "gyrotc.lot/1"
     axis: Axis = Field(description="of the gyros; null where their recordings have one axis")
     units: tuple[LotUnit, ...] = Field(description="fully calibrated units, in the order of their folders")
-    told: str = Field(description="in words: how much is shared, clusters, who stands apart")
+    told: str = Field(description="in words: how much is shared, clusters, outliers")
     temperature_c: tuple[Celsius, Celsius] = Field(description="envelope of the lot, C")
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
     occupancy: tuple[Numbers, ...] = Field(

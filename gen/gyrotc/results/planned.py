@@ -130,7 +130,7 @@ class PlanLimit(Part):
 
 
 class Separability(Part):
-    """From which size on a cause is told from the others."""
+    """From which size on a cause is recognised from the others."""
 
     id: str = Field(description="the cause that is there")
     parameter: str | None = Field(description="name of its parameter; null: none")
@@ -141,7 +141,7 @@ class Separability(Part):
 
 
 class Hard(Part):
-    """Two causes that are hard to tell apart."""
+    """Two causes that are hard to separate."""
 
     pair: tuple[str, str] = Field(description="ids")
     d: float = Field(description="size from which they are told apart")

@@ -24,7 +24,7 @@ __all__ = [
 
 
 class MarkedRows(Part):
-    """Rows that something is told of."""
+    """Rows that something is reported of."""
 
     file: str = Field(description="as in `dataset.toml`")
     rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not told")
@@ -73,7 +73,7 @@ class CheckedRun(Part):
 
 
 class Checked(Result):
-    """Problems and doubts of recordings."""
+    """Problems and warnings of recordings."""
 
     schema_: Annotated[Literal["gyrotc.check/1"], Field(alias="schema")] = "gyrotc.check/1"
     serial: str | None = Field(description="null where it could not be read")

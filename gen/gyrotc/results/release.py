@@ -130,7 +130,7 @@ class Limit(Part):
     )
 
     def failure(self) -> str:
-        """What is told of a limit that is not met."""
+        """What is reported of a limit that is not met."""
         bound, measured = (_told(v) for v in (self.bound, self.measured))
         if self.verdict == "CONDITIONAL PASS":
             return f"{self.limit} = {bound} is met by less than the guard band: {measured}"

@@ -56,7 +56,7 @@ class LotOrder:
     """What lot is to be made.
 
     Attributes:
-        units: Number of gyros, strangers among them.
+        units: Number of gyros, foreign units among them.
         family: Correlation of each parameter between two units of a cluster, 0 ... 1.
         clusters: Groups with a center of their own; units go to them at random.
         strangers: Units that share nothing with the others but the scenario.

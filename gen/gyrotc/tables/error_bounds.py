@@ -3,7 +3,7 @@
 The range of the map over the envelope, seen by the reference on a grid, at every center, where lines through two
 centers cross and along the lines of those narrower than the grid (a Gaussian may be a ridge, whose highest place lies
 in another one or at the envelope's edge), as of regions that are, and of the terms, as training saw it or as their
-parameters allow; each with a margin. 0 belongs to it: before anything is believed there is no correction.
+parameters allow; each with a margin. 0 belongs to it: before any reading is accepted there is no correction.
 
 docs/numerics.md, section 8, has the sums; the channel's mean and the temperature are those of the target. Every part
 is a rounding of one step times the largest effect that it has.
@@ -303,7 +303,7 @@ class _Ramps:
 
 
 def regions(model: Model) -> tuple[Envelope, ...]:
-    """Region of every network, those of stand-ins last; the envelope where it has none of its own."""
+    """Region of every network, those of fallback models last; the envelope where it has none of its own."""
     return tuple(n.region or model.envelope for n in (*model.networks, *model.stand_ins))
 
 
@@ -396,7 +396,7 @@ def _over_cells(values: FloatArray, least: np.ufunc) -> FloatArray:
 def _apart(
     model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]
 ) -> FloatArray:
-    """Bound of how far apart the networks are that count in a cell, deg/h."""
+    """Bound of how far from one another the networks are that count in a cell, deg/h."""
     center, half = model.scale.temperature_c
     inputs = [(x - a.offset) / a.factor for x, a in zip(lines, axes, strict=True)]
     z = [(inputs[0] - center) / half, inputs[1] / model.scale.slope_c_per_min]

@@ -235,7 +235,7 @@ def _inputs(model: Model, table: Table, where: NDArray[Any]) -> Words:
 
 
 def _telling(table: Table, inputs: Words, n: int) -> list[int]:
-    """Numbers of the inputs that tell most builds from a right one, those first that no chosen one told yet."""
+    """Numbers of the inputs that show most builds to be wrong, those first that no chosen one shows yet."""
     _, right = evaluate_map(table, inputs)
     tells = np.stack([evaluate_map(table, inputs, fused)[1] != right for fused in _BUILDS])
     told = np.zeros(len(_BUILDS))

@@ -97,7 +97,7 @@ def _text(record: EmissionRecord) -> bytes:
 
 
 class _Stored(Options):
-    """What of a record is believed before `verify` has made it again: the options."""
+    """What of a record is accepted before `verify` has made it again: the options."""
 
     schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")]
 

@@ -331,7 +331,7 @@ def _whole(kind: TableKind, k: int, id: str, value: float) -> int:
 
 
 def _heads(model: Model) -> list[int]:
-    """Second words of the records: channel, and number of the stand-in among the networks in the upper half."""
+    """Second words of the records: channel, and number of the fallback model among the networks in the upper half."""
     heads, last = [], len(model.networks)
     for term in model.terms:
         last += term.stand_in is not None

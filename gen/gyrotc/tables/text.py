@@ -32,7 +32,7 @@ def example_values(model: Model) -> dict[str, Any]:
 
 
 def example_samples(model: Model) -> int:
-    """Samples until the first start of the example is believed, of every channel."""
+    """Samples until the first start of the example is accepted, of every channel."""
     longest_s = max(guard_of(model, name).agree_s for name in (None, *channel_names(model)))
     return math.ceil(longest_s * 1e6 / example_period_us(model)) + 1
 

@@ -54,7 +54,7 @@ class Settings:
 class Steps:
     """The corrections of a history, in the order in which they come into force.
 
-    `believed[i]`: sample i was believed. For correction k: it is in force from sample `at[k]` on (at the
+    `believed[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the
     same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
     before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
     GTC_WARMING or 0. Where `kind` is not MAP, temperature,
@@ -176,7 +176,7 @@ class _Corrections:
 def _block_means(
     arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
 ) -> tuple[NDArray[np.bool_], Numbers]:
-    """Which blocks are valid, and their means (0 where no sample was believed)."""
+    """Which blocks are valid, and their means (0 where no sample was accepted)."""
     used = _used(verdict, n)
     step = n * max(1, _PART // n)
     parts = [
@@ -211,7 +211,7 @@ def _believed(
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Verdict on every sample, and blocks after which the fallback is in force.
 
-    What is believed after a loss depends on when the blocks made it one: judged again from each loss on.
+    What is accepted after a loss depends on when the blocks made it one: judged again from each loss on.
     """
     n = settings.samples_per_block
     lost: list[int] = []
@@ -247,7 +247,7 @@ def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
 
 
 def _used(verdict: NDArray[np.int8], n: int) -> NDArray[np.bool_]:
-    """Samples that count for their block: believed, and none before a restart in it."""
+    """Samples that count for their block: accepted, and none before a restart in it."""
     used: NDArray[np.bool_] = verdict != HELD
     for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
         used[i - i % n : i] = False

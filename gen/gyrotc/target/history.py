@@ -36,7 +36,7 @@ def channel_at(
     Args:
         arithmetic: The numbers that the target computes with.
         readings: One for each sample of the temperature, missing ones as `arithmetic.missing`.
-        guard: What is believed of them.
+        guard: What is accepted of them.
         fallback: What stands for the channel where there is no reading.
         settings: Of the temperature.
         steps: The corrections.
@@ -220,7 +220,7 @@ class Replay:
     status: NDArray[np.int32]  # what `bias` returns after it
     bits: Words  # of the bias that it writes
     missed_status: NDArray[np.int32]  # what `missed` returns before the row (0 where nothing was missed)
-    block_valid: NDArray[np.bool_]  # the row's own block has enough believed samples
+    block_valid: NDArray[np.bool_]  # the row's own block has enough accepted samples
     begun: NDArray[np.bool_]  # a correction has been made; before it bias is 0, and says so by HELD
     sigma: Words | None  # bits of 1 σ that `snapshot` writes; None: the table has no uncertainties
     age: NDArray[np.int64]  # blocks that it writes

@@ -55,7 +55,7 @@ def stand_in(table: Table, number: int, temperature: NDArray[Any], slope: NDArra
 
     Args:
         table: The table.
-        number: Of the stand-in among its networks, from 1 on.
+        number: Of the fallback model among its networks, from 1 on.
         temperature, slope: Inputs of the map, numbers of the arithmetic, shape (n,) each.
     """
     low, high = table.numbers(table.envelope).reshape(2, 2).T

@@ -140,7 +140,7 @@ class CourseChannel:
     Attributes:
         mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
         remarks: Status bits: held, lost, clamped, shape (n,).
-        is_away: Where nothing of it is believed, so that something stands for it, shape (n,).
+        is_away: Where nothing of it is accepted, so that something stands for it, shape (n,).
         stand_in: What its term adds then, shape (n,), needed there and where a reading lies at the edge of its range;
             None: the effect of `mean`.
     """

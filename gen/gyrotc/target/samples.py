@@ -1,7 +1,7 @@
-"""Samples as the front end sees them: counted, with the missing ones, and which of them are believed.
+"""Samples as the front end sees them: counted, with the missing ones, and which of them are accepted.
 
 Long stretches without events are done at once; one sample at a time is looked at only from an event
-(a jump, a missing or stuck sample) until a sample is believed again.
+(a jump, a missing or stuck sample) until a sample is accepted again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Guarded:
     Attributes:
         low, high: Range of the readings.
         max_step: Believable change between two of them, besides ...
-        max_rate: ... this much for each microsecond since the last believed one (fixed point: 2^-40).
+        max_rate: ... this much for each microsecond since the last accepted one (fixed point: 2^-40).
         agree_us: How long readings must agree that do not follow the last one.
         stuck_us: How long a reading may stay the same; 0: for ever.
         missing_blocks: Blocks in a row with too few readings that are bridged.
@@ -58,9 +58,9 @@ def believe(
     Args:
         arithmetic: The numbers that the target computes with.
         x: Readings, shape (n,); missing ones as `arithmetic.missing`.
-        guard: What is believed.
+        guard: What is accepted.
         period_us: Time from reading to reading, microseconds.
-        lost: Readings before which the channel was lost, ascending: what was believed is forgotten.
+        lost: Readings before which the channel was lost, ascending: what was accepted is forgotten.
     """
     judged, sound = guard.limited(x), _sound(arithmetic, x, guard, period_us)
     judge = _Judge(arithmetic, guard, period_us)
@@ -92,7 +92,7 @@ def believe(
 def _events(
     arithmetic: Arithmetic, x: Numbers, sound: NDArray[np.bool_], near: Any, lost: Sequence[int]
 ) -> NDArray[np.intp]:
-    """Readings that are not believed just because their predecessor is."""
+    """Readings that are not accepted just because their predecessor is."""
     regular = np.zeros(x.size, dtype=np.bool_)
     for a in range(1, x.size, _PART):
         now, before = slice(a, a + _PART), slice(a - 1, min(a + _PART, x.size) - 1)
@@ -121,7 +121,7 @@ def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -
 
 
 class _Judge:
-    """The state of the target between events: last believed reading, gap, suspects."""
+    """The state of the target between events: last accepted reading, gap, suspects."""
 
     def __init__(self, arithmetic: Arithmetic, guard: Guarded, period_us: int) -> None:
         self._arithmetic = arithmetic

@@ -235,7 +235,7 @@ def _drift(
 
 
 def sigma_bits(table: Table, evidence: SigmaEvidence) -> Words:
-    """Bits of 1 σ of every correction, the first one that before anything is believed.
+    """Bits of 1 σ of every correction, the first one that before any reading is accepted.
 
     Args:
         table: A table with uncertainties.

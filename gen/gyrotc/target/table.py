@@ -93,7 +93,7 @@ class Table:
     probes: Words
     error_bound_dph: float  # |map - model| never exceeds it: arithmetic and input rounding, no terms
     bound_parts_dph: dict[str, float]  # what the bound is made of
-    stand_in_bounds_dph: tuple[float, ...] = ()  # the same of each stand-in alone
+    stand_in_bounds_dph: tuple[float, ...] = ()  # the same of each fallback model alone
 
     def records(self, array: str) -> Words:
         """An array of records, one a row: shape (n, words of a record)."""
@@ -106,7 +106,7 @@ class Table:
 
     @property
     def stand_ins(self) -> tuple[int, ...]:
-        """Of every term the number of its stand-in among the networks, from 1 on; 0: it has none."""
+        """Of every term the number of its fallback model among the networks, from 1 on; 0: it has none."""
         return tuple(int(word) >> 16 for word in self.records("terms")[:, 1])
 
     @property
@@ -115,7 +115,7 @@ class Table:
 
     @property
     def n_networks(self) -> int:
-        """Networks of the map; the stand-ins stand behind them."""
+        """Networks of the map; the fallback models stand behind them."""
         return self.networks.size // ARRAYS["networks"] - self.n_stand_ins
 
     @property
@@ -164,7 +164,7 @@ class Table:
 
     @property
     def stand_in_bytes(self) -> int:
-        """Those of the stand-ins among them."""
+        """Those of the fallback models among them."""
         counts = self.records("networks")[self.n_networks :, 0]
         return 4 * (3 * counts.size + ARRAYS["centers"] * int(counts.sum()))
 
@@ -173,7 +173,7 @@ class Table:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
         pointers = len(ARRAYS) + 4  # arrays, code of terms
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
-        # The header without its length, and CRC and number of stand-ins
+        # The header without its length, and CRC and number of fallback models
         return 4 * (len(self.header) - 1 + pointers + 2 + arrays)
 
     def encode_inputs(self, values: ArrayLike) -> Words:

@@ -175,7 +175,7 @@ class StandIn:
 
 
 def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> StandIn | None:
-    """The stand-in of a term; None where nothing can be fitted.
+    """The fallback model of a term; None where nothing can be fitted.
 
     Args:
         model: The model with its map.
@@ -449,7 +449,7 @@ def _row(
 def with_channels(
     model: Model, choice: ChannelChoice, runs: Sequence[Run], samples: TrainingData, missing_s: float
 ) -> Model:
-    """The model with a term, a stand-in for it, a guard and an uncertainty for every chosen channel.
+    """The model with a term, a fallback model for it, a guard and an uncertainty for every chosen channel.
 
     `samples`: those that the map was trained on, without what the channels add.
     """

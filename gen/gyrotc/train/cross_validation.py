@@ -1,6 +1,6 @@
 """Stretches of thermal history that are left out in turn, and paired comparisons over them.
 
-`history_folds` is what the ladder of corrections is chosen by: runs, power-ons, branches, the fastest rate, and the
+`history_folds` is what model selection is chosen by: runs, power-ons, branches, the fastest rate, and the
 hottest and the coldest tenth, each with a guard gap; never random samples, which lie between samples that were seen.
 
 `training_spans` is what a model of few runs is judged by: with fewer than three runs, whole runs are too few to learn

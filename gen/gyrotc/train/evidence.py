@@ -3,7 +3,7 @@
 Its mean is the target that `mrbf` compresses; its variance is the shape of the uncertainty.
 
 The evidence of a flexible process can be raised without limit by following every mean and calling what is left
-noise. So the noise that differences of neighbouring means show holds it: σ is never believed to be less than a
+noise. So the noise that differences of neighbouring means show holds it: σ is never taken to be less than a
 quarter of it, outliers are measured by no less than it, and at most a tenth of the means is dropped.
 """
 

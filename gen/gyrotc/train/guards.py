@@ -24,7 +24,7 @@ def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average
     """Why the networks must not be used, in words; empty if they may.
 
     They must not leave their process by 4 σ anywhere on the envelope, nor lie beyond the lowest or highest mean of
-    the samples by more than these lie apart, nor hold numbers that no table holds.
+    the samples by more than these differ, nor hold numbers that no table holds.
     """
     t, r = (
         x.ravel()
@@ -72,7 +72,7 @@ _MARGIN = 0.5  # of the range, at either end ...
 _LEAST_MARGIN = 0.01  # ... and at least this share of the largest magnitude
 _STEPS = 2.0  # times the largest change between two rows
 _STUCK = 20.0  # times the longest that a reading stayed the same
-# Below two minutes a chamber at rest would count as stuck; above 2000 s a flight would be over before it is told.
+# Below two minutes a chamber at rest would count as stuck; above 2000 s a flight would be over before it is reported.
 _SHORTEST_STUCK_S, _LONGEST_STUCK_S = 120.0, 2000.0
 
 

@@ -68,7 +68,7 @@ def fit(
         rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
         size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
-        power_on: For the ladder: number of the power-on of each run, by its index; None: each run is one.
+        power_on: For model selection: number of the power-on of each run, by its index; None: each run is one.
         prior: What units of the type share, or the unit's earlier model; for `AUTO` and "mrbf" without a number of
             centers. Samples that do not agree with it are fitted without it, with a finding.
         serial: The unit's, to tell whether a lot has seen it.

@@ -43,7 +43,7 @@ METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "
 NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
 """Those whose map is networks alone, so that a table can hold it."""
 AUTO = "auto"
-"""The ladder: the simplest correction that does on unseen history what the best one does."""
+"""Model selection: the simplest correction that does on unseen history what the best one does."""
 
 
 def _meaning(text: str) -> dict[str, str]:
@@ -52,7 +52,7 @@ def _meaning(text: str) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildOptions:
-    """What `gyrotc fit`, `build`, `diagnose`, `compare` and a fleet can be told.
+    """What `gyrotc fit`, `build`, `diagnose`, `compare` and a fleet take as options.
 
     Raises:
         InputError: A value is out of its range; the message names the option of the command line.

@@ -9,7 +9,7 @@ mrbf_paper Kohonen nodes, by error reduction    ρ (eq. 16), the width that need
 rbf_ols    regular grid, by error reduction     contiguous blocks left out with guard gaps
 ========== ==================================== ==========================================
 
-All have one width δ for both normalised inputs, chosen from a ladder of seven, and w0 as the first column.
+All have one width δ for both normalised inputs, chosen from a series of seven, and w0 as the first column.
 """
 
 from __future__ import annotations

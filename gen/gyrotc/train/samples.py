@@ -44,10 +44,10 @@ class Blocks:
     """
 
     start_s: NDArray[np.float64]
-    valid: NDArray[np.bool_]  # the block itself has enough believed samples
+    valid: NDArray[np.bool_]  # the block itself has enough accepted samples
     temperature_c: NDArray[np.float32]  # input in force during the block (NaN before the first sample)
     slope_c: NDArray[np.float32]  # input in force, C per block
-    mean_c: NDArray[np.float32]  # mean of the block itself (0 where it has no believed sample)
+    mean_c: NDArray[np.float32]  # mean of the block itself (0 where it has no accepted sample)
     status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
     rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
     rows: NDArray[np.int64]  # number of these rows
@@ -59,7 +59,7 @@ class Blocks:
 
     @property
     def begins_s(self) -> float | None:
-        """Start of the first block with rows of the run, s: means of it begin here, believed or not."""
+        """Start of the first block with rows of the run, s: means of it begin here, accepted or not."""
         starts = self.start_s[self.rows > 0]
         return float(starts[0]) if starts.size else None
 
@@ -109,7 +109,7 @@ def run_blocks(
         block_s: Length of a block, s.
         slope_blocks: Window of dT/dt, blocks.
         max_step_c: Believable change between two samples, C, besides ...
-        max_rate_c_per_min: ... this rate times the time since the last believed one.
+        max_rate_c_per_min: ... this rate times the time since the last accepted one.
         agree_s: How long readings must agree that do not follow the last one, s.
         stuck_s: Time after which a reading that stays the same is none, s; 0: never.
         hold_blocks: Invalid blocks in a row that are bridged before the fallback.

@@ -5,7 +5,7 @@ with every stretch of history left out in turn (`history_folds`) and judged on t
 `average_s`. Two questions decide:
 
 1. *Which rung?* The yardstick is the best of what anyone would fit: a constant, a cubic in T, a cubic with a slope in
-   dT/dt. Another rung has to be clearly better than that, by one standard error (Hastie, Tibshirani, Friedman, The
+   dT/dt. Another candidate has to be clearly better than that, by one standard error (Hastie, Tibshirani, Friedman, The
    Elements of Statistical Learning, 7.10) of paired differences over all stretches, of the score and of the mean
    square: it has to gain on stretches as they come and on what they add up to. The simplest is taken of those that do,
    of equally good ones, and of those that leave no more than noise on any stretch.
@@ -16,7 +16,7 @@ with every stretch of history left out in turn (`history_folds`) and judged on t
 
 The score of a stretch is ½ log(mean square + s²), s the noise of a mean from first differences: all stretches count
 alike, one that fails grossly does not outvote the others, and differences below the noise count for nothing.
-Where it is not, the constant is what remains. Only one rung is asked, so that luck among many has no part in it.
+Where it is not, the constant is what remains. Only one candidate is asked, so that luck among many has no part in it.
 
 The maps stand here as the mean of the evidence process with the parameters of the whole record, conditioned anew
 without each stretch; the network that is emitted follows it to within a tenth of its own expected error.
@@ -78,7 +78,7 @@ _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """What every rung leaves on every stretch of history, and the choice among them.
+    """What every candidate leaves on every stretch of history, and the choice among them.
 
     Attributes:
         folds: Stretches that were left out.
@@ -95,7 +95,7 @@ class Ladder:
     pieces: NDArray[np.int64]
 
     def chosen(self, without: Sequence[str] = ()) -> str:
-        """The rung to emit, with some that must not be."""
+        """The candidate to emit, with some that must not be."""
         able = [
             k
             for k, name in enumerate(RUNGS)
@@ -111,7 +111,7 @@ class Ladder:
         return name if self.beats_constant(name) else "constant"
 
     def _leaves_noise(self, k: int) -> bool:
-        """Whether a rung leaves less than the noise on every stretch, beside the noise."""
+        """Whether a candidate leaves less than the noise on every stretch, beside the noise."""
         return bool(np.max(self.rms_dph[:, k] ** 2) < 2.0 * self.noise_dph**2)
 
     def _best(self, rungs: Sequence[int]) -> int:
@@ -120,7 +120,7 @@ class Ladder:
         return next(k for k in rungs if score[k] <= min(score.values()) + _EQUAL)
 
     def beats_constant(self, name: str) -> bool:
-        """Whether a rung is better than a constant: by a t test at 5 % over independent pieces of history.
+        """Whether a candidate is better than a constant: by a t test at 5 % over independent pieces of history.
 
         Where it leaves less than the noise on every piece, pieces differ by noise alone: then over all stretches.
         """
@@ -217,7 +217,7 @@ def climb(
     average_s: float,
     folds: Sequence[Fold] | None = None,
 ) -> Ladder:
-    """Fits every rung without every stretch of history.
+    """Fits every candidate without every stretch of history.
 
     Args:
         samples: Samples as `cleaned` returns them.
@@ -225,7 +225,7 @@ def climb(
         process: The evidence process of all samples; None: it could not be fitted, and no map is tried.
         power_on: Number of the power-on of each run, by the run's index; None: each run is one.
         average_s: Averaging of what is judged, s.
-        folds: Stretches that another ladder of the same times has left out; None: those of these samples.
+        folds: Stretches that another selection of the same times has left out; None: those of these samples.
     """
     means, kept = _means(samples, process)
     groups = means.run if power_on is None else power_on[means.run]
@@ -265,7 +265,7 @@ def pieces_of(folds: Sequence[Fold]) -> NDArray[np.int64]:
 
 
 def _squares(fold: Fold, sums: RunSums, average_s: float) -> list[float]:
-    """Mean square on a stretch under each rung that has not seen it, (deg/h)²."""
+    """Mean square on a stretch under each candidate that has not seen it, (deg/h)²."""
     held, rest = sums.means.select(fold.held), Remaining(sums, fold.near)
     t, r = sums.scaling.normalise(
         np.clip(held.temperature_c, *rest.temperature_c), np.clip(held.slope_c_per_min, *rest.slope_c_per_min)
@@ -370,7 +370,7 @@ class RunSums:
 
 
 class Remaining:
-    """Every rung fitted to what remains without a stretch.
+    """Every candidate fitted to what remains without a stretch.
 
     Attributes:
         temperature_c, slope_c_per_min: Ranges of what remains.
@@ -394,7 +394,7 @@ class Remaining:
         self._simple = all_solved(triangle, len(sums.means) - len(near))
 
     def correction(self, name: str, t: FloatArray, r: FloatArray) -> FloatArray:
-        """What a rung says at normalised inputs, deg/h.
+        """What a candidate says at normalised inputs, deg/h.
 
         Raises:
             TrainingFailed: The map cannot be fitted.
@@ -514,7 +514,7 @@ def _misses(samples: TrainingData, ladder: Ladder) -> bool:
 
 
 def _reason(ladder: Ladder, name: str, misses: bool) -> str:
-    """Why this rung, in words."""
+    """Why this candidate, in words."""
     tried = f"left out in turn: {', '.join(ladder.stretches()) or 'nothing, there is too little'}"
     if misses:
         return f"nothing is shown to be better than a constant on history that was not seen ({tried})"

@@ -429,7 +429,7 @@ def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
 def _sizes(target: Target, program: Path, shared: _Shared) -> dict[str, int]:
     """Code and constants of runtime and table that the program links, and their writable static data.
 
-    What is constant is told by the objects: linker scripts put constants beside the code.
+    What is constant is reported by the objects: linker scripts put constants beside the code.
     """
     own = {symbol.name: symbol.kind for symbol in shared.symbols}
     linked = {symbol.name: symbol for symbol in symbols(target, program) if symbol.name in own}.values()

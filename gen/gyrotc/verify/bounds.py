@@ -39,7 +39,7 @@ from .toolchain import Object, Target, compile_objects, disassembly, link, symbo
 
 __all__ = ["Paths", "Program", "instruction_bounds"]
 
-STAND_IN = "is_shown"  # the function that asks the network of a stand-in
+STAND_IN = "is_shown"  # the function that asks the network of a fallback model
 _ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
 
 
@@ -207,7 +207,7 @@ class Paths:
             self.long_quotients += copy.ways[second.start, second.successors[0]]
 
     def _without_stand_ins(self, copy: _Copy) -> None:
-        """A table without stand-ins has 0 in the upper half of the word of a term's channel."""
+        """A table without fallback models has 0 in the upper half of the word of a term's channel."""
         if self.program.text.counts.stand_ins:
             return
         for block in copy.flow.blocks.values():

@@ -340,7 +340,7 @@ _OTHER: dict[str, Callable[[Counts, int], int]] = {
     "for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {": lambda c, _: (
         c.by_name["slope_blocks"] - 1
     ),
-    "for (i = 1U; i < number; i++) {": lambda c, _: c.by_name["n_networks"] - 1,  # before a stand-in
+    "for (i = 1U; i < number; i++) {": lambda c, _: c.by_name["n_networks"] - 1,  # before a fallback model
     # A running block, those until every channel counts as missing, and the rest of the last one.
     "while (rest > 0U) {": lambda c, _: c.missing_blocks + 3,
     "while (center != end) {": lambda c, unrolled: 0 if c.is_narrow else c.centers // unrolled,

@@ -260,7 +260,7 @@ class Object:
     """A compiled source that is the same for every serial, and what was measured on it.
 
     Attributes:
-        name: Hash of what it was made of; empty where that cannot be told.
+        name: Hash of what it was made of; empty where that cannot be determined.
         code: The file.
         graph: Who calls whom, and the stack of each function, as gcc writes it; empty where it was not asked for.
     """
@@ -336,7 +336,7 @@ def _object(name: str, content: bytes) -> Object | None:
 
 
 def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
-    """Name under which the object of a source is kept; empty where the compiler or the processor cannot be told."""
+    """Name under which an object is kept; empty where compiler or processor cannot be determined."""
     compiler = _identity(target.compiler)
     processor = _processor() if "-march=native" in target.flags else "any"
     if not compiler or not processor:

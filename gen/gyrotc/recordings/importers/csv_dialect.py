@@ -109,7 +109,7 @@ def plain_lines(lines: bytes, delimiter: str, thousands: str, *, apart: bool) ->
     """Lines of cells, in UTF-8, likewise; the decimal mark stays.
 
     Args:
-        apart: Signs stand apart from the digits.
+        apart: Signs are separate from the digits.
     """
     edge = re.escape(delimiter.encode())
     if apart:
@@ -268,7 +268,7 @@ class Dialect:
         units: Units by column, empty where none are given.
         missing: What cells without a number hold.
         thousands: The mark between thousands; empty: there is none.
-        apart: Signs stand apart from the digits.
+        apart: Signs are separate from the digits.
         facts: `key: value` lines above the header.
     """
 

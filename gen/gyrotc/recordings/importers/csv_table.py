@@ -39,7 +39,7 @@ _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
-    """A CSV file with its dialect, told from its head and `[csv]` of a map.
+    """A CSV file with its dialect, recognised from its head and `[csv]` of a map.
 
     Raises:
         InputError: No rows of numbers can be found.

@@ -55,7 +55,7 @@ class ColumnMap(_Part):
 
 
 class CsvMap(_Part):
-    """`[csv]`: what is not told from the file itself; None where it is."""
+    """`[csv]`: what is not recognised from the file itself; None where it is."""
 
     encoding: Text | None = None
     delimiter: Text | None = None

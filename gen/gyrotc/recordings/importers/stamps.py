@@ -59,7 +59,7 @@ _DIGITS_ONLY = re.compile(r"(%[A-Za-z])+")
 
 
 def forms_of(sample: Sequence[str]) -> list[str]:
-    """Forms that all texts of a sample have; two where day and month cannot be told apart.
+    """Forms that all texts of a sample have; two where day and month cannot be distinguished.
 
     Forms with a fraction that none of the texts has are left out.
     """
