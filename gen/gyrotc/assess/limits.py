@@ -25,7 +25,7 @@ from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
 from ..model import Model
 from ..results.evaluation import Evaluation, FigureUncertainty
-from ..results.release import DecisionRule, HeldLimits, Instrument, Limit, Value, Verdict
+from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict
 from ..results.verification import Verification
 from ..verify.toolchain import all_targets
 from .product_guards import ProductGuard
@@ -45,6 +45,11 @@ __all__ = [
 _NORMAL = NormalDist()
 _UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
 _ORDER: tuple[Verdict, ...] = ("PASS", "CONDITIONAL PASS", "FAIL")
+_LEAST_FREEDOM = 5.0  # with fewer, U is unknown by a third: 1/sqrt(2 freedom), JCGM 100:2008, E.4.3
+_ON_TRAINING = (
+    "judged on the training runs themselves, which a fit follows too well: record a run for the exam and give it "
+    'role = "exam"'
+)
 
 
 def coverage_factor(freedom: float | None) -> float:
@@ -59,6 +64,7 @@ def decided(
     sign: float,
     rule: DecisionRule,
     known: FigureUncertainty | str | None,
+    part: JudgedOn | None = None,
 ) -> Limit:
     """Holds an amount with its uncertainty against a limit, by a decision rule.
 
@@ -70,7 +76,31 @@ def decided(
         rule: The decision rule.
         known: The figure's uncertainty; a text: why it has none; None: it is not known, so that a guard band cannot
             be kept.
+        part: What the figure was measured on; None: not on recordings. Of training runs, and with fewer than 5
+            degrees of freedom where the uncertainty counts, a pass is a conditional one, by any rule.
     """
+    one = _by_rule(name, measured, bound, sign, rule, known)
+    few = one.degrees_of_freedom is not None and one.degrees_of_freedom < _LEAST_FREEDOM
+    reasons = []
+    if part == "train" and measured is not None:
+        reasons.append(_ON_TRAINING)
+    if few and rule != "simple_acceptance":
+        reasons.append(
+            f"its uncertainty has fewer than {_LEAST_FREEDOM:g} degrees of freedom: record longer or more runs"
+        )
+    verdict = worst_of((one.verdict, "CONDITIONAL PASS" if reasons else None))
+    return one.model_copy(update={"part": part, "capped": "; ".join(reasons), "verdict": verdict})
+
+
+def _by_rule(
+    name: str,
+    measured: float | None,
+    bound: float,
+    sign: float,
+    rule: DecisionRule,
+    known: FigureUncertainty | str | None,
+) -> Limit:
+    """The decision by the rule alone."""
     if isinstance(known, str):
         return _bare(name, measured, bound, sign, known)
     if measured is None or known is None:
@@ -361,6 +391,9 @@ _NOT_RANDOM = {
 }
 """Figures that no noise of a recording moves."""
 
+_OF_RUNS = ("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph")
+"""Figures of whole runs, which spans left out do not have."""
+
 
 def _limit(name: str, measured: Value, bound: Value, met: bool, why: str) -> Limit:
     """A limit of something that is so or not."""
@@ -369,7 +402,14 @@ def _limit(name: str, measured: Value, bound: Value, met: bool, why: str) -> Lim
 
 
 def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -> Iterator[Limit]:
-    known = evaluation.uncertainty or {}
+    known, judged = evaluation.uncertainty or {}, evaluation.judged()
+    role: JudgedOn | None = judged[0] if judged else None
+
+    def measured_on(name: str) -> JudgedOn | None:
+        if name in _NOT_RANDOM:
+            return None
+        return "train" if name in _OF_RUNS and role == "left_out" else role
+
     for part, sign in (("at_most", 1.0), ("at_least", -1.0)):
         for name, bound in getattr(limits, part).model_dump(exclude_none=True).items():
             yield decided(
@@ -379,6 +419,7 @@ def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -
                 sign,
                 limits.decision_rule,
                 _NOT_RANDOM.get(name) or known.get(name),
+                measured_on(name),
             )
 
 

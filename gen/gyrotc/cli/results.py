@@ -220,7 +220,8 @@ def summary(result: Evaluation) -> str:
         text = f"improvement about zero {part.improvement:.2f}"
         beside = ["paper: 9.8-10.4"] if published else []
     else:
-        text, beside = f"improvement about zero on spans left out {part.improvement:.2f}", []
+        where = "on spans left out" if found[0] == "left_out" else "on the training runs themselves"
+        text, beside = f"improvement about zero {where} {part.improvement:.2f}", []
     alone = _of_a_constant(result, part)
     beside += [f"a constant alone: {alone:.2f}"] if alone else []
     text += f" ({'; '.join(beside)})" if beside else ""
@@ -256,13 +257,14 @@ def limit_lines(limits: HeldLimits) -> Iterator[str]:
         return
     rule = f" ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)" if limits.decision_rule else ""
     yield f"limits{product}: {limits.decision}{rule}"
+    yield from (f"  CONDITIONAL PASS at most: {why}" for why in limits.capped)
     for check in limits.limits:
         kind, _, figure = check.limit.partition(".")
         sign = {"at_most": "<= ", "at_least": ">= "}.get(kind, "")
         name, bound = figure if sign else check.limit, _plain(check.bound)
         known = check.expanded_uncertainty
         spread = f" +- {known:.2g}" if known else ""
-        mark = "" if check.verdict in ("PASS", None) and check.met else f", {check.verdict or 'FAIL'}"
+        mark = "" if check.decision == "PASS" else f", {check.decision}"
         yield f"  {name} {sign}{bound}: {_plain(check.measured)}{spread}{mark}"
 
 

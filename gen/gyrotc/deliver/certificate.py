@@ -95,7 +95,7 @@ def _bias(unit: UnitResults) -> Iterator[CertifiedRow]:
 
 
 def _row(limit: Limit) -> CertifiedRow:
-    verdict = limit.verdict or ("PASS" if limit.met else "FAIL")
+    verdict = limit.decision
     plain = CertifiedRow(
         text=limit_words(limit.limit), page=measured_words(limit), bound=bound_words(limit), verdict=verdict
     )

@@ -95,16 +95,21 @@ class UnitResults:
     def held(self) -> list[Limit]:
         """The limits, those that are not met first."""
         limits = self.limits.limits if self.limits else ()
-        return sorted(limits, key=lambda one: _GRAVEST.index(_verdict(one)))
+        return sorted(limits, key=lambda one: _GRAVEST.index(one.decision))
 
     @property
     def counts(self) -> Counter[str]:
         """How many limits have each verdict."""
-        return Counter(_verdict(one) for one in self.held)
+        return Counter(one.decision for one in self.held)
 
     def named(self, verdict: str) -> str:
         """The limits of a verdict, in words."""
-        return "; ".join(limit_words(one.limit) for one in self.held if _verdict(one) == verdict)
+        return "; ".join(limit_words(one.limit) for one in self.held if one.decision == verdict)
+
+    @property
+    def capped(self) -> tuple[str, ...]:
+        """Why a pass is a conditional one, and what to record."""
+        return self.limits.capped if self.limits else ()
 
     @property
     def rule(self) -> str:
@@ -156,10 +161,6 @@ class UnitResults:
     def other_changes(self) -> list[tuple[str, str, str | None]]:
         """Figures, versions and files that are not as in the earlier result: before and now, or one text."""
         return list(_changes(self.changes)) if self.changes else []
-
-
-def _verdict(one: Limit) -> str:
-    return one.verdict or ("PASS" if one.met else "FAIL")
 
 
 def _ratio(judged: Pooled | None, figure: str) -> float | None:

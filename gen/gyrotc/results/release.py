@@ -16,6 +16,7 @@ __all__ = [
     "DecisionRule",
     "HeldLimits",
     "Instrument",
+    "JudgedOn",
     "Limit",
     "Release",
     "ReleasedUnit",
@@ -83,6 +84,9 @@ class Budget(UnitResult):
 Verdict = Literal["PASS", "CONDITIONAL PASS", "FAIL"]
 """Statement of conformity; a conditional pass is within its limit, but closer to it than the guard band."""
 
+JudgedOn = Literal["exam", "left_out", "train"]
+"""What a figure was measured on."""
+
 DecisionRule = Literal["guard_band", "guard_band_binary", "simple_acceptance"]
 """How the uncertainty of a figure counts (ILAC-G8:09/2019, 4.2): see docs/limits.md."""
 
@@ -129,6 +133,20 @@ class Limit(Part):
         default="", description="what the uncertainty rests on, or why there is none"
     )
 
+    part: JudgedOn | None = Field(
+        default=None,
+        description="what the figure was measured on: `exam` runs, `left_out` spans of training, or the training runs "
+        "themselves; null: not on recordings",
+    )
+    capped: str = Field(
+        default="", description="why it is CONDITIONAL PASS at most, and what to record; empty: it is not"
+    )
+
+    @property
+    def decision(self) -> Verdict:
+        """The verdict; files of an early gyrotc state only whether the limit is met."""
+        return self.verdict or ("PASS" if self.met else "FAIL")
+
     def failure(self) -> str:
         """What is reported of a limit that is not met."""
         bound, measured = (_told(v) for v in (self.bound, self.measured))
@@ -152,6 +170,11 @@ class HeldLimits(UnitResult):
     def decision(self) -> Verdict | None:
         """The verdict; None where there is nothing that it could be of. Files of an early gyrotc do not state it."""
         return (self.verdict or ("PASS" if self.met else "FAIL")) if self.limits else None
+
+    @property
+    def capped(self) -> tuple[str, ...]:
+        """Why limits are CONDITIONAL PASS at most, each reason once."""
+        return tuple(dict.fromkeys(one.capped for one in self.limits if one.capped))
 
 
 RELEASED = (

@@ -1,0 +1,129 @@
+"""Every view of a verdict says the same: terminal, page, certificate, DCC, what is signed, JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.assess.limits import Limits, decided, held_against
+from gyrotc.cli.results import limit_lines, summary
+from gyrotc.deliver.certificate import rows_of
+from gyrotc.jobs.release import _unit
+from gyrotc.model import Model
+from gyrotc.pages.report import page_environment
+from gyrotc.pages.unit import UnitResults
+from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, Statistics
+from gyrotc.results.release import HeldLimits
+from test_limits import EVALUATION, VERIFICATION
+
+_FIGURES = ("rms_dph", "std_dph", "max_abs_dph", "mean_dph", "rms_30min_dph", "centers")
+_RULES = ("guard_band", "guard_band_binary", "simple_acceptance")
+_VERDICTS = "CONDITIONAL PASS|PASS|FAIL"
+
+
+def pooled(rms: float) -> Pooled:
+    after = Statistics(rms_dph=rms, std_dph=0.8 * rms, mean_dph=0.6 * rms, max_abs_dph=3.0 * rms)
+    before = Statistics(rms_dph=0.01, std_dph=0.008, mean_dph=0.006, max_abs_dph=0.03)
+    return Pooled(before=before, after=after, improvement=0.01 / rms, samples=100)
+
+
+def drawn(rng: np.random.Generator, model: Model) -> tuple[Evaluation, HeldLimits]:
+    """A result with limits near its figures, some of them without an uncertainty or with few degrees of freedom."""
+    parts = {name: pooled(rng.uniform(1e-4, 1e-2)) for name in ("exam", "left_out", "train")}
+    kept = {
+        "exam": ("exam", "train"),
+        "left_out": ("left_out", "train"),
+        "train": ("train",),
+    }
+    role = rng.choice(["exam", "left_out", "train"])
+    known = {
+        name: FigureUncertainty(
+            standard=rng.uniform(0.0, 1e-3),
+            freedom=rng.choice([None, 2.0, 4.0, 5.0, 20.0]),
+            method="drawn",
+        )
+        for name in _FIGURES
+        if rng.random() < 0.8
+    }
+    none: dict[str, Any] = dict.fromkeys(parts)
+    update = none | {name: parts[name] for name in kept[role]}
+    mismatches = int(rng.random() < 0.1)
+    evaluation = EVALUATION.model_copy(update=update | {"uncertainty": known, "mismatches": mismatches})
+    names = [name for name in _FIGURES if rng.random() < 0.5]
+    bounds = {name: float(rng.uniform(1e-4, 1e-2)) for name in names}
+    limits = Limits.model_validate(
+        {
+            "schema": 1,
+            "at_most": bounds,
+            "decision_rule": str(rng.choice(_RULES)),
+            "product": "NAV",
+        }
+    )
+    return evaluation, held_against(limits, model, evaluation, VERIFICATION)
+
+
+def said(text: str) -> list[str]:
+    """The verdicts of a text in their order."""
+    return re.findall(rf"\b({_VERDICTS})\b", text)
+
+
+def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
+    seed = 20260725
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    model = Model.from_dict(model_dict)
+    macros = page_environment().get_template("parts.html.j2").module
+    for number in range(500):
+        evaluation, held = drawn(rng, model)
+        unit = UnitResults(model, evaluation, None, VERIFICATION, None, None, held, None, None)
+        banner = re.findall(r"<strong>([^<]*)</strong>", macros.verdict(unit))
+        table = re.findall(r'class="state"><span[^>]*>([^<]*)<', macros.limits_table(unit.held))
+        certified = [row.verdict for row in rows_of(unit)]
+        signed = _unit(model, unit)
+        again = HeldLimits.model_validate_json(json.dumps(held.content()))
+        assert again == held, number
+        assert banner == [unit.verdict or "No verdict"], number
+        assert signed.verdict == unit.decision, number
+        assert table == certified == [one.decision for one in unit.held], number
+        if evaluation.mismatches:
+            assert unit.decision == "FAIL", number
+            continue
+        assert unit.decision == held.decision, number
+        lines = list(limit_lines(held))
+        assert said(lines[0])[:1] == ([held.decision] if held.decision else []), number
+        marked = [line.rpartition(", ")[2] for line in lines[1:] if not line.startswith("  CONDITIONAL")]
+        assert [m if m in _VERDICTS.split("|") else "PASS" for m in marked] == [
+            one.decision for one in held.limits
+        ], number
+        where = {"left_out": "spans left out", "train": "training runs themselves"}
+        judged = evaluation.judged()
+        assert judged is not None
+        for name in ("left_out", "train"):
+            assert (where[name] in summary(evaluation)) == (judged[0] == name), number
+
+
+def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(
+    model_dict: dict[str, Any],
+) -> None:
+    model = Model.from_dict(model_dict)
+    known = {"rms_dph": FigureUncertainty(standard=1e-6, freedom=None, method="")}
+    update = {"exam": None, "train": pooled(1e-3), "uncertainty": known}
+    limits = Limits.model_validate({"schema": 1, "at_most": {"rms_dph": 1.0, "centers": 100.0}})
+    held = held_against(limits, model, EVALUATION.model_copy(update=update), VERIFICATION)
+    assert [one.decision for one in held.limits] == ["CONDITIONAL PASS", "PASS"]
+    assert [one.part for one in held.limits] == ["train", None]
+    assert held.decision == "CONDITIONAL PASS"
+    assert len(held.capped) == 1
+    assert 'role = "exam"' in held.capped[0]
+
+
+@pytest.mark.parametrize(("freedom", "verdict"), [(4.9, "CONDITIONAL PASS"), (5.0, "PASS"), (None, "PASS")])
+def test_few_degrees_of_freedom_make_a_pass_conditional(freedom: float | None, verdict: str) -> None:
+    known = FigureUncertainty(standard=1e-3, freedom=freedom, method="")
+    one = decided("at_most.rms_dph", 0.1, 1.0, 1.0, "guard_band", known, "exam")
+    assert (one.verdict, bool(one.capped)) == (verdict, verdict != "PASS")
+    assert decided("at_most.rms_dph", 2.0, 1.0, 1.0, "guard_band", known, "exam").verdict == "FAIL"
+    assert decided("at_most.rms_dph", 0.1, 1.0, 1.0, "simple_acceptance", known, "exam").verdict == "PASS"
