@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import scipy.io
 from conftest import Command, run_gyrotc
 from gyrotc.recordings.importers.job import ImportOptions, import_files
 from gyrotc.recordings.importers.map_file import Map, load_map
@@ -431,6 +433,64 @@ def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) ->
     status, _, error = run("import", tmp_path / "log.bin", "--out", tmp_path / "R")
     assert status == 2, error
     assert error.splitlines()[-1].startswith("gyrotc: ") and not (tmp_path / "R").exists()
+
+
+@pytest.mark.parametrize("way", ["external", "virtual"])
+def test_values_in_other_files_are_not_read(way: str, tmp_path: Path, run: Run) -> None:
+    h5py = pytest.importorskip("h5py")
+    secret = tmp_path / "secret"
+    np.arange(500.0).tofile(secret)
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["rate"] = np.arange(500.0)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time_s"], file["temperature_c"] = np.arange(500.0), np.linspace(20.0, 40.0, 500)
+        if way == "external":
+            file.create_dataset("rate_dph", (500,), "f8", external=[(str(secret), 0, 4000)])
+        else:
+            layout = h5py.VirtualLayout(shape=(500,), dtype="f8")
+            layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "rate", shape=(500,))
+            file.create_virtual_dataset("rate_dph", layout)
+    status, _, error = run("import", tmp_path / "log.h5", "--out", tmp_path / "R")
+    assert status == 2 and "log.h5, rate_dph: has its values in other files" in error, error
+
+
+def test_links_to_other_files_are_not_followed(tmp_path: Path, run: Run) -> None:
+    h5py = pytest.importorskip("h5py")
+    os.mkfifo(tmp_path / "pipe")  # opened, it would wait for ever
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time_s"], file["temperature_c"] = np.arange(500.0), np.linspace(20.0, 40.0, 500)
+        file["rate_dph"] = np.sin(np.arange(500.0))
+        file["far"] = h5py.ExternalLink(str(tmp_path / "pipe"), "/rate")
+        file["gone"] = h5py.SoftLink("/nowhere")
+    status, _, error = run("import", tmp_path / "log.h5", "--serial", "a", "--out", tmp_path / "R")
+    assert status == 0, error
+
+
+def test_rows_that_a_logger_file_only_declares_are_refused(tmp_path: Path, run: Run) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name in ("time_s", "temperature_c", "rate_dph"):
+            file.create_dataset(name, (10**15,), "f8", chunks=(1024,))
+    status, _, error = run("import", tmp_path / "log.h5", "--out", tmp_path / "R")
+    assert status == 2 and "1e+15 rows; expected at most 100000000" in error, error
+
+
+def test_matlab_variables_larger_than_the_allowed_memory_are_refused_before_they_are_unpacked(
+    tmp_path: Path, run: Run
+) -> None:
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"rate_dph": np.zeros((200_000, 4))}, do_compression=True)
+    assert path.stat().st_size < 20_000
+    status, _, error = run("--max", "memory_gib=0.01", "import", path, "--out", tmp_path / "R")
+    assert status == 2 and "GiB of memory for its variables" in error, error
+
+
+def test_a_column_name_of_many_blanks_takes_no_time(tmp_path: Path, run: Run) -> None:
+    name = "x" + " " * 20_000 + "y"  # the time grew with the square of the blanks
+    rows = "".join(f"{k},{20 + k / 100},{k % 7},0\n" for k in range(200))
+    (tmp_path / "log.csv").write_text(f"time_s,temperature_c,rate_dph,{name}\n{rows}")
+    status, _, error = run("import", tmp_path / "log.csv", "--serial", "a", "--out", tmp_path / "R")
+    assert status == 0, error
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...common.errors import InputError
-from ...common.inputs import open_input
+from ...common.inputs import open_input, refuse_above
 from .csv_table import open_csv
 from .map_file import Map
 from .tables import LoggerFile
@@ -55,7 +55,19 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
     kind = next((kind for magic, kind in _MAGIC if head.startswith(magic)), _NAMED.get(path.suffix.lower()))
     if kind is None:
         return open_csv(path, chosen.csv.given())
-    return _opener(kind)(path)
+    return _within_limits(_opener(kind)(path))
+
+
+def _within_limits(file: LoggerFile) -> LoggerFile:
+    """The file, where no table of it declares more rows than are read: a few bytes can declare any number."""
+    try:
+        for table in file.tables:
+            refuse_above("rows", getattr(table, "rows", 0), f"{file.path.name} {table.name}".rstrip(), "rows")
+            refuse_above("columns", len(table.columns), f"{file.path.name} {table.name}".rstrip(), "columns")
+    except InputError:
+        file.close()
+        raise
+    return file
 
 
 def _opener(kind: str) -> Callable[[Path], LoggerFile]:

@@ -32,7 +32,13 @@ def open_hdf5(path: Path) -> LoggerFile:
     columns: list[tuple[str, str, int, Column, Part]] = []
     rates: dict[str, tuple[float, str]] = {}
 
+    matlab = False
+
     def visit(name: str, node: Any) -> None:
+        nonlocal matlab
+        matlab = matlab or ("/" not in name and "MATLAB_class" in node.attrs)
+        if isinstance(node, h5py.Dataset):
+            _refuse_elsewhere(path, name, node)
         if not isinstance(node, h5py.Dataset) or name.startswith("#"):
             return
         group = name.rpartition("/")[0]
@@ -45,15 +51,28 @@ def open_hdf5(path: Path) -> LoggerFile:
     try:
         file.visititems(visit)
         rates.update({"": found} if (found := _stated_rate(file)) else {})
-    except (OSError, RuntimeError, ValueError) as error:
+    except InputError:
+        file.close()
+        raise
+    except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
+        file.close()
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"is damaged ({what})", "a whole HDF5 file") from error
     tables = grouped(columns, rates)
     if not tables:
         raise InputError(path.name, "no numeric vectors", "vectors, matrices or tables of numbers")
     facts = {str(k).lower(): _text(v) for k, v in file.attrs.items() if isinstance(v, str | bytes)}
-    matlab = "MATLAB_class" in {k for d in file.values() for k in d.attrs}
     return LoggerFile(path, "MATLAB 7.3 file" if matlab else "HDF5 file", tables, facts, close=file.close)
+
+
+def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
+    """Values that lie in other files are not read: a stranger's file may name any file of the user, or a pipe.
+
+    Links to other files need no test, `visititems` does not follow them.
+    """
+    if node.is_virtual or node.external:
+        found = "has its values in other files"
+        raise InputError(f"{path.name}, {name}", found, "values in the file itself (h5repack makes it so)")
 
 
 def _columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, int, Column, Part]]:

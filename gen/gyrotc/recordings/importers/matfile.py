@@ -5,6 +5,7 @@ Their variables are read whole: the format keeps each compressed in one piece, a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,12 @@ import numpy as np
 import scipy.io
 
 from ...common.errors import InputError
+from ...common.inputs import need_memory
 from .tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
 
 __all__ = ["open_mat"]
 
+_NUMBER_BYTES = 8  # of a float64, the widest number that is read
 _DEEPEST = 4  # structures within one another: deeper ones are no tables
 
 
@@ -27,11 +30,14 @@ def open_mat(path: Path) -> LoggerFile:
         InputError: It is damaged, or holds nothing that can be read.
     """
     try:
+        _need_memory(path)
         content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
         from .hdf5 import open_hdf5
 
         return open_hdf5(path)
+    except InputError:
+        raise
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as MATLAB file ({what})", "a whole .mat file") from error
@@ -58,6 +64,15 @@ def open_mat(path: Path) -> LoggerFile:
             path.name, f"no numeric vectors (there is {', '.join(opaque[:6]) or 'nothing'})", hint
         )
     return LoggerFile(path, "MATLAB file", tables)
+
+
+def _need_memory(path: Path) -> None:
+    """Refuses variables that take more memory than is allowed, by their sizes; a few packed bytes may be gigabytes.
+
+    A variable is unpacked, then made an array, so it is there twice for a moment.
+    """
+    declared = sum(_NUMBER_BYTES * math.prod(shape) for _, shape, _ in scipy.io.whosmat(path))
+    need_memory(2.0 * declared, path.name, "its variables")
 
 
 def _leaves(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:

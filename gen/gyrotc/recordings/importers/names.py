@@ -13,6 +13,7 @@ from ..units import Kind, UnitError, conversion, kind_of
 
 __all__ = ["Meaning", "axis_of", "meaning", "split_unit", "words"]
 
+_LONGEST = 256  # characters of a name that is searched for a unit: the search takes the square of it or more
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({<]\s*(?P<unit>[^\])}>]+?)\s*[\])}>]\s*$")
 _AFTER_SIGN = re.compile(r"^(?P<base>[^/,]*[^/,\s])\s*(?:/|,|\bin\b)\s*(?P<unit>\S.*)$")
 _WITH_SIGN = re.compile(
@@ -141,6 +142,8 @@ def words(name: str) -> list[str]:
 @cache
 def split_unit(name: str) -> tuple[str, str | None, str]:
     """A name without its unit, the unit (None: the name gives none), and how it was given."""
+    if len(name) > _LONGEST:
+        return name, None, ""
     if found := _BRACKETS.match(name):
         unit = found["unit"]
         before = split_unit(found["base"]) if kind_of(unit) is None and found["base"] else ("", None, "")

@@ -52,7 +52,7 @@ def _tables(group: Any) -> list[LoggerTable]:
                 columns.append(column)
                 parts[column.name] = _part(channel)
         step = channels[0].properties.get("wf_increment")
-        rate = 1.0 / float(step) if step else None
+        rate = 1.0 / float(step) if step and 0.0 < float(step) < np.inf else None
         name = group.name if len(lengths) == 1 else f"{group.name} ({rows} rows)"
         why = f"wf_increment = {step} s of {channels[0].name}" if rate else ""
         started = _instant(channels[0].properties.get("wf_start_time")) if rate else None
