@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -32,6 +33,8 @@ _EXPECTED = "a catalogue as gyrotc fleet wrote it"
 _APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
 _MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
 _BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
+_MOST_S = 60.0  # a catalogue of 100,000 gyros is read in seconds
+_STEPS = 100_000  # of SQLite's machine between two looks at the clock: milliseconds
 _TOLD = 100  # calibrations of a whole catalogue: a screen or two
 
 SCHEMA = """
@@ -106,11 +109,13 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
     _check_file(path)
     try:
         with closing(sqlite3.connect(path)) as base:
+            _confine(base)
             if base.execute("PRAGMA user_version").fetchone()[0] == 0:
                 with base:
                     base.executescript(
                         f"BEGIN; PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = 1; {SCHEMA}"
                     )
+            _check_schema(base, path)
             yield base
     except sqlite3.OperationalError as error:  # the disk, a lock
         raise GyrotcError(f"{path}: {error}") from error
@@ -118,6 +123,24 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
         raise InputError(
             str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
         ) from error
+
+
+def _confine(base: sqlite3.Connection) -> None:
+    """No function of a foreign schema runs, and no statement for ever: a view may count without an end."""
+    base.execute("PRAGMA trusted_schema = 0")
+    end = time.monotonic() + _MOST_S
+    base.set_progress_handler(lambda: int(time.monotonic() > end), _STEPS)
+
+
+def _check_schema(base: sqlite3.Connection, path: Path) -> None:
+    """The tables and the index are those of gyrotc, and there is nothing else: no view, no trigger."""
+    text = "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%' ORDER BY name"
+    with closing(sqlite3.connect(":memory:")) as empty:
+        empty.executescript(SCHEMA)
+        wanted = empty.execute(text).fetchall()
+    application = base.execute("PRAGMA application_id").fetchone()[0]
+    if application != _APPLICATION or base.execute(text).fetchall() != wanted:
+        raise InputError(str(path), "has other tables than a catalogue", _EXPECTED)
 
 
 def _check_file(path: Path) -> None:
@@ -195,6 +218,8 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
     query = _CARRIED if serial else f"SELECT * FROM calibration ORDER BY id DESC LIMIT {_TOLD}"
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
+            _confine(base)
+            _check_schema(base, path)
             base.row_factory = sqlite3.Row
             rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
             found = tuple(_told(base, row) for row in rows)

@@ -129,6 +129,18 @@ def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:
         catalogued(tmp_path / "a.sqlite", "RLG-1", "2026-01-01")
 
 
+@pytest.mark.parametrize(
+    "more", ["CREATE VIEW more AS SELECT 1", "CREATE TRIGGER t AFTER INSERT ON recording BEGIN SELECT 1; END"]
+)
+def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.sqlite"
+    base = sqlite3.connect(path)
+    base.executescript(f"PRAGMA application_id = {0x47544331}; PRAGMA user_version = 1; {SCHEMA}; {more};")
+    base.close()
+    with pytest.raises(InputError, match="has other tables than a catalogue"):
+        catalogued(path, "RLG-1", "2026-01-01")
+
+
 def test_the_command(fleet: Path, gyrotc: Command) -> None:
     told = gyrotc("catalogue", fleet, "RLG-1", "--on", "2026-08-31")
     assert told.returncode == 0 and "2026-03-01 to 2027-03-01" in told.stdout and "run-01.csv" in told.stdout
