@@ -8,6 +8,7 @@ It names verdict, limits, uncertainty and dates, and the hashes of what they res
 from __future__ import annotations
 
 import hashlib
+import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,7 +125,16 @@ def load_private_key(path: Path, passphrase: Callable[[], str]) -> Ed25519Privat
         raise InputError(str(path), found, expected) from error
     if not isinstance(key, Ed25519PrivateKey):
         raise InputError(str(path), "is a key of another kind", expected)
+    _refuse_shared(path)
     return key
+
+
+def _refuse_shared(path: Path) -> None:
+    """Refuses a private key that others can read or write, as ssh does: it signs for whoever has it."""
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        found = f"is a private key that other users can reach (mode {mode:03o})"
+        raise InputError(str(path), found, f"mode 600: chmod 600 {path.name}")
 
 
 def _serialization() -> Any:
