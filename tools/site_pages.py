@@ -123,7 +123,7 @@ def picture(graph: dict[str, set[str]]) -> str:
         '<path d="M0 0L8 4L0 8z" fill="currentColor"/></marker>'
     )
     return (
-        f'<svg role="img" aria-label="Who imports whom" viewBox="0 0 {width} {height}" width="{width}"'
+        f'<svg role="img" aria-label="What leads to what" viewBox="0 0 {width} {height}" width="{width}"'
         f' style="max-width:100%"><defs>{head}</defs>{"".join(drawn)}</svg>'
     )
 
