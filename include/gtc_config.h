@@ -49,6 +49,16 @@
 #endif
 #endif
 
+/* Fraction bits of a bias in fixed point that this firmware decodes: GTC_<ID>_Q31_BIAS_FRAC_BITS of the emitted header.
+ * Where it is defined, gtc_q31_check() and gtc_q31_open() refuse a table in another unit. Else each table has its own. */
+#ifdef GTC_BIAS_FRAC_BITS
+#define GTC_FRAC_BITS_LEAST GTC_BIAS_FRAC_BITS
+#define GTC_FRAC_BITS_MOST GTC_BIAS_FRAC_BITS
+#else
+#define GTC_FRAC_BITS_LEAST 0
+#define GTC_FRAC_BITS_MOST 60
+#endif
+
 /* 1: two Gaussians in each turn of the loop of the fixed-point map. The bits are the same; it takes
  * 6 % fewer instructions and 90 bytes more. The default follows the compiler's -Os. */
 #ifndef GTC_UNROLL

@@ -30,7 +30,7 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     RANGE(1U, 3600000000U,             1U, 3600000000U),             /* block_us */
     RANGE(2U, GTC_MAX_SLOPE_BLOCKS,    2U, GTC_MAX_SLOPE_BLOCKS),    /* slope_blocks */
     RANGE(0U, 1U,                      0U, 1U),                      /* lead_blocks */
-    RANGE(0U, 0U,                      0U, 60U),                     /* bias_frac_bits */
+    RANGE(0U, 0U,                      GTC_FRAC_BITS_LEAST, GTC_FRAC_BITS_MOST), /* bias_frac_bits */
     RANGE(1U, 16U,                     1U, 16U),                     /* n_networks */
     RANGE(0U, 512U,                    0U, 512U),                    /* n_centers */
     RANGE(1U, GTC_MAX_TERMS + 1,       1U, GTC_MAX_TERMS + 1),       /* n_channels */

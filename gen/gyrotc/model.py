@@ -290,6 +290,7 @@ class Model(_Frozen):
     fallback_dph: Dph
     effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = None
     rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
+    q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
     hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
     agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
@@ -458,7 +459,10 @@ class Model(_Frozen):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object, in the order of docs/FORMAT.md."""
-        return self.model_dump(mode="json", by_alias=True)
+        content = self.model_dump(mode="json", by_alias=True)
+        if self.q31_bias_frac_bits is None:  # a model without a stated unit has no such field
+            del content["q31_bias_frac_bits"]
+        return content
 
     def to_json(self) -> str:
         """Text of `model.json`: the object, and last the checksum that `load_model` demands."""

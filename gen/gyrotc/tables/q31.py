@@ -167,6 +167,10 @@ def surface_of(network: Network, scale: Scale, per_block: float, inputs: Inputs)
 
 _MAX_SPAN = 2**26  # 1024 C in 2^-16 C: an offset times 32 then fits 32 bits
 _FINEST = 28  # largest number of fraction bits of an argument
+# 2^-32 deg/h is 2e-7 of the noise floor of a good laser gyro (1e-3 deg/h) and holds 0.25 deg/h
+_USUAL_BITS = 32
+_STEP_BITS = 4  # a unit 16 times as large: that gyros of one type lie on both sides of a step is rare
+_LARGEST_SIZE = 2**30 - 1024  # so that a sum stays below 2^30 after the rounding of 512 weights
 _COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
 _LARGEST_ARGUMENT = 2**31 - 1  # a signed 32-bit word
 _MAX_FACTOR = 65535  # of s
@@ -232,7 +236,8 @@ def table_of(model: Model) -> Table:
         _fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)
     ]
     largest = max(_size(network.solved) for network in networks)
-    frac_bits = _frac_bits(max(largest, abs(model.fallback_dph)) + term_size_dph(model))
+    size = max(largest, abs(model.fallback_dph)) + term_size_dph(model) + model.rezero_dph
+    frac_bits = _frac_bits(size, model.q31_bias_frac_bits)
     bounds = [_bound(network, inputs, frac_bits) for network in networks]
     of_map, stand_ins = bounds[: len(model.networks)], bounds[len(model.networks) :]
     parts = {part: max(bound[part] for bound in of_map) for part in bounds[0]}
@@ -338,15 +343,19 @@ def _size(surface: Surface) -> float:
     return math.fsum(abs(p) for p in (surface.w0, *surface.linear, *surface.weights))
 
 
-def _frac_bits(size: float) -> int:
-    """Most fraction bits of a bias with which a sum of this size stays below 2^30."""
-    largest = max(size, 2.0**-30)
-    bits = 30 - math.frexp(largest)[1]
-    if largest * 2.0**bits > 2**30 - 1024:  # room for the rounding of 512 weights
-        bits -= 1
-    if bits < 0:
-        raise CheckFailed(f"q31: weights of {largest:.3g} deg/h in all leave the range of 32 bits")
-    return bits
+def _frac_bits(size: float, stated: int | None) -> int:
+    """Fraction bits of a bias: those of the product, else the usual ones, else the most of their steps that fit.
+
+    Tables of gyros of one type then have one unit, whatever their weights are.
+    """
+    steps = range(_USUAL_BITS, -1, -_STEP_BITS) if stated is None else (stated,)
+    for bits in steps:
+        if size * 2.0**bits <= _LARGEST_SIZE:
+            return bits
+    unit = "" if stated is None else f" in the product's unit of 2^-{stated} deg/h (q31_bias_frac_bits)"
+    raise CheckFailed(
+        f"q31: weights, terms and re-zero of {size:.3g} deg/h in all leave the range of 32 bits{unit}"
+    )
 
 
 def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:

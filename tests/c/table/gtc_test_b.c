@@ -128,19 +128,19 @@ static const gtc_word_t q31_serial[16] = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[24] = {
-    B(0x3UL), B(0xff001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00000000UL), B(0x00009fffUL), B(0x00000000UL), B(0x0000ffffUL),
-    B(0x3UL), B(0xee001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000aaaaUL),
-    B(0x0UL), B(0x1e000200UL), B(0x08000030UL), B(0xfc000000UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00005555UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xffe00374UL), B(0x00fffef8UL), B(0xff7fff37UL), B(0x00000000UL), B(0x00009fffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xfdc00374UL), B(0x00fffef8UL), B(0xff7fff37UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000aaaaUL),
+    B(0x0UL), B(0x03c00040UL), B(0x01000006UL), B(0xff800000UL), B(0x00005fffUL), B(0x0000ffffUL), B(0x00005555UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[30] = {
-    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
-    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x00bfffc8UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfebffeabUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x004fff60UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x00bfffc8UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfebffeabUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x004fff60UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -155,26 +155,26 @@ static const gtc_word_t q31_coverage[1] = {
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t q31_sigma[15] = {
-    B(0x0010624eUL), B(0x002712c7UL),
-    B(0x003c32dbUL), B(0x0050fe40UL),
-    B(0x00020c4aUL), B(0x0000346eUL),
-    B(0x0024dd2fUL), B(0x00083127UL),
-    B(0x00041893UL), B(0x003d70a4UL),
-    B(0x00666666UL), B(0x01333333UL),
-    B(0x000c49baUL), B(0x007ae148UL),
+    B(0x00020c4aUL), B(0x0004e259UL),
+    B(0x0007865bUL), B(0x000a1fc8UL),
+    B(0x00004189UL), B(0x0000068eUL),
+    B(0x00049ba6UL), B(0x00010625UL),
+    B(0x00008312UL), B(0x0007ae14UL),
+    B(0x000ccccdUL), B(0x00266666UL),
+    B(0x00018937UL), B(0x000f5c29UL),
     B(0x00000384UL),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0x12b82300UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf1b26fe1UL), B(0x4UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xfcc79590UL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x02e42bb1UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0x20cc6225UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xfb3a97daUL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x00eb92e2UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x21fffe2fUL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0x02570460UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xfe364dfcUL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff98f2b2UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x005c8576UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0x04198c44UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xff6752fbUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x001d725cUL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x043fffc5UL), B(0x2UL),
 };
 
 const gtc_q31_table_t gtc_test_b_q31 = {
@@ -186,11 +186,11 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .block_us = 10000000UL,
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
-    .bias_frac_bits = 27UL,
-    .fallback = 50331648L,
-    .authority = { -579382807L, 830450778L },
+    .bias_frac_bits = 24UL,
+    .fallback = 6291456L,
+    .authority = { -72422852L, 103806347L },
     .effect = { 0L, 0L },
-    .rezero = 4026532L,
+    .rezero = 503316L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 3UL,
@@ -210,7 +210,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x6b413bc4UL,
+    .crc = 0x2687e6a0UL,
     .term_code = { NULL },
 };
 

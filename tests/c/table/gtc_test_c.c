@@ -130,14 +130,14 @@ static const gtc_word_t q31_serial[16] = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xff001b9cUL), B(0x07fff7c0UL), B(0xfbfff9b6UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xffe00374UL), B(0x00fffef8UL), B(0xff7fff37UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[15] = {
-    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x05fffe3fUL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xf5fff557UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x027ffb02UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x00bfffc8UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfebffeabUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x004fff60UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -148,33 +148,33 @@ static const gtc_word_t q31_guards[16] = {
 
 /* kind, channel + 65536 * number of the stand-in among the networks, parameters */
 static const gtc_word_t q31_terms[16] = {
-    B(0x6UL), B(0x1UL), B(0x01000000UL), B(0x0266f984UL), B(0x000b0000UL), B(0x02000000UL), B(0x000d0000UL), B(0xff800000UL), /* auxiliary_curve */
-    B(0x7UL), B(0x1UL), B(0x00800000UL), B(0x000c0000UL), B(0x00400000UL), B(0x000f0000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary_product */
+    B(0x6UL), B(0x1UL), B(0x00200000UL), B(0x0266f984UL), B(0x000b0000UL), B(0x00400000UL), B(0x000d0000UL), B(0xfff00000UL), /* auxiliary_curve */
+    B(0x7UL), B(0x1UL), B(0x00100000UL), B(0x000c0000UL), B(0x00080000UL), B(0x000f0000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary_product */
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t q31_sigma[17] = {
-    B(0x0010624eUL), B(0x002712c7UL),
-    B(0x003c32dbUL), B(0x0050fe40UL),
-    B(0x00020c4aUL), B(0x0000346eUL),
-    B(0x0024dd2fUL), B(0x00083127UL),
-    B(0x00041893UL), B(0x003d70a4UL),
-    B(0x00666666UL), B(0x01333333UL),
-    B(0x000c49baUL), B(0x007ae148UL),
-    B(0x00000384UL), B(0x003d70a4UL),
-    B(0x0028f5c3UL),
+    B(0x00020c4aUL), B(0x0004e259UL),
+    B(0x0007865bUL), B(0x000a1fc8UL),
+    B(0x00004189UL), B(0x0000068eUL),
+    B(0x00049ba6UL), B(0x00010625UL),
+    B(0x00008312UL), B(0x0007ae14UL),
+    B(0x000ccccdUL), B(0x00266666UL),
+    B(0x00018937UL), B(0x000f5c29UL),
+    B(0x00000384UL), B(0x0007ae14UL),
+    B(0x00051eb8UL),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xfefc59f0UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xfadc692bUL), B(0x0UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xfcc79590UL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x02e42bb1UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xfd9990f1UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xf9b91ecbUL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x00eb92e2UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x02675091UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xffdf8b3eUL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xff5b8d25UL), B(0x0UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff98f2b2UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x005c8576UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xffb3321eUL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xff3723d9UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x001d725cUL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x004cea12UL), B(0x2UL),
 };
 
 extern const struct gtc_q31_term_code gtc_q31_term_curve;
@@ -190,11 +190,11 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .block_us = 10000000UL,
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
-    .bias_frac_bits = 27UL,
-    .fallback = 50331648L,
-    .authority = { -1232527861L, 1242930504L },
-    .effect = { -964689920L, 1023410176L },
-    .rezero = 4026532L,
+    .bias_frac_bits = 24UL,
+    .fallback = 6291456L,
+    .authority = { -154065983L, 155366313L },
+    .effect = { -120586240L, 127926272L },
+    .rezero = 503316L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -214,7 +214,7 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .coverage = NULL,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x6288e110UL,
+    .crc = 0xef5aaee4UL,
     .term_code = { &gtc_q31_term_curve, &gtc_q31_term_product },
 };
 

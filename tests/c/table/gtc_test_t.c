@@ -139,16 +139,16 @@ static const gtc_word_t q31_serial[16] = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[16] = {
-    B(0x3UL), B(0xffc006e7UL), B(0x01fffdf0UL), B(0xfefffe6eUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
-    B(0x1UL), B(0xffdfffeaUL), B(0x0100002aUL), B(0xff800000UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL), /* stands in for supply_v */
+    B(0x3UL), B(0xffe00374UL), B(0x00fffef8UL), B(0xff7fff37UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x1UL), B(0xffeffff5UL), B(0x00800015UL), B(0xffc00000UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL), /* stands in for supply_v */
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[20] = {
-    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x017fff90UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfd7ffd56UL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x009ffec0UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
-    B(0x00004cdfUL), B(0xde5e9739UL), B(0x00000000UL), B(0x00000000UL), B(0x00c00024UL), /* 15.00 C, +0.500 C/min; widths 0.500, infinite; +3.750e-01 deg/h */
+    B(0x00006017UL), B(0xf3fd5054UL), B(0x00002670UL), B(0xe994133bUL), B(0x00bfffc8UL), /* -10.00 C, +0.500 C/min; widths 0.400, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfebffeabUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x004fff60UL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x00004cdfUL), B(0xde5e9739UL), B(0x00000000UL), B(0x00000000UL), B(0x00600012UL), /* 15.00 C, +0.500 C/min; widths 0.500, infinite; +3.750e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -160,35 +160,35 @@ static const gtc_word_t q31_guards[16] = {
 /* kind, channel + 65536 * number of the stand-in among the networks, parameters */
 static const gtc_word_t q31_terms[32] = {
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
-    B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00800000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
-    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x00f383c6UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
-    B(0x5UL), B(0x20001UL), B(0x00400000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
+    B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */
+    B(0x3UL), B(0x0UL), B(0x024eed8aUL), B(0x0079c1e3UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* warm_up */
+    B(0x5UL), B(0x20001UL), B(0x00200000UL), B(0x000c0000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary */
 };
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t q31_sigma[19] = {
-    B(0x00041893UL), B(0x0009c4b2UL),
-    B(0x000f0cb7UL), B(0x00143f90UL),
-    B(0x00008312UL), B(0x00000d1bUL),
-    B(0x0009374cUL), B(0x00020c4aUL),
-    B(0x00010625UL), B(0x000f5c29UL),
-    B(0x0019999aUL), B(0x004ccccdUL),
-    B(0x0003126fUL), B(0x001eb852UL),
-    B(0x00000384UL), B(0x00051eb8UL),
-    B(0x000a3d71UL), B(0x00000000UL),
-    B(0x000f5c29UL),
+    B(0x00020c4aUL), B(0x0004e259UL),
+    B(0x0007865bUL), B(0x000a1fc8UL),
+    B(0x00004189UL), B(0x0000068eUL),
+    B(0x00049ba6UL), B(0x00010625UL),
+    B(0x00008312UL), B(0x0007ae14UL),
+    B(0x000ccccdUL), B(0x00266666UL),
+    B(0x00018937UL), B(0x000f5c29UL),
+    B(0x00000384UL), B(0x00028f5cUL),
+    B(0x00051eb8UL), B(0x00000000UL),
+    B(0x0007ae14UL),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xffbf167cUL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xfeb71a4aUL), B(0x0UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xff31e564UL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x00b90aecUL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xff66643cUL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xfe6e47b2UL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x003ae4b8UL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x0099d424UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xffdf8b3eUL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xff5b8d25UL), B(0x0UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff98f2b2UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x005c8576UL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xffb3321eUL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xff3723d9UL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x001d725cUL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x004cea12UL), B(0x2UL),
 };
 
 extern const struct gtc_q31_term_code gtc_q31_term_memory;
@@ -208,11 +208,11 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .block_us = 10000000UL,
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
-    .bias_frac_bits = 25UL,
-    .fallback = 12582912L,
-    .authority = { -134938150L, 122858746L },
-    .effect = { -67978665L, 67978665L },
-    .rezero = 1006633L,
+    .bias_frac_bits = 24UL,
+    .fallback = 6291456L,
+    .authority = { -67469075L, 61429373L },
+    .effect = { -33989333L, 33989333L },
+    .rezero = 503316L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -232,7 +232,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .coverage = NULL,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x71b86a71UL,
+    .crc = 0xdfb784b2UL,
     .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
 };
 

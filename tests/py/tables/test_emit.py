@@ -229,6 +229,39 @@ def test_the_same_model_gives_the_same_words() -> None:
     assert quantise(random_model(7), "f32").words == quantise(random_model(7), "f32").words
 
 
+def _scaled(model_dict: dict[str, Any], factor: float, **fields: Any) -> Model:
+    """The model with all biases multiplied."""
+    networks = [
+        network
+        | {"w0": factor * network["w0"]}
+        | {name: [factor * x for x in network[name]] for name in ("linear", "weights")}
+        for network in model_dict["networks"]
+    ]
+    fallback = factor * model_dict["fallback_dph"]
+    return Model.from_dict(model_dict | {"networks": networks, "fallback_dph": fallback} | fields)
+
+
+def test_the_unit_of_fixed_point_does_not_follow_the_weights(model_dict: dict[str, Any]) -> None:
+    """A calibration whose weights differ by a third has the unit of the one before: 2^-32 deg/h, where that holds."""
+    found = [quantise(_scaled(model_dict, k), "q31").bias_frac_bits for k in (0.4, 0.5, 0.75, 1.0, 1.33)]
+    assert found == [32] * 5
+
+
+def test_there_is_room_for_a_re_zero_in_fixed_point(model_dict: dict[str, Any]) -> None:
+    """The largest shift counts in the choice of the unit: no table is left out because of it."""
+    table = quantise(_scaled(model_dict, 1.0, rezero_dph=0.9), "q31")
+    assert table.bias_frac_bits == 28
+    assert table.decode_bias([table.rezero])[0] == pytest.approx(0.9, abs=1e-8)
+
+
+def test_the_unit_that_a_product_states_is_the_table_s(model_dict: dict[str, Any]) -> None:
+    model = _scaled(model_dict, 1.0, q31_bias_frac_bits=30)
+    assert Model.from_dict(model.to_dict()) == model
+    assert quantise(model, "q31").bias_frac_bits == 30
+    with pytest.raises(CheckFailed, match="in the product's unit of 2\\^-40 deg/h"):
+        quantise(_scaled(model_dict, 1.0, q31_bias_frac_bits=40), "q31")
+
+
 def test_the_gaussian_is_as_good_as_the_bound_says() -> None:
     u = np.linspace(0.0, 2047.4, 300001).astype(np.float32)
     relative = gauss(u) / np.exp2(-u.astype(np.float64) / 64.0) - 1.0
