@@ -74,6 +74,7 @@ def main() -> None:
     Arrow's read-ahead threads may still hold a Python file when the interpreter goes; it would end them inside C++
     code, which aborts the process after its work is done.
     """
+    _open_closed_streams()
     _quiet_start()
     _single_threaded()
     _without_warnings()
@@ -87,6 +88,17 @@ def main() -> None:
             print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
         die_of(end.number)
     os._exit(status)
+
+
+def _open_closed_streams() -> None:
+    """Standard streams that were closed lead nowhere, else the next file opened would get their number."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            handle = os.open(os.devnull, os.O_RDWR)
+            if handle != number:
+                os.dup2(handle, number)
+                os.close(handle)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8", closefd=False))
 
 
 def _quiet_start() -> None:

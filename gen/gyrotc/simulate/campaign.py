@@ -128,6 +128,8 @@ class RowForm:
     @classmethod
     def of(cls, row_s: float, raw_hz: float | None, pulses: bool, format: Format) -> RowForm:
         """Raises `InputError` for a length that cannot be."""
+        if format not in ("csv", "parquet"):
+            raise InputError("--format", repr(format), "csv or parquet")
         return cls(RowLength.of(row_s, raw_hz), pulses, format)
 
 

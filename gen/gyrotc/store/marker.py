@@ -332,7 +332,7 @@ def check_apart(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) 
         raise InputError(str(out), "is the root of a file system", "a folder inside it")
     named = [(path, "the data set") for path in inputs] + [(path, "gyrotc's sources") for path in _sources()]
     for path, name in named:
-        other = path.resolve()
+        other = Path(os.path.realpath(path))  # resolve() raises for a loop of links until Python 3.13
         if place == other:
             raise InputError(str(out), f"is {name}", "a folder beside it")
         if whole and place in other.parents:
