@@ -134,7 +134,7 @@ def _confine(base: sqlite3.Connection) -> None:
 
 def _check_schema(base: sqlite3.Connection, path: Path) -> None:
     """The tables and the index are those of gyrotc, and there is nothing else: no view, no trigger."""
-    text = "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%' ORDER BY name"
+    text = "SELECT type, name, sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY name"
     with closing(sqlite3.connect(":memory:")) as empty:
         empty.executescript(SCHEMA)
         wanted = empty.execute(text).fetchall()

@@ -130,7 +130,8 @@ def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "more", ["CREATE VIEW more AS SELECT 1", "CREATE TRIGGER t AFTER INSERT ON recording BEGIN SELECT 1; END"]
+    "more",
+    ["CREATE VIEW more AS SELECT 1", "CREATE TRIGGER sqlitet AFTER INSERT ON recording BEGIN SELECT 1; END"],
 )
 def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, tmp_path: Path) -> None:
     path = tmp_path / "a.sqlite"

@@ -28,7 +28,7 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
         writes = isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         if writes or (isinstance(mode, str) and set(mode) & set("wax+")):
             _opened.append(os.fsdecode(path))  # type: ignore[arg-type]
-    elif event == "sqlite3.connect" and "?mode=ro" not in str(arguments[0]):
+    elif event == "sqlite3.connect" and arguments[0] != ":memory:" and "?mode=ro" not in str(arguments[0]):
         _opened.append(os.fsdecode(arguments[0]))  # type: ignore[arg-type]
 
 
