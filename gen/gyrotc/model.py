@@ -215,7 +215,7 @@ class Term(_Frozen):
         if cause.needs.channel != (self.channel is not None):
             raise ValueError("a channel belongs to an auxiliary term and to no other")
         if self.stand_in is not None and (self.channel is None or self.stand_in.region is not None):
-            raise ValueError("a stand-in belongs to a term with a channel, and has no region")
+            raise ValueError("a fallback model belongs to a term with a channel, and has no region")
         return self
 
     @model_serializer(mode="wrap")

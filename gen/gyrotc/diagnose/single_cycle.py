@@ -284,7 +284,7 @@ class Cycle:
         """Why memory can be neither named nor ruled out here; empty where it can."""
         if self.turns == 0:
             return (
-                "the temperature never turns, so that a memory of it cannot be told from a map of T: "
+                "the temperature never turns, so that a memory of it cannot be distinguished from a map of T: "
                 "record the way back, too"
             )
         if self.chosen is None or self.causes:

@@ -88,7 +88,7 @@ def next_steps(
         untestable: Ids of the causes that these recordings cannot test.
         shipped: Whether an extension is.
     """
-    steps = [f"To tell them apart: {c.separate_by}." for c in causes if c.separate_by]
+    steps = [f"To separate them: {c.separate_by}." for c in causes if c.separate_by]
     if verdict == "explained" and not shipped:
         remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
         steps.append(f"Against it: {'; '.join(remedies)}.")

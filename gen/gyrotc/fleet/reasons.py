@@ -152,7 +152,7 @@ def _thermometers(kind: _Kind) -> Iterator[Reason]:
         if abs(shift) > max(_FAR * scatter, _LEAST_SHIFT_C):
             more = "more" if shift > 0.0 else "less"
             text = (
-                f"thermometer apart: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
+                f"thermometer differs: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
             )
             yield _reason(entry, "thermometer_apart", text)
 
@@ -218,7 +218,7 @@ def _bias_apart(kind: _Kind) -> Iterator[Reason]:
     for entry, curve in zip(kind.entries, kind.curves, strict=True):
         far = kind.distance(curve)
         if _FAR < far < np.inf:
-            text = f"bias over temperature apart from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
+            text = f"bias over temperature differs from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
             yield _reason(entry, "bias_apart", text)
 
 

@@ -323,7 +323,7 @@ def _stranger(use: LotUse) -> dict[str, Any]:
     return {
         "id": "not_of_its_lot",
         "text": f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
-        "units is refused), so it was calibrated without it, from its own runs alone. Look for what sets it apart: "
+        "units is refused), so it was calibrated without it, from its own runs alone. Look for what makes it differ: "
         "another design, another batch of mirrors, the wrong lot, a fault.",
         "evidence": {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum},
     }

@@ -101,7 +101,7 @@ class NamedCause(Part):
     p_value: Figure = Field(description="adjusted for the whole search")
     parameters: dict[str, Estimate] = Field(description="fitted parameters by name")
     equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
-    separate_by: str | None = Field(description="the experiment that would tell them apart")
+    separate_by: str | None = Field(description="the experiment that would separate them")
     probabilities: dict[str, float] | None = Field(
         default=None, description="of this cause and of the others in its place, by id; those above 1 %"
     )
@@ -177,7 +177,7 @@ class CycleResult(Part):
     map_rms_dph: float = Field(description="what a map of temperature alone leaves, deg/h")
     turns: Count = Field(description="how often the temperature turns")
     not_testable: str | None = Field(
-        description="why memory cannot be told from a static map; null where it can"
+        description="why memory cannot be distinguished from a static map; null where it can"
     )
     gain: GainOnUnseen | None = Field(
         description="of the best memories on unseen runs; null where there are none"

@@ -276,7 +276,7 @@ class Apart(Part):
     rms_dph: float = Field(description="deg/h")
     mean_dph: float = Field(description="deg/h")
     max_abs_dph: float = Field(description="deg/h")
-    at: At = Field(description="where they are farthest apart")
+    at: At = Field(description="where they differ most")
     rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null where that is not known")
     expanded_uncertainty_dph: Amount | None = Field(
         default=None,

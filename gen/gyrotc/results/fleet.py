@@ -64,7 +64,7 @@ class CatalogueAnswer(Result):
     schema_: Annotated[Literal["gyrotc.catalogue/1"], Field(alias="schema")] = "gyrotc.catalogue/1"
     serial: str | None = Field(description="that was asked for; null: none")
     axis: None = Field(description="each calibration has its own")
-    day: str | None = Field(description="that was asked for; null: every calibration is told")
+    day: str | None = Field(description="that was asked for; null: every calibration is listed")
     calibrations: Count = Field(description="in the catalogue")
     found: tuple[Catalogued, ...] = Field(description="one for each axis, or the last 100 that were entered")
 

@@ -63,7 +63,7 @@ class LotUnit(Part):
 
     serial: str = Field(description="gyro serial")
     model_hash: str = Field(description="hash of its model")
-    cluster: int | None = Field(description="number of its cluster, from 0; null: it was set aside")
+    cluster: int | None = Field(description="number of its cluster, from 0; null: it was excluded")
     p_value: Share = Field(description="probability that a unit of the lot without it lies as far from it")
 
 

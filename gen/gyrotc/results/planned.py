@@ -144,7 +144,7 @@ class Hard(Part):
     """Two causes that are hard to separate."""
 
     pair: tuple[str, str] = Field(description="ids")
-    d: float = Field(description="size from which they are told apart")
+    d: float = Field(description="size from which they are separated")
     add: str = Field(description="what would part them")
 
 
@@ -172,7 +172,7 @@ class TriedRun(Part):
 
     profile: str = Field(description="its name")
     hours: float = Field(description="h")
-    d: float = Field(description="size from which the pair is told apart with it")
+    d: float = Field(description="size from which the pair is separated with it")
 
 
 class Additions(Part):
@@ -211,7 +211,7 @@ class Plan(Result):
     runs: tuple[PlannedRun, ...] = Field(description="of the profile")
     limits: tuple[PlanLimit, ...] = Field(description="what will be found")
     not_testable: dict[str, str] = Field(description="causes that cannot be tested, with the reason")
-    separability: tuple[Separability, ...] = Field(description="what can be told from what")
+    separability: tuple[Separability, ...] = Field(description="what can be distinguished from what")
     hard_to_separate: tuple[Hard, ...] = Field(description="the hardest first")
     accuracy: tuple[Accuracy, ...] = Field(description="after each run")
     shortest: Shortest | None = Field(description="where limits were required")

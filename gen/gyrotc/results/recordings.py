@@ -27,7 +27,7 @@ class MarkedRows(Part):
     """Rows that something is reported of."""
 
     file: str = Field(description="as in `dataset.toml`")
-    rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not told")
+    rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not stated")
     span_s: tuple[float, float] | None = Field(description="their times on the file's clock, s")
 
 
@@ -43,9 +43,9 @@ class Problem(Part):
 class Doubted(Part):
     """What a person should look at."""
 
-    id: str = Field(description="stable name of the doubt")
+    id: str = Field(description="stable name of the warning")
     where: str = Field(description="file, or `data set`")
-    text: str = Field(description="what is doubtful")
+    text: str = Field(description="what is suspect")
     next: str = Field(description="what to do next; empty where `text` says it")
     rows: tuple[MarkedRows, ...] = Field(description="rows that it is about, the first ones")
 
@@ -136,7 +136,7 @@ class TrueLot(Part):
     units: int = Field(description="gyros in the lot")
     family: Share = Field(description="correlation of each parameter between two units of one cluster")
     clusters: int = Field(description="groups with a center of their own")
-    cluster: int = Field(description="number of the group, from 0; of a stranger that of none: -1")
+    cluster: int = Field(description="number of the group, from 0; of a foreign unit that of none: -1")
     stranger: bool = Field(description="whether it shares nothing with the lot but the scenario")
     scores: dict[str, float] = Field(description="every parameter that was drawn, in standard deviations")
 

@@ -171,7 +171,8 @@ class MapError(Part):
     mean_dph: float | None = Field(default=None, description="mean there, deg/h; only of `--exhaustive`")
     inputs_visited: Count = Field(description="inputs that were tried")
     mismatches: Count | None = Field(
-        default=None, description="inputs that differ from integers computed apart; only of `--exhaustive`"
+        default=None,
+        description="inputs that differ from integers computed separately; only of `--exhaustive`",
     )
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
 

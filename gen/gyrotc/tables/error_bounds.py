@@ -341,7 +341,7 @@ def handover_error_dph(
     blended = counts.sum(axis=0) > 1
     if np.any(blended & (room <= 0.0)):
         raise CheckFailed(
-            f"{numeric}: networks hand over within less than this arithmetic can tell apart; let their regions "
+            f"{numeric}: networks hand over within less than this arithmetic can separate; let their regions "
             f"overlap by more than {float(np.max(moved)):.1g} of their width"
         )
     apart = _apart(model, axes, lines, counts)

@@ -120,7 +120,7 @@ def _terms(table: Table, limits: Limits) -> Iterator[str]:
         kind = int(record[0])
         last += stand_in != 0
         if stand_in and (stand_in != last or channel == 0):
-            yield f"stand-in of a term is network {stand_in}"
+            yield f"fallback model of a term is network {stand_in}"
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
         elif channel >= table.n_channels or (channel != 0) != TableKind(kind).reads_channel:

@@ -189,6 +189,6 @@ def _beyond(method: str, against: str) -> dict[str, object]:
     return {
         "id": "map_beyond_data",
         "text": f"The map of {method}, which was asked for by name, should not be used: {against}. Without --method "
-        "the ladder chooses a correction that keeps to the data.",
+        "model selection chooses a correction that keeps to the data.",
         "evidence": {"method": method},
     }

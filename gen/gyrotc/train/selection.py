@@ -563,7 +563,7 @@ def _advice(ladder: Ladder) -> str:
         return "One run says nothing about another: record the same cycle at least twice more, after a power-on each."
     if branches == 0:
         return (
-            "In each run temperature goes one way, so that it, its rate and time cannot be told apart: record runs "
+            "In each run temperature goes one way, so that it, its rate and time cannot be separated: record runs "
             "that come back, and repeat them."
         )
     return "Repeat the runs with the same programme, after a power-on each: what repeats can be corrected."
@@ -572,6 +572,6 @@ def _advice(ladder: Ladder) -> str:
 def _refusal(name: str, text: str) -> dict[str, Any]:
     return {
         "id": "map_refused",
-        "text": f"The ladder goes on without {NAMES[name]} ({name}): {text}.",
+        "text": f"Model selection goes on without {NAMES[name]} ({name}): {text}.",
         "evidence": {"method": name, "reason": text},
     }

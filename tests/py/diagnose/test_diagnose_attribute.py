@@ -575,7 +575,7 @@ def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> N
 
 def test_an_ambiguous_verdict_names_the_experiment() -> None:
     steps = next_steps("ambiguous", result("ambiguous").causes, [], shipped=True)
-    assert steps == ["To tell them apart: holds from both sides."]
+    assert steps == ["To separate them: holds from both sides."]
 
 
 def test_what_no_table_holds_has_its_own_remedy() -> None:

@@ -84,7 +84,7 @@ def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(tmp_path: Path
     (tmp_path / "a.csv").write_text("Zeit [s];Temp [°C];Rate [°/h]\n" + "\n".join(lines) + "\n", "utf-8")
     status, _, error = run_alone("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 2
-    assert "no column that a rate is told from" in error
+    assert "no column that gives a rate" in error
     stated = ("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--csv", "thousands=.")
     status, _, error = run_alone(*stated)
     assert status == 0, error
@@ -207,7 +207,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
             lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}",
         ),
         (),
-        ("cannot be told apart", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
+        ("cannot be distinguished", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
         ("--time-format", "%d/%m/%Y %H:%M:%S"),
     ),
     "stamps too coarse": (
@@ -227,7 +227,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     "no times": (
         lines("temp_c,rate_dph", lambda k, t, r: f"{t},{r}"),
         (),
-        ("no column that a time is told from", "--rate-hz"),
+        ("no column that gives a time", "--rate-hz"),
         ("--rate-hz", "0.1"),
     ),
     "the hours of deg/hr taken for a time": (
@@ -263,7 +263,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
             ),
         ),
         (),
-        ("no column that a time is told from", "as Zeit [ms] holds", "--csv thousands=."),
+        ("no column that gives a time", "as Zeit [ms] holds", "--csv thousands=."),
         ("--csv", "thousands=."),
     ),
     "a unit that is none": (

@@ -266,5 +266,5 @@ def _form(file: str, columns: Sequence[Column]) -> str:
         raise InputError(where, found, '--time-format "%H:%M" or --time-format "%M:%S"')
     if len(forms) > 1:
         choices = " or ".join(f'--time-format "{form}"' for form in forms[:3])
-        raise InputError(where, f"{texts[0]!r}: day and month cannot be told apart", choices)
+        raise InputError(where, f"{texts[0]!r}: day and month cannot be distinguished", choices)
     return forms[0]

@@ -242,7 +242,7 @@ def _values(
     best = max((one[2] for one in likely), default=0)
     top = [one for one in likely if one[2] == best]
     if not top:
-        unseen = f"no column that a rate is told from among {listed(file)}"
+        unseen = f"no column that gives a rate among {listed(file)}"
         if made := nameless(file):
             raise InputError(file.path.name, f"{unseen}: nothing stands above its rows", made)
         raise InputError(file.path.name, unseen, increments(file) or name_it("rate") + in_text(file, "rate"))
@@ -318,7 +318,7 @@ def _temperature(
     if not top:
         raise InputError(
             file.path.name,
-            f"no column that a temperature is told from among {listed(file)}",
+            f"no column that gives a temperature among {listed(file)}",
             name_it("temperature") + in_text(file, "temperature"),
         )
     if len(top) > 1:
@@ -364,7 +364,7 @@ def _time(
     expected = (
         '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
     )
-    unseen = f"no column that a time is told from among {listed(file)}"
+    unseen = f"no column that gives a time among {listed(file)}"
     raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 
 
