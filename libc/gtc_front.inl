@@ -329,7 +329,7 @@ static int FN(take_temperature)(STATE *state, NUM x)
     int verdict = IS_HELD;
 
     if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
-        || (!((x >= ELEMENT(guard[0])) && (x <= ELEMENT(guard[1]))))) {
+        || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
         FN(refuse)(in, state->period_us);
     } else {
         verdict = FN(admit)(state, in, guard, x);
@@ -352,10 +352,10 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
         FN(refuse)(in, state->period_us);
         return;
     }
-    if (x < ELEMENT(guard[0])) {
-        x = ELEMENT(guard[0]);
-    } else if (x > ELEMENT(guard[1])) {
-        x = ELEMENT(guard[1]);
+    if (x < ELEMENT(guard[GUARD_LOW])) {
+        x = ELEMENT(guard[GUARD_LOW]);
+    } else if (x > ELEMENT(guard[GUARD_HIGH])) {
+        x = ELEMENT(guard[GUARD_HIGH]);
     } else {
         /* in its range */
     }

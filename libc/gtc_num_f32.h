@@ -304,8 +304,8 @@ static inline float FN(limit)(const gtc_word_t *guard, uint_least32_t us)
     const float time = (float)us;
     float limit;
 
-    limit = guard[3].value * time;
-    limit = guard[2].value + limit;
+    limit = guard[GUARD_RATE].value * time;
+    limit = guard[GUARD_STEP].value + limit;
     return limit;
 }
 

@@ -412,7 +412,7 @@ static inline int_least32_t FN(unmixed)(const BLEND *blend, int_least32_t otherw
 /* max_step + max_rate * time, or the largest number */
 static inline uint_least32_t FN(limit)(const gtc_word_t *guard, uint_least32_t us)
 {
-    const uint_least64_t limit = guard[2].bits + (((uint_least64_t)guard[3].bits * us) >> 24);
+    const uint_least64_t limit = guard[GUARD_STEP].bits + (((uint_least64_t)guard[GUARD_RATE].bits * us) >> 24);
 
     return (limit < 0xFFFFFFFFU) ? (uint_least32_t)limit : 0xFFFFFFFFU;
 }

@@ -52,6 +52,10 @@ uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_l
 #define READS_CHANNEL(kind) ((kind) >= GTC_TERM_AUXILIARY)
 
 /* Words of a guard. */
+#define GUARD_LOW 0U
+#define GUARD_HIGH 1U
+#define GUARD_STEP 2U
+#define GUARD_RATE 3U
 #define GUARD_AGREE 4U
 #define GUARD_STUCK 5U
 #define GUARD_MISSING 6U

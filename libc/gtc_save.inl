@@ -192,14 +192,14 @@ static int FN(counts_fit)(const STATE *state, const INPUT *in, const gtc_word_t 
  * have left is refused. */
 static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
 {
-    const NUM low = FN(lesser_of)(ELEMENT(guard[0]), NUM_ZERO);
-    const NUM high = -FN(lesser_of)(-ELEMENT(guard[1]), NUM_ZERO);
+    const NUM low = FN(lesser_of)(ELEMENT(guard[GUARD_LOW]), NUM_ZERO);
+    const NUM high = -FN(lesser_of)(-ELEMENT(guard[GUARD_HIGH]), NUM_ZERO);
     int numbers = FN(counts_fit)(state, in, guard);
 
     numbers &= FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
                & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high);
     /* The sum last: its bounds are products of what was tested before. */
-    return (numbers != 0) ? FN(sum_fits)(in, ELEMENT(guard[0]), ELEMENT(guard[1])) : 0;
+    return (numbers != 0) ? FN(sum_fits)(in, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH])) : 0;
 }
 
 /* A temperature of the window, or of a term, which an envelope may have moved. */

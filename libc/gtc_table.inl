@@ -216,21 +216,22 @@ static int FN(members_fit)(const TABLE *table)
  * two samples leaves its word. */
 static int FN(guard_fits)(const gtc_word_t *guard, uint_least32_t channel)
 {
-    const NUM low = ELEMENT(guard[0]);
-    const NUM high = ELEMENT(guard[1]);
+    const NUM low = ELEMENT(guard[GUARD_LOW]);
+    const NUM high = ELEMENT(guard[GUARD_HIGH]);
     int fit = FN(numbers_fit)(guard, FN(guard_limits), 4U)
-              & FN(numbers_fit)(&guard[7], FN(guard_limits), 1U) & ((low <= high) ? 1 : 0);
+              & FN(numbers_fit)(&guard[GUARD_FALLBACK], FN(guard_limits), 1U) & ((low <= high) ? 1 : 0);
     uint_least32_t i;
 
     for (i = 0U; i < 3U; i++) {
-        fit &= ((guard[4U + i].bits >= FN(guard_wholes)[i][0]) && (guard[4U + i].bits <= FN(guard_wholes)[i][1]))
+        fit &= ((guard[GUARD_AGREE + i].bits >= FN(guard_wholes)[i][0])
+                && (guard[GUARD_AGREE + i].bits <= FN(guard_wholes)[i][1]))
                    ? 1
                    : 0;
     }
     if (channel == 0U) {
         fit &= ((low >= NUM_PLAUSIBLE_MIN) && (high <= NUM_PLAUSIBLE_MAX)) ? 1 : 0;
     } else {
-        fit &= ((ELEMENT(guard[7]) >= low) && (ELEMENT(guard[7]) <= high)) ? 1 : 0;
+        fit &= ((ELEMENT(guard[GUARD_FALLBACK]) >= low) && (ELEMENT(guard[GUARD_FALLBACK]) <= high)) ? 1 : 0;
     }
     return fit;
 }
