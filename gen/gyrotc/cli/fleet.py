@@ -59,6 +59,11 @@ def fleet(
     gathered: Annotated[
         bool, typer.Option("--gather", help="Only the summary of what shares have done.")
     ] = False,
+    release: Annotated[
+        list[str] | None,
+        typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it."),
+    ] = None,
+    why: Annotated[str, typer.Option("--reason", help="Why, for --release.")] = "",
     lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -73,6 +78,9 @@ def fleet(
     from ..fleet.run import Cluster, gather, run_fleet, run_share
 
     share = share_of(shard) if shard else None
+    if bool(release) != bool(why.strip()):
+        raise InputError("--release", "and --reason go together", "--release SERIAL --reason TEXT")
+    releases = dict.fromkeys(release or (), " ".join(why.split()))
     if share and gathered:
         raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
@@ -83,15 +91,23 @@ def fleet(
         if share:
             entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, told=told)
         elif gathered:
-            entries = gather(wanted, out, full=full, tag=tag, told=told)
+            entries = gather(wanted, out, full=full, tag=tag, releases=releases, told=told)
         else:
-            entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, told=told)
+            entries = run_fleet(
+                wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, releases=releases, told=told
+            )
     if share:
         _tell_share(shard or "", entries)
         return
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     _tell_comparison(summary)
+    for unit in summary.serials:
+        if unit.barred:
+            tell(
+                f"{unit.name}: not in the catalogue, in no lot: {', '.join(unit.barred)}; look at it, or "
+                f"--release {unit.serial} --reason TEXT"
+            )
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""

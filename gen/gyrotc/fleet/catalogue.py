@@ -18,7 +18,8 @@ from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..jobs.release import unit_of
 from ..model import Model, load_model
-from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry
+from ..results.base import read_optional
+from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry, FleetSummary
 from ..store.files import check_own, open_or_create, write_own
 from ..store.folder import kept_by_hash, result_folder
 from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
@@ -81,7 +82,8 @@ ORDER BY axis
 def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     """Adds what a fleet has made and the catalogue does not have yet; returns how many calibrations that are.
 
-    Gyros under one serial are not distinguished by it, so none of them is entered.
+    Gyros under one serial are not distinguished by it, so none of them is entered; nor is one that a finding in
+    `fleet.json` bars. Of one that is released nevertheless the reason goes into its tag.
 
     Args:
         out: The fleet's folder; each entry's result lies in the folder of its name.
@@ -92,7 +94,13 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
         GyrotcError: It cannot be written.
     """
     counts = Counter((entry.serial, entry.axis) for entry in entries)
-    made = [e for e in entries if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1]
+    summary = read_optional(out / "fleet.json", FleetSummary)
+    barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
+    made = [
+        e
+        for e in entries
+        if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1 and e.name not in barred
+    ]
     place = out / CATALOGUE
     if not made and not place.exists():
         return 0
@@ -101,7 +109,11 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
         known = set(base.execute("SELECT serial, axis, input_sha256 FROM calibration"))
         new = [e for e in made if (e.serial, e.axis or "", e.key) not in known]
         with base:  # one transaction
-            return sum(_add(base, out, entry, tag) for entry in new)
+            return sum(_add(base, out, entry, _tag_of(entry, tag)) for entry in new)
+
+
+def _tag_of(entry: FleetEntry, tag: str) -> str:
+    return f"{tag}; released: {entry.released}".removeprefix("; ") if entry.released else tag
 
 
 @contextmanager

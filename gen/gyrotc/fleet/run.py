@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -246,6 +246,7 @@ def run_fleet(
     cluster: Cluster | None = None,
     full: bool = False,
     tag: str = "",
+    releases: Mapping[str, str] | None = None,
     told: Told | None = None,
 ) -> list[FleetEntry]:
     """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
@@ -255,6 +256,7 @@ def run_fleet(
         jobs: Processes on this machine.
         cluster: To use instead; its workers see the same folders.
         tag: Goes into the catalogue with what is new in it.
+        releases: Reasons, by serial, for which units are released although a finding bars them.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
         told: Called with each entry as it comes, those of earlier calls first.
 
@@ -265,7 +267,7 @@ def run_fleet(
     place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        entries = _run(fleet, place, jobs, cluster, full, told or (lambda _: None))
+        entries = _run(fleet, place, jobs, cluster, full, told or (lambda _: None), releases)
         enter(place, entries, tag)
         return entries
     finally:
@@ -316,7 +318,13 @@ def _without_summary(out: Path) -> None:
 
 
 def gather(
-    fleet: Fleet, out: Path, *, full: bool = False, tag: str = "", told: Told | None = None
+    fleet: Fleet,
+    out: Path,
+    *,
+    full: bool = False,
+    tag: str = "",
+    releases: Mapping[str, str] | None = None,
+    told: Told | None = None,
 ) -> list[FleetEntry]:
     """The summary and the catalogue of the results that shares have made; arguments as of `run_fleet`.
 
@@ -333,7 +341,7 @@ def gather(
             known = made_before(task.keyed())
             entries.append(known.as_kept() if known else _unfinished(task, _NO_RESULT))
             say(entries[-1])
-        found = _summed(place, entries)
+        found = _summed(place, entries, releases)
         enter(place, found, tag)
         return found
     finally:
@@ -368,7 +376,13 @@ def tasks_of(fleet: Fleet, out: Path, full: bool) -> list[Task]:
 
 
 def _run(
-    fleet: Fleet, out: Path, jobs: int, cluster: Cluster | None, full: bool, say: Told
+    fleet: Fleet,
+    out: Path,
+    jobs: int,
+    cluster: Cluster | None,
+    full: bool,
+    say: Told,
+    releases: Mapping[str, str] | None,
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
     tasks = tasks_of(fleet, out, full)
@@ -376,7 +390,7 @@ def _run(
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
         write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
-    return _summed(out, _worked(tasks, entries, jobs, cluster, say))
+    return _summed(out, _worked(tasks, entries, jobs, cluster, say), releases)
 
 
 def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
@@ -402,9 +416,15 @@ def _worked(
     return [entries[number] for number in range(len(tasks))]
 
 
-def _summed(out: Path, entries: Sequence[FleetEntry]) -> list[FleetEntry]:
+def _summed(out: Path, entries: Sequence[FleetEntry], releases: Mapping[str, str] | None) -> list[FleetEntry]:
     """Writes the summary; the entries as it tells them."""
-    found = list(_one_of_each_serial(entries))
+    why = releases or {}
+    found = [
+        entry.model_copy(update={"released": why[entry.serial]})
+        if entry.serial is not None and entry.serial in why
+        else entry
+        for entry in _one_of_each_serial(entries)
+    ]
     write_summary(out, found)
     return found
 

@@ -12,7 +12,8 @@ from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
-from ..results.base import read_result
+from ..results.base import read_optional, read_result
+from ..results.fleet import FleetSummary
 from ..results.lot import AtRest, CrossValidation, Lot, LotCluster, LotUnit
 from ..results.training import Training
 from ..store.files import digest_of
@@ -89,10 +90,12 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
 
 
 def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
-    """Units of one axis, in the order of their folders; one under two names counts once."""
+    """Units of one axis, in the order of their folders; one under two names counts once, one that is barred not."""
     if not fleet.is_dir():
         raise InputError(str(fleet), "is no folder", "what gyrotc fleet wrote")
-    places = sorted(p.parent for p in fleet.glob("*/training.json"))
+    summary = read_optional(fleet / "fleet.json", FleetSummary)
+    barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
+    places = sorted(p.parent for p in fleet.glob("*/training.json") if p.parent.name not in barred)
     units = [_unit(place) for place in places]
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:

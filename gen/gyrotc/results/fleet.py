@@ -69,6 +69,12 @@ class CatalogueAnswer(Result):
     found: tuple[Catalogued, ...] = Field(description="one for each axis, or the last 100 that were entered")
 
 
+BARRING = frozenset(
+    {"sign_reversed", "axes_exchanged", "copy_of_other", "not_of_its_lot", "does_not_generalise"}
+)
+"""Findings that say that the recordings are not this gyro's, or that it is not calibrated: no release by itself."""
+
+
 class FleetUnit(Part):
     """One gyro; figures are absent where no table was made, and null where they were not measured."""
 
@@ -116,6 +122,16 @@ class FleetUnit(Part):
     )
     copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows")
     apart: str | None = Field(default=None, description="why it is an outlier, as in `apart` of the fleet")
+
+    released: str | None = Field(
+        default=None,
+        description="why it is released although a finding bars it (`--release`); null: it is not",
+    )
+
+    @property
+    def barred(self) -> tuple[str, ...]:
+        """Findings for which no catalogue and no lot takes it; none where a release is recorded."""
+        return () if self.released else tuple(sorted(BARRING & {*self.findings}))
 
 
 class LikelyStep(Part):

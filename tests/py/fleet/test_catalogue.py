@@ -163,7 +163,9 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
         head = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"'
         text = toml('file = "run-01.csv"', head=head) + "\n[meta]\ncalibrated_on = 2026-03-01\n"
         (folder / "d" / serial / "dataset.toml").write_text(text)
-    run_fleet(load_manifest(folder / "d"), folder / "out", jobs=1)
+    run_fleet(
+        load_manifest(folder / "d"), folder / "out", jobs=1, releases={"RLG-1": "copies", "RLG-2": "copies"}
+    )
     return folder / "out"
 
 

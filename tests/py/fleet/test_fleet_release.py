@@ -1,0 +1,51 @@
+"""A unit that a finding bars enters neither catalogue nor lot, unless its release is recorded with a reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from conftest import Command
+from gyrotc.fleet import run
+from gyrotc.fleet.catalogue import catalogued
+from gyrotc.fleet.manifest import load_manifest
+from gyrotc.results.base import read_result
+from gyrotc.results.fleet import FleetSummary, FleetUnit
+from test_catalogue import gyro
+
+
+def test_a_barred_unit_is_not_entered_until_it_is_released(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
+    manifest, out = load_manifest(tmp_path / "fleet.toml"), tmp_path / "out"
+    summed = run._one_of_each_serial
+    monkeypatch.setattr(
+        run,
+        "_one_of_each_serial",
+        lambda entries: [e.model_copy(update={"findings": ("sign_reversed",)}) for e in summed(entries)],
+    )
+    run.run_fleet(manifest, out, jobs=1)
+    assert catalogued(out, None, None).calibrations == 0
+    [unit] = read_result(out / "fleet.json", FleetSummary).serials
+    assert unit.barred == ("sign_reversed",)
+    run.run_fleet(manifest, out, jobs=1, tag="May", releases={"RLG-1": "mounted upside down, see log"})
+    [one] = catalogued(out, "RLG-1", "2026-04-01").found
+    assert one.tag == "May; released: mounted upside down, see log"
+    [unit] = read_result(out / "fleet.json", FleetSummary).serials
+    assert (unit.barred, unit.released) == ((), "mounted upside down, see log")
+
+
+@pytest.mark.parametrize("finding", ["axes_exchanged", "does_not_generalise", "copy_of_other"])
+def test_findings_that_bar_a_unit(finding: str) -> None:
+    unit = FleetUnit(name="a", axis=None, status="done", findings=("rate_outliers", finding))
+    assert unit.barred == (finding,)
+    assert FleetUnit(name="a", axis=None, status="done", findings=("rate_outliers",)).barred == ()
+
+
+def test_a_release_needs_its_reason(tmp_path: Path, gyrotc: Command) -> None:
+    gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
+    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out", "--release", "RLG-1")
+    assert result.returncode == 2
+    assert "--reason" in result.stderr
+    assert not (tmp_path / "out").exists()
