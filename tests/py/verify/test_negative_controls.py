@@ -143,7 +143,7 @@ TERM_FAULTS = {
     "warm-up a block late": (r"FN\(fading\)\(state->elapsed,", "FN(fading)(state->elapsed + 1U,"),
     "harmonic with half its phase": (r"\(x, frequency, phase, amp", "(x, frequency, phase / 2, amp"),
     "half a block of a channel refused": (r"\(2U \* in->valid\) >= state", "(2U * in->valid) > state"),
-    "missing channel not said": (r"effect->remarks \|= GTC_HELD", "effect->remarks |= GTC_OK"),
+    "missing channel not said": (r"remarks \|= GTC_HELD", "remarks |= GTC_OK"),
     "no hand-over at the upper edge": (r"if \(high < envelope\[1\]\)", "if (high < envelope[0])"),
 }
 ABSENT = {2: "play with", 3: "harmonic with"}
