@@ -79,6 +79,7 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
             pictures=pictures,
             links={entry.name: _link(out, entry.name) for entry in summary.serials},
             verdicts=Counter(entry.verdict for entry in summary.serials),
+            barred=sum(bool(entry.barred) for entry in summary.serials),
         )
     )
     texts = (json_text(summary.content()), _table(summary.serials), page)

@@ -20,11 +20,12 @@ from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..pages.report import write_report
+from ..pages.unit import UnitResults
 from ..recordings.load import axes_of, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
-from ..results.release import HeldLimits
+from ..results.release import HeldLimits, Verdict
 from ..results.training import Manifest, Training
 from ..results.verification import Verification
 from ..store.files import json_text, write_atomically
@@ -61,6 +62,22 @@ class Built:
     diagnosis: Diagnosed | None = None
     limits: HeldLimits | None = None
     changes: Changes | None = None
+
+    @property
+    def decision(self) -> Verdict | None:
+        """The decision of the unit, as every page and certificate of its folder states it."""
+        unit = UnitResults(
+            self.model,
+            self.evaluation,
+            self.training,
+            self.verification,
+            None,
+            self.diagnosis,
+            self.limits,
+            self.changes,
+            None,
+        )
+        return unit.decision
 
 
 @dataclass(frozen=True, slots=True)

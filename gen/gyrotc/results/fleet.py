@@ -107,7 +107,10 @@ class FleetUnit(Part):
         "comparison with the fleet",
     )
     model_hash: str | None = Field(default=None, description="hash of the model")
-    verdict: Verdict | None = Field(default=None, description="the worst of all limits; null without limits")
+    verdict: Verdict | None = Field(
+        default=None,
+        description="the worst of all limits, `FAIL` where another check failed; null without limits",
+    )
     limits_met: Count | None = Field(default=None, description="limits that are met; null without limits")
     limits_held: Count | None = Field(default=None, description="limits in all; null without limits")
     expanded_uncertainty_dph: Figure = Field(

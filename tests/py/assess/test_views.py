@@ -1,26 +1,36 @@
-"""Every view of a verdict says the same: terminal, page, certificate, DCC, what is signed, JSON."""
+"""Every view of a verdict says the same: terminal, page, certificate, DCC, what is signed, fleet, catalogue, JSON."""
 
 from __future__ import annotations
 
 import json
 import re
-from typing import Any
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from gyrotc.assess.limits import Limits, decided, held_against
 from gyrotc.cli.results import limit_lines, summary
 from gyrotc.deliver.certificate import rows_of
+from gyrotc.fleet import catalogue, unit
+from gyrotc.fleet.manifest import Fleet, Unit
+from gyrotc.fleet.page import write_summary
+from gyrotc.jobs.build import Built
 from gyrotc.jobs.release import _unit
 from gyrotc.model import Model
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
+from gyrotc.recordings.records import Dataset
 from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, Statistics
 from gyrotc.results.release import HeldLimits
+from gyrotc.results.training import Training
 from test_limits import EVALUATION, VERIFICATION
 
 _FIGURES = ("rms_dph", "std_dph", "max_abs_dph", "mean_dph", "rms_30min_dph", "centers")
 _RULES = ("guard_band", "guard_band_binary", "simple_acceptance")
+_NO_TRAINING = cast(Training, None)  # no verdict depends on it
+_NO_FLEET = cast(Fleet, None)  # nor on the options
 _VERDICTS = "CONDITIONAL PASS|PASS|FAIL"
 
 
@@ -78,20 +88,20 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
     macros = page_environment().get_template("parts.html.j2").module
     for number in range(500):
         evaluation, held = drawn(rng, model)
-        unit = UnitResults(model, evaluation, None, VERIFICATION, None, None, held, None, None)
-        banner = re.findall(r"<strong>([^<]*)</strong>", macros.verdict(unit))
-        table = re.findall(r'class="state"><span[^>]*>([^<]*)<', macros.limits_table(unit.held))
-        certified = [row.verdict for row in rows_of(unit)]
-        signed = _unit(model, unit)
+        shown = UnitResults(model, evaluation, None, VERIFICATION, None, None, held, None, None)
+        banner = re.findall(r"<strong>([^<]*)</strong>", macros.verdict(shown))
+        table = re.findall(r'class="state"><span[^>]*>([^<]*)<', macros.limits_table(shown.held))
+        certified = [row.verdict for row in rows_of(shown)]
+        signed = _unit(model, shown)
         again = HeldLimits.model_validate_json(json.dumps(held.content()))
         assert again == held, number
-        assert banner == [unit.verdict or "No verdict"], number
-        assert signed.verdict == unit.decision, number
-        assert table == certified == [one.decision for one in unit.held], number
+        assert banner == [shown.verdict or "No verdict"], number
+        assert signed.verdict == shown.decision, number
+        assert table == certified == [one.decision for one in shown.held], number
         if evaluation.mismatches:
-            assert unit.decision == "FAIL", number
+            assert shown.decision == "FAIL", number
             continue
-        assert unit.decision == held.decision, number
+        assert shown.decision == held.decision, number
         lines = list(limit_lines(held))
         assert said(lines[0])[:1] == ([held.decision] if held.decision else []), number
         marked = [line.rpartition(", ")[2] for line in lines[1:] if not line.startswith("  CONDITIONAL")]
@@ -103,6 +113,63 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         assert judged is not None
         for name in ("left_out", "train"):
             assert (where[name] in summary(evaluation)) == (judged[0] == name), number
+
+
+def test_fleet_and_catalogue_have_the_decision_of_the_unit(
+    model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unit, "facts_of", lambda runs: None)  # no verdict depends on the comparison
+    seed, draws = 20260726, 60
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    model = Model.from_dict(model_dict)
+    built, entries = [], []
+    for number in range(draws):
+        evaluation, held = drawn(rng, model)
+        limits = held if rng.random() < 0.8 else None
+        failures = () if not evaluation.mismatches else ("a check",)
+        one = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, failures, limits=limits)
+        task = unit.Task(
+            Unit(Path(f"u{number}"), None),
+            "d",
+            _NO_FLEET,
+            tmp_path / f"u{number}",
+            False,
+            "",
+        )
+        dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", runs=(), sketch=()))
+        entry = unit._entry_of(task, "0" * 64, dataset, one, ())
+        folder = tmp_path / entry.name
+        (folder / "c").mkdir(parents=True)
+        (folder / "c" / f"gtc_{model.id}.bin").write_bytes(b"table")
+        model.save(folder / "model.json")
+        unit.write_entry(folder, entry)
+        built.append(one)
+        entries.append(entry)
+    views = {
+        entry.name: UnitResults(
+            model,
+            one.evaluation,
+            None,
+            VERIFICATION,
+            None,
+            None,
+            one.limits,
+            None,
+            None,
+        )
+        for entry, one in zip(entries, built, strict=True)
+    }
+    monkeypatch.setattr(catalogue, "unit_of", lambda folder: views[folder.name])
+    assert catalogue.enter(tmp_path, entries) == draws
+    listed = catalogue.catalogued(tmp_path, None, None).found
+    assert len(listed) == draws
+    assert {one.serial: one.verdict for one in listed} == {
+        entry.serial: views[entry.name].decision for entry in entries
+    }
+    for entry in write_summary(tmp_path, entries).serials:
+        assert entry.verdict == views[entry.name].decision, entry.name
+    assert {entry.verdict for entry in entries if entry.status == "failed"} == {"FAIL"}
 
 
 def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(

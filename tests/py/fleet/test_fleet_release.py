@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from conftest import Command
 from gyrotc.fleet import run
 from gyrotc.fleet.catalogue import catalogued
 from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.page import write_summary
+from gyrotc.lot import job
 from gyrotc.results.base import read_result
-from gyrotc.results.fleet import FleetSummary, FleetUnit
+from gyrotc.results.fleet import FleetEntry, FleetSummary, FleetUnit
 from test_catalogue import gyro
 
 
@@ -29,11 +32,67 @@ def test_a_barred_unit_is_not_entered_until_it_is_released(
     assert catalogued(out, None, None).calibrations == 0
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
     assert unit.barred == ("sign_reversed",)
-    run.run_fleet(manifest, out, jobs=1, tag="May", releases={"RLG-1": "mounted upside down, see log"})
+    run.run_fleet(
+        manifest,
+        out,
+        jobs=1,
+        tag="May",
+        releases={"RLG-1": "mounted upside down, see log"},
+    )
     [one] = catalogued(out, "RLG-1", "2026-04-01").found
     assert one.tag == "May; released: mounted upside down, see log"
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
     assert (unit.barred, unit.released) == ((), "mounted upside down, see log")
+
+
+@pytest.mark.parametrize("released", [None, "mounted upside down"])
+def test_the_page_of_a_fleet_names_a_barred_unit_and_its_finding(
+    tmp_path: Path, released: str | None
+) -> None:
+    unit = FleetEntry(
+        name="a",
+        axis=None,
+        status="done",
+        findings=("sign_reversed",),
+        verdict="PASS",
+        released=released,
+    )
+    write_summary(tmp_path, [unit])
+    page = (tmp_path / "fleet.html").read_text("utf-8")
+    assert ("not released: sign reversed" in page) == (released is None)
+    assert ("Not released: 1" in page) == (released is None)
+
+
+def test_a_lot_leaves_out_a_barred_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("a", "b", "c", "d")
+    for name in names:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "training.json").touch()
+    write_summary(
+        tmp_path,
+        [
+            FleetEntry(name="a", axis=None, status="done", findings=("sign_reversed",)),
+            FleetEntry(
+                name="b",
+                axis=None,
+                status="done",
+                findings=("sign_reversed",),
+                released="see log",
+            ),
+            *(FleetEntry(name=name, axis=None, status="done") for name in names[2:]),
+        ],
+    )
+    read: list[str] = []
+
+    def unit(place: Path) -> SimpleNamespace:
+        read.append(place.name)
+        model = SimpleNamespace(serial=place.name, axis=None)
+        return SimpleNamespace(model=model, training=SimpleNamespace(lot=None, prior=None))
+
+    monkeypatch.setattr(job, "_unit", unit)
+    monkeypatch.setattr(job, "LEAST_UNITS", 3)
+    assert [one.model.serial for one in job._units(tmp_path, None)] == ["b", "c", "d"]
+    assert read == ["b", "c", "d"]
 
 
 @pytest.mark.parametrize("finding", ["axes_exchanged", "does_not_generalise", "copy_of_other"])
@@ -45,7 +104,14 @@ def test_findings_that_bar_a_unit(finding: str) -> None:
 
 def test_a_release_needs_its_reason(tmp_path: Path, gyrotc: Command) -> None:
     gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
-    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out", "--release", "RLG-1")
+    result = gyrotc(
+        "fleet",
+        tmp_path / "fleet.toml",
+        "--out",
+        tmp_path / "out",
+        "--release",
+        "RLG-1",
+    )
     assert result.returncode == 2
     assert "--reason" in result.stderr
     assert not (tmp_path / "out").exists()
