@@ -110,13 +110,15 @@ def load_private_key(path: Path, passphrase: Callable[[], str]) -> Ed25519Privat
     """An Ed25519 private key from a PEM file; `passphrase` is asked for it where it is encrypted.
 
     Raises:
-        InputError: It cannot be read or decrypted, is something else, or `cryptography` is not installed.
+        InputError: It cannot be read or decrypted, other users can reach it, it is something else, or `cryptography` is not installed.
     """
     serialization = _serialization()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
     expected = "an Ed25519 private key (PEM), as `openssl genpkey -algorithm ed25519` writes it"
     data = _bytes(path, _LARGEST_KEY, expected)
+    if b"PRIVATE KEY" in data:  # in the first line of each kind of PEM private key (RFC 7468, 10 and 11)
+        _refuse_shared(path)
     word = passphrase().encode() if b"ENCRYPTED" in data else None
     try:
         key = serialization.load_pem_private_key(data, word)
@@ -125,7 +127,6 @@ def load_private_key(path: Path, passphrase: Callable[[], str]) -> Ed25519Privat
         raise InputError(str(path), found, expected) from error
     if not isinstance(key, Ed25519PrivateKey):
         raise InputError(str(path), "is a key of another kind", expected)
-    _refuse_shared(path)
     return key
 
 

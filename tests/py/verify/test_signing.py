@@ -102,10 +102,15 @@ def test_keys_of_another_kind_and_files_that_are_none_are_refused(key: Path, tmp
 @pytest.mark.parametrize("mode", [0o666, 0o640, 0o602])
 def test_a_private_key_that_others_can_reach_is_refused(key: Path, tmp_path: Path, mode: int) -> None:
     shared = tmp_path / "shared.pem"
-    shared.write_bytes(key.read_bytes())
+    encrypted = ("-aes256", "-passout", "pass:right")
+    assert _openssl("pkey", "-in", key, *encrypted, "-out", shared).returncode == 0
     shared.chmod(mode)
+
+    def asked() -> str:
+        pytest.fail("the passphrase was asked for before the access was checked")
+
     with pytest.raises(InputError, match=f"mode {mode:03o}"):
-        load_private_key(shared, lambda: "")
+        load_private_key(shared, asked)
 
 
 def test_an_encrypted_key_asks_and_says_when_the_passphrase_is_wrong(
