@@ -122,7 +122,7 @@ def sign(
     accept_fail: AcceptOption = None,
 ) -> None:
     """Sign verdict, limits, uncertainty, dates and DIR/c (with --axis all: of every axis, too): DIR/c/release.json and
-    release.json.sig. Only what verify passes is signed, and what says FAIL only with --accept-fail.
+    release.json.sig. Only what verify passes is signed, and FAIL or CONDITIONAL PASS only with --accept-fail.
 
     Example: gyrotc sign result --key lab.pem
     """

@@ -121,7 +121,7 @@ def certificate_page(
     Args:
         facts: What the laboratory states.
         missing: What is missing makes it a draft.
-        accepted: Why the unit is released although a verdict is FAIL.
+        accepted: Why the unit is released although a verdict is FAIL or CONDITIONAL PASS.
     """
     template = page_environment().get_template("certificate.html.j2")
     rows = [rows_of(unit) for unit in units]
@@ -269,11 +269,11 @@ def certificate(
         facts: A facts file of the laboratory.
         number: Number of the certificate.
         draft: Take what is missing as not stated: the page is marked as a draft, and there is no DCC.
-        accept_fail: Why a unit gets one whose verdict is FAIL; both say it.
+        accept_fail: Why a unit gets one whose verdict is FAIL or CONDITIONAL PASS; both say it.
 
     Raises:
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
-            built, the verdict is FAIL and not accepted, or `out` cannot be replaced.
+            built, the verdict is FAIL or CONDITIONAL PASS and not accepted, or `out` cannot be replaced.
     """
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     units = [unit_of(place) for place in places]

@@ -11,7 +11,7 @@ from ..assess.limits import worst_of
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..pages.unit import UnitResults, unit_in
-from ..results.release import RELEASED, STATED, Release, ReleasedUnit
+from ..results.release import NEED_REASON, RELEASED, STATED, Release, ReleasedUnit
 from ..store.marker import check_intact, sha256
 from ..tables.record import RECORD
 from .axes import axes_in
@@ -48,23 +48,23 @@ def unit_of(folder: Path) -> UnitResults:
 
 
 def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> str | None:
-    """The reason for which a unit is released whose verdict is FAIL; None where it is not.
+    """The reason for which a unit is released whose verdict is FAIL or CONDITIONAL PASS; None where it is neither.
 
     Raises:
-        InputError: The verdict is FAIL and there is no reason, or it is not and there is one.
+        InputError: The verdict is one of these and there is no reason, or it is neither and there is one.
     """
-    failed = any(unit.verdict == "FAIL" for unit in units)
+    verdict = worst_of(unit.decision for unit in units) or ""
     if reason is None:
-        if failed:
-            why = [text for unit in units for text in (*unit.failures, unit.named("FAIL")) if text]
+        if verdict in NEED_REASON:
+            why = [text for unit in units for text in (*unit.failures, unit.named(verdict)) if text]
             raise InputError(
                 str(folder),
-                f"its verdict is FAIL ({'; '.join(why)[:200]})",
+                f"its verdict is {verdict} ({'; '.join(why)[:200]})",
                 "a PASS, or --accept-fail REASON",
             )
         return None
-    if not failed:
-        raise InputError("--accept-fail", "the verdict is not FAIL", "no such option")
+    if verdict not in NEED_REASON:
+        raise InputError("--accept-fail", f"the verdict is {verdict or 'not stated'}", "no such option")
     line = " ".join(reason.split())
     if not 0 < len(line) <= _LONGEST:
         raise InputError("--accept-fail", repr(reason)[:40], f"a reason of at most {_LONGEST} characters")
@@ -77,7 +77,7 @@ def release_of(folder: Path, reason: str | None = None) -> list[tuple[Path, Rele
     A folder of `emit` alone, which nothing was measured of, has no verdict.
 
     Raises:
-        InputError: It is not as it was written, or its verdict is FAIL without a reason to release it.
+        InputError: It is not as it was written, or it needs a reason to be released and there is none.
     """
     axes = axes_in(folder)
     parts = [folder / axis for axis in axes] or [folder]
@@ -103,7 +103,7 @@ def _release(place: Path, units: Sequence[tuple[Path, ReleasedUnit]], why: str |
         serial=load_model(units[0][0] / "model.json").serial,
         axis=units[0][1].axis if units[0][0] == place else None,
         verdict=verdict,
-        accepted_fail=why if verdict == "FAIL" else None,
+        accepted_fail=why if verdict in NEED_REASON else None,
         units=tuple(unit for _, unit in units),
         emission=sha256(place / "c" / RECORD),
         files={p.relative_to(place).as_posix(): sha256(p) for p in listed if p.is_file()},

@@ -9,6 +9,7 @@ from pydantic import Field
 from .base import Amount, Axis, Figure, Part, Positive, Result, UnitResult
 
 __all__ = [
+    "NEED_REASON",
     "RELEASED",
     "STATED",
     "Budget",
@@ -83,6 +84,9 @@ class Budget(UnitResult):
 
 Verdict = Literal["PASS", "CONDITIONAL PASS", "FAIL"]
 """Statement of conformity; a conditional pass is within its limit, but closer to it than the guard band."""
+
+NEED_REASON: tuple[Verdict, ...] = ("CONDITIONAL PASS", "FAIL")
+"""Verdicts of units that are certified and signed only for a stated reason."""
 
 JudgedOn = Literal["exam", "left_out", "train"]
 """What a figure was measured on."""
@@ -210,7 +214,7 @@ class Release(Result):
     axis: Axis = Field(description="null where there is one axis, and for the folder of several")
     verdict: Verdict | None = Field(description="the gravest of all axes; null: no limits were given")
     accepted_fail: str | None = Field(
-        description="why it is released although the verdict is FAIL; else null"
+        description="why it is released although the verdict is FAIL or CONDITIONAL PASS; else null"
     )
     units: tuple[ReleasedUnit, ...] = Field(description="every axis")
     emission: str = Field(description="SHA-256 of `c/emission.json`, which has that of every emitted file")

@@ -193,8 +193,27 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
     assert f"released: FAIL, accepted: {reason}; valid until 2027-03-07" in capsys.readouterr().out
 
 
+def test_a_conditional_pass_needs_a_reason_which_is_released_and_printed(
+    passing: Path, tmp_path: Path
+) -> None:
+    """Before: it was certified and signed as if it were a PASS."""
+    [rms] = [limit.measured for limit in unit_of(passing).held if limit.limit == "at_most.rms_dph"]
+    assert isinstance(rms, float)
+    folder = _built(tmp_path, PASSES.replace("rms_dph = 30.0", f"rms_dph = {rms * 1.0001}"))
+    assert unit_of(folder).decision == "CONDITIONAL PASS"
+    with pytest.raises(InputError, match=r"its verdict is CONDITIONAL PASS \(.*RMS"):
+        release_of(folder)
+    with pytest.raises(InputError, match="its verdict is CONDITIONAL PASS"):
+        certificate(folder, tmp_path / "C", draft=True)
+    [(_, release)] = release_of(folder, "within its limit")
+    assert (release.verdict, release.accepted_fail) == ("CONDITIONAL PASS", "within its limit")
+    certificate(folder, tmp_path / "C", draft=True, accept_fail="within its limit")
+    page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
+    assert "Released although the verdict is CONDITIONAL PASS:</b> within its limit" in page
+
+
 def test_a_reason_without_a_fail_is_refused(passing: Path) -> None:
-    with pytest.raises(InputError, match="the verdict is not FAIL"):
+    with pytest.raises(InputError, match="the verdict is PASS"):
         release_of(passing, "why not")
 
 
