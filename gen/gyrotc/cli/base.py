@@ -228,7 +228,11 @@ TrustUnitsOption = Annotated[
 ]
 AcceptOption = Annotated[
     str | None,
-    typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL or CONDITIONAL PASS; says why."),
+    typer.Option(
+        "--accept-fail",
+        metavar="REASON",
+        help="Release a unit whose verdict is FAIL or CONDITIONAL PASS; says why.",
+    ),
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 

@@ -151,7 +151,8 @@ class SignatureCheck(Part):
         default=None, description="that was signed; null without limits, and where the signature is not good"
     )
     accepted_fail: str | None = Field(
-        default=None, description="why it was released although the verdict is FAIL or CONDITIONAL PASS, as it was signed"
+        default=None,
+        description="why it was released although the verdict is FAIL or CONDITIONAL PASS, as it was signed",
     )
     valid_until: str | None = Field(
         default=None, description="first day on which an axis ends, as it was signed"

@@ -110,7 +110,8 @@ def load_private_key(path: Path, passphrase: Callable[[], str]) -> Ed25519Privat
     """An Ed25519 private key from a PEM file; `passphrase` is asked for it where it is encrypted.
 
     Raises:
-        InputError: It cannot be read or decrypted, other users can reach it, it is something else, or `cryptography` is not installed.
+        InputError: It cannot be read or decrypted, other users can reach it, it is something else, or `cryptography`
+            is not installed.
     """
     serialization = _serialization()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
