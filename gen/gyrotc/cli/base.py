@@ -20,7 +20,8 @@ from rich.text import Text
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..train.options import DEFAULTS, BuildOptions, flag_of, help_of
+from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
+from .words import GyroAxis, completing
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
@@ -182,22 +183,42 @@ JsonOption = Annotated[
     typer.Option("--json", callback=written_place, help="Write the machine-readable result here."),
 ]
 AxisOption = Annotated[
-    str | None, typer.Option("--axis", help="x, y or z of a three-axis recording, or all.")
+    str | None,
+    typer.Option(
+        "--axis",
+        help="x, y or z of a three-axis recording, or all.",
+        autocompletion=completing((*(axis.value for axis in GyroAxis), "all")),
+    ),
 ]
 
 
 def _of_build(name: str) -> Any:
     """An option of `BuildOptions`, which knows its meaning and refuses what is out of range."""
-    return typer.Option(flag_of(name), help=help_of(name))
+    words = completing((AUTO, *NETWORK_METHODS)) if name == "method" else None
+    return typer.Option(flag_of(name), help=help_of(name), autocompletion=words)
+
+
+def _targets_begun(incomplete: str) -> list[str]:
+    from ..verify.toolchain import all_targets
+
+    return completing(("all", *all_targets()))(incomplete)
 
 
 AnyAverageOption = Annotated[float | None, _of_build("average_s")]
 SeedOption = Annotated[int, _of_build("seed")]
 NumericOption = Annotated[
-    str | None, typer.Option("--numeric", help="Arithmetics, e.g. f32 or f32,q31; default: all.")
+    str | None,
+    typer.Option(
+        "--numeric",
+        help="Arithmetics, e.g. f32 or f32,q31; default: all.",
+        autocompletion=completing(("f32", "q31", "f32,q31")),
+    ),
 ]
 TargetOption = Annotated[
-    list[str] | None, typer.Option("--target", help="Name of a target, or all; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--target", help="Name of a target, or all; may be repeated.", autocompletion=_targets_begun
+    ),
 ]
 LotOption = Annotated[
     Path | None,

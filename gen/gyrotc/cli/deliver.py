@@ -6,13 +6,14 @@ import re
 import shutil
 import sys
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated
 
 import typer
 
 from ..common.errors import InputError
 from ..common.inputs import read_input
 from .base import AcceptOption, DirArg, OutOption, app, progress, tell, written_place
+from .words import ExportFormat, GyroAxis
 
 _MOST_POINTS = 1000  # of an axis: a table of a million is more than any control unit holds
 
@@ -50,12 +51,13 @@ def certificate(
 def export(
     folder: DirArg,
     format: Annotated[
-        str, typer.Option("--format", help="px4, ardupilot; csv, json, a2l, cdf: the map as a table; fmu.")
+        ExportFormat,
+        typer.Option("--format", help="px4, ardupilot; csv, json, a2l, cdf: the map as a table; fmu."),
     ],
     out: Annotated[Path, typer.Option("--out", callback=written_place, help="The file.")],
     axis_as: Annotated[
-        str, typer.Option("--axis-as", help="Axis of the autopilot for a gyro of one axis.")
-    ] = "x",
+        GyroAxis, typer.Option("--axis-as", help="Axis of the autopilot for a gyro of one axis.")
+    ] = GyroAxis.x,
     device: Annotated[int, typer.Option("--device", min=0, help="PX4: CAL_GYRO0_ID of the vehicle.")] = 0,
     points: Annotated[
         str, typer.Option("--points", help="Temperatures x rates of temperature of a table.")
@@ -72,15 +74,13 @@ def export(
 
     Example: gyrotc export result --format px4 --out gyro.params
     """
-    from ..deliver.export import Exporting, Format
+    from ..deliver.export import Exporting
     from ..deliver.export import export as run
 
-    if format not in get_args(Format):
-        raise InputError("--format", repr(format), ", ".join(get_args(Format)))
-    options = Exporting(axis_as, device, points_of(points), address_of(address))
+    options = Exporting(axis_as.value, device, points_of(points), address_of(address))
     with progress() as say:
-        say(f"writing {format}")
-        told = run(folder, cast(Format, format), out, options)
+        say(f"writing {format.value}")
+        told = run(folder, format.value, out, options)
     for line in told:
         tell(line)
     tell(str(out))

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from ..common.errors import InputError
 from .base import PLAN, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
+from .words import NoiseLevel
 
 if TYPE_CHECKING:
     from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
@@ -177,8 +178,8 @@ def _additions(found: Additions) -> Iterator[str]:
 def plan(
     profile: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
     noise: Annotated[
-        str, typer.Option("--noise", help="paper, or class, where the scenario gives none.")
-    ] = "paper",
+        NoiseLevel, typer.Option("--noise", help="paper, or class, where the scenario gives none.")
+    ] = NoiseLevel.paper,
     seed: SeedOption = 1,
     require: Annotated[
         list[str] | None,
@@ -238,7 +239,7 @@ def plan(
     with result_folder(out, "plan") if out else nullcontext() as stage, progress(PLAN) as say:
         result = run(
             profile,
-            noise=noise,  # type: ignore[arg-type]
+            noise=noise.value,
             seed=seed,
             required=limits_of(require or ()),
             pair=pair_of(separate),

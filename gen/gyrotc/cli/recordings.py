@@ -24,6 +24,7 @@ from .base import (
     write_json,
     written_place,
 )
+from .words import NoiseLevel, RunFormat
 
 _ROLES = ("time", "temperature", "rate", "rate_x", "rate_y", "rate_z", "pulses")
 
@@ -72,7 +73,7 @@ def import_(
             help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
         ),
     ] = None,
-    format: Annotated[str, typer.Option("--format", help="Format of the runs: parquet or csv.")] = "parquet",
+    format: Annotated[RunFormat, typer.Option("--format", help="Format of the runs.")] = RunFormat.parquet,
     pulse_weight: Annotated[
         float | None,
         typer.Option(
@@ -92,8 +93,6 @@ def import_(
     from ..recordings.importers.job import ImportOptions, import_files
     from ..recordings.importers.map_file import Map, load_map
 
-    if format not in ("csv", "parquet"):
-        raise InputError("--format", repr(format), "parquet or csv")
     known = load_map(map_file) if map_file else Map()
     units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
     stated = {"rate_hz": rate_hz, "format": time_format, "zone": time_zone}
@@ -101,7 +100,7 @@ def import_(
     content["csv"] |= _csv(csv or [], content["csv"])
     content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
     chosen = _stated(content, units, stated, _columns(column or []), table)
-    options = ImportOptions(serial, format, trust_units, dry_run)  # type: ignore[arg-type]
+    options = ImportOptions(serial, format.value, trust_units, dry_run)
     with progress() as say:
         result = import_files(
             files, out, Map.model_validate(chosen), options, ask=_ask, say=tell,
@@ -173,10 +172,10 @@ def simulate(
         float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")
     ] = None,
     pulses: Annotated[bool, typer.Option("--pulses", help="Write integer pulses instead of a rate.")] = False,
-    format: Annotated[str, typer.Option("--format", help="Format of the files: csv or parquet.")] = "csv",
+    format: Annotated[RunFormat, typer.Option("--format", help="Format of the files.")] = RunFormat.csv,
     noise: Annotated[
-        str, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
-    ] = "paper",
+        NoiseLevel, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
+    ] = NoiseLevel.paper,
     units: Annotated[
         int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")
     ] = None,
@@ -216,8 +215,8 @@ def simulate(
             row_s=row_s,
             raw_hz=raw_hz,
             pulses=pulses,
-            format=format,  # type: ignore[arg-type]
-            noise=noise,  # type: ignore[arg-type]
+            format=format.value,
+            noise=noise.value,
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: data set of scenario {scenario}, seed {seed}")
@@ -228,8 +227,8 @@ def _simulate_lot(
     base: str,
     seed: int,
     out: Path,
-    rows: tuple[float, float | None, bool, str],
-    noise: str,
+    rows: tuple[float, float | None, bool, RunFormat],
+    noise: NoiseLevel,
 ) -> None:
     """`gyrotc simulate lot`."""
     from ..simulate.campaign import RowForm
@@ -244,8 +243,8 @@ def _simulate_lot(
             seed=seed,
             out=out,
             scenario=base,
-            form=RowForm.of(*rows),  # type: ignore[arg-type]
-            noise=noise,  # type: ignore[arg-type]
+            form=RowForm.of(*rows[:3], rows[3].value),
+            noise=noise.value,
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: {order.units} data sets of scenario {base}, family {order.family:g}, seed {seed}")

@@ -9,6 +9,7 @@ import typer
 
 from ..common.errors import InputError
 from .base import app, tell
+from .words import Shell
 
 
 @app.command()
@@ -37,20 +38,15 @@ def schema(
         typer.echo(json.dumps(whole, indent=1))
 
 
-_SHELLS = ("bash", "zsh", "fish")
-
-
 @app.command()
-def completion(shell: Annotated[str, typer.Argument(help="bash, zsh or fish.")]) -> None:
+def completion(shell: Annotated[Shell, typer.Argument(help="The shell.")]) -> None:
     """A script that completes commands and options in a shell, on stdout.
 
     Example: gyrotc completion bash > ~/.local/share/bash-completion/completions/gyrotc
     """
     from typer._completion_shared import get_completion_script
 
-    if shell not in _SHELLS:
-        raise InputError("completion", repr(shell), ", ".join(_SHELLS))
-    typer.echo(get_completion_script(prog_name="gyrotc", complete_var="_GYROTC_COMPLETE", shell=shell))
+    typer.echo(get_completion_script(prog_name="gyrotc", complete_var="_GYROTC_COMPLETE", shell=shell.value))
 
 
 @app.command()

@@ -10,17 +10,22 @@ import signal
 import subprocess
 import sys
 import time
+from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 
 import pytest
-from conftest import Command, quick_and_slow
+from conftest import Command, invoked, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
 from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, StageLine, folded, time_left
-from gyrotc.cli.main import _hoisted
+from gyrotc.cli.main import _hoisted, run
+from gyrotc.cli.words import ExportFormat, GyroAxis, NoiseLevel, RunFormat, Shell
+from gyrotc.deliver import export
 from gyrotc.model import Model
+from gyrotc.recordings.importers import rows
+from gyrotc.simulate import campaign
 from gyrotc.store import cache
 from gyrotc.tables.emit import emit
 from recordings import described
@@ -236,6 +241,61 @@ def test_bash_completes_commands_and_options(tmp_path: Path, gyrotc: Command) ->
     for shell in ("zsh", "fish"):
         assert "_GYROTC_COMPLETE" in gyrotc("completion", shell).stdout
     assert gyrotc("completion", "csh").returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("export result --format a", ["ardupilot", "a2l"]),
+        ("export result --axis-as", ["x", "y", "z"]),
+        ("simulate paper --format", ["csv", "parquet"]),
+        ("simulate paper --noise cl", ["class"]),
+        ("plan paper --noise", ["paper", "class"]),
+        ("completion f", ["fish"]),
+        ("build data --method cu", ["cubic", "cubic_slope"]),
+        ("build data --numeric f32,", ["f32,q31"]),
+        ("build data --axis a", ["all"]),
+        ("verify result --target cortex-m4", ["cortex-m4f"]),
+    ],
+)
+def test_a_shell_completes_the_words_that_an_option_takes(
+    typed: str,
+    offered: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    whole = typed.rsplit(maxsplit=1)[-1].startswith("-")
+    monkeypatch.setenv("_GYROTC_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", f"gyrotc {typed}{' ' if whole else ''}")
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split()) + whole))
+    run([])
+    assert capsys.readouterr().out.split() == offered
+
+
+@pytest.mark.parametrize(
+    ("words", "types"),
+    [
+        (ExportFormat, (export.Format,)),
+        (RunFormat, (campaign.Format, rows.Format)),
+        (NoiseLevel, (campaign.Noise,)),
+    ],
+    ids=["export", "runs", "noise"],
+)
+def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:
+    for of_job in types:
+        assert {word.value for word in words} == set(get_args(of_job))
+
+
+def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
+    for command, right in (
+        (("plan", "paper", "--noise", "none"), NoiseLevel),
+        (("simulate", "paper", "--out", "R", "--format", "xml"), RunFormat),
+        (("export", "result", "--out", "a", "--format", "dcm"), ExportFormat),
+        (("export", "result", "--out", "a", "--format", "px4", "--axis-as", "w"), GyroAxis),
+        (("completion", "csh"), Shell),
+    ):
+        done = invoked(*command)
+        assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command
 
 
 def test_the_cache_is_told_cleared_and_kept_to_a_limit(

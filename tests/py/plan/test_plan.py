@@ -114,7 +114,6 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
         (("--require", "sensor_lag=1"), "thermal_gradient"),
         (("--separate", "hysteresis"), "two causes"),
         (("--separate", "hysteresis,sensor_lag"), "thermal_gradient"),
-        (("--noise", "none"), "paper"),
     ],
 )
 def test_bad_options_are_told(folder: Path, options: tuple[str, str], told: str) -> None:
