@@ -178,9 +178,22 @@ def written_place(path: Path | None) -> Path | None:
     return path
 
 
+_STANDARD_OUTPUT = Path("-")
+
+
+def _json_place(path: Path | None) -> Path | None:
+    """As `written_place`; with `-` the JSON alone has standard output, and all text goes to standard error."""
+    if path != _STANDARD_OUTPUT:
+        return written_place(path)
+    OUT.stderr = True
+    return path
+
+
 JsonOption = Annotated[
     Path | None,
-    typer.Option("--json", callback=written_place, help="Write the machine-readable result here."),
+    typer.Option(
+        "--json", callback=_json_place, help="Write the machine-readable result here; -: standard output."
+    ),
 ]
 AxisOption = Annotated[
     str | None,
@@ -323,7 +336,10 @@ def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
 
 
 def tell(text: str, *, wrong: bool = False) -> None:
-    """A line of the result on stdout, on a terminal broken between words; with --quiet only what went wrong."""
+    """A line of the result on stdout, with `--json -` on stderr.
+
+    On a terminal it is broken between words; with --quiet only what went wrong is printed.
+    """
     if _Loudness.quiet and not wrong:
         return
     line = terminal_line(text)
@@ -350,7 +366,7 @@ def folded(line: str, width: int) -> str:
 
 
 def show(table: Table) -> None:
-    """A table of the result on stdout; none with --quiet."""
+    """A table of the result on stdout (stderr with `--json -`); none with --quiet."""
     if not _Loudness.quiet:
         OUT.print(table)
 
@@ -359,7 +375,9 @@ def write_json(path: Path | None, result: dict[str, Any]) -> None:
     from ..store.files import json_text
     from ..store.folder import write_result
 
-    if path is not None:
+    if path == _STANDARD_OUTPUT:
+        print(json_text(result), end="")
+    elif path is not None:
         write_result(path, json_text(result))
 
 
@@ -398,6 +416,7 @@ def _main(
     ] = False,
 ) -> None:
     _Loudness.quiet, _Loudness.verbose = quiet, verbose
+    OUT.stderr = False  # an earlier command of this process may have had `--json -`
 
 
 def lot_in(path: Path | None) -> LotPrior | None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from conftest import Command
+from gyrotc.cli import base
+from gyrotc.cli.commands import app
+from recordings import described
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
@@ -27,3 +32,23 @@ def test_a_loop_of_links_is_one_line(tmp_path: Path, gyrotc: Command) -> None:
 def test_an_unknown_format_is_refused(tmp_path: Path, gyrotc: Command) -> None:
     done = gyrotc("simulate", "paper", "--format", "x", "--out", tmp_path / "R")
     assert done.returncode == 2 and not (tmp_path / "R").exists()
+
+
+def test_json_on_standard_output_is_alone_there(tmp_path: Path, gyrotc: Command) -> None:
+    folder = tmp_path / "RLG-1"
+    described(folder)
+    done = gyrotc("check", folder, "--json", "-", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["schema"] == "gyrotc.check/1"
+    assert "run-01.csv" in done.stderr
+    assert not (tmp_path / "-").exists()
+    assert gyrotc("check", folder).stdout.strip(), "the next command has its standard output again"
+
+
+def test_every_command_writes_its_json_by_the_same_function() -> None:
+    commands = [c.callback for c in app.registered_commands if c.callback]
+    found = {c.__name__ for c in commands if "json_file" in inspect.signature(c).parameters}
+    assert {"build", "check", "compare", "diagnose", "emit", "fit", "fleet", "plan", "verify"} <= found
+    for command in commands:
+        parameter = inspect.signature(command, eval_str=True).parameters.get("json_file")
+        assert parameter is None or parameter.annotation == base.JsonOption, command.__name__
