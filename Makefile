@@ -218,9 +218,10 @@ site: setup
 	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
 	@build/site-tools/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
-## packages of the C library for ESP-IDF and Rust: build/packages (others take the sources as they are)
+## archives for ESP-IDF and Rust, sdist and wheel in build/packages; every way to install or use gyrotc, tried (minutes)
 packages:
-	@python3 tools/packages.py build/packages
+	@tools/setup.sh test
+	@$(PYTHON) tools/ways.py build/packages
 
 ## remove what was built (not .venv)
 clean:
