@@ -11,11 +11,11 @@ import sqlite3
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from .. import __version__
-from ..common.errors import GyrotcError, InputError
+from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..jobs.release import unit_of
 from ..model import Model, load_model
 from ..results.base import read_optional
@@ -23,6 +23,8 @@ from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEn
 from ..store.files import check_own, open_or_create, write_own
 from ..store.folder import kept_by_hash, result_folder
 from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
+from ..tables.emit import image_of
+from ..tables.quantise import NUMERICS, quantise
 from ..verify.emitted import left_out_of, made_again, texts_again
 from .unit import ENTRY, PAYLOADS
 
@@ -261,6 +263,15 @@ def _check_payloads(place: Path, one: Catalogued) -> None:
     model = load_model(text)
     if (model.serial, model.axis, model.hash) != (one.serial, one.axis, one.model_hash):
         raise InputError(str(text), f"is not the model that the catalogue names for {one.serial}", _EXPECTED)
+    if image.read_bytes() not in _images(model):
+        raise InputError(str(image), f"is not the image that {text.name} gives", _EXPECTED)
+
+
+def _images(model: Model) -> Iterator[bytes]:
+    """The image of a model in each arithmetic that it is emitted in."""
+    for numeric in NUMERICS:
+        with suppress(CheckFailed):  # refused for this model
+            yield image_of(quantise(model, numeric))
 
 
 def export(place: Path, serial: str, day: str, out: Path) -> tuple[Catalogued, ...]:

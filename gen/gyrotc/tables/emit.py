@@ -41,6 +41,7 @@ __all__ = [
     "emit_texts",
     "emitted_tables",
     "expected_answers",
+    "image_of",
     "quantise_all",
     "write_texts",
 ]
@@ -186,8 +187,8 @@ def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
-        texts[f"gtc_{model.id}{suffix}.bin"] = _image(table)
-        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(_image(table)).encode("ascii")
+        texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
+        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(image_of(table)).encode("ascii")
     texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     texts[RECORD] = record_text(model, options, texts)
     return texts
@@ -328,7 +329,8 @@ def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
         yield _macro(f"AUTHORITY_{name}_DPH", text, told)
 
 
-def _image(table: Table) -> bytes:
+def image_of(table: Table) -> bytes:
+    """The words of a table as octets, the least significant first, as a target holds them."""
     return struct.pack(f"<{len(table.words)}I", *table.words)
 
 

@@ -179,6 +179,26 @@ def test_what_all_gyros_have_stands_once_in_a_fleet(two: Path) -> None:
     assert sum(own) + sum((two / "RLG-1" / n).stat().st_size for n in ("model.json", IMAGE)) <= _MOST_BYTES
 
 
+@pytest.mark.parametrize("of", ["RLG-2", "no gyro"])
+def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(
+    two: Path, tmp_path: Path, of: str
+) -> None:
+    """Before: another gyro's whole image, under its own hash, was given out for this one."""
+    place = shutil.copytree(two / "catalogue", tmp_path / "catalogue")
+    day = "2026-03-02"
+    assert len(catalogued(place / "catalogue.sqlite", "RLG-1", day).found) == 1
+    if of == "RLG-2":
+        [other] = catalogued(two, "RLG-2", day).found
+        image = other.image_sha256
+    else:
+        [one] = catalogued(two, "RLG-1", day).found
+        image = one.model_sha256
+    with sqlite3.connect(place / "catalogue.sqlite") as base:
+        base.execute("UPDATE calibration SET image_sha256 = ? WHERE serial = 'RLG-1'", (image,))
+    with pytest.raises(InputError, match=f"{image}: is not the image that"):
+        catalogued(place / "catalogue.sqlite", "RLG-1", day)
+
+
 def test_a_result_that_a_fleet_keeps_in_part_verifies_as_a_whole(two: Path, tmp_path: Path) -> None:
     assert not (two / "RLG-1" / ANSWERS).exists() and not faults(two / "RLG-1")
     found = verify(two / "RLG-1", compiled=False)
