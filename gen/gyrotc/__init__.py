@@ -25,9 +25,20 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    """`RBFNetworkRegressor` on first use: scikit-learn stays optional."""
+    """`RBFNetworkRegressor` on first use: scikit-learn stays optional.
+
+    Raises:
+        ModuleNotFoundError: scikit-learn is not installed; the message says what to install.
+    """
     if name != "RBFNetworkRegressor":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from .train.estimator import RBFNetworkRegressor
+    try:
+        from .train.estimator import RBFNetworkRegressor
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "sklearn":
+            raise
+        from .common.errors import install_command
 
+        found = f"gyrotc.{name} needs scikit-learn: {install_command('sklearn')}"
+        raise ModuleNotFoundError(found, name=error.name) from error
     return RBFNetworkRegressor

@@ -5,7 +5,7 @@ Every module may import this one; it imports none of them.
 
 from __future__ import annotations
 
-__all__ = ["CheckFailed", "GyrotcError", "InputError"]
+__all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command"]
 
 
 class GyrotcError(Exception):
@@ -41,3 +41,8 @@ class CheckFailed(GyrotcError):
     """The job ran and a check failed (bits differ, a bound or limit is not met): exit status 1."""
 
     exit_status = 1
+
+
+def install_command(extra: str) -> str:
+    """The command that installs an extra of gyrotc, as a shell takes it."""
+    return f'pip install "gyrotc[{extra}]"'

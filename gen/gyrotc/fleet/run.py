@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..common.errors import InputError
+from ..common.errors import InputError, install_command
 from ..results.fleet import FleetEntry
 from ..store.cache import program_of
 from ..store.files import Lock
@@ -176,7 +176,7 @@ def _connected(cluster: Cluster) -> Iterator[Any]:
     try:
         import distributed
     except ImportError as error:
-        raise InputError("--scheduler", "Dask is not installed here", "pip install gyrotc[dask]") from error
+        raise InputError("--scheduler", "Dask is not installed here", install_command("dask")) from error
     try:
         client = distributed.Client(cluster.address, timeout=_CONNECT_S)
     except (OSError, ValueError, distributed.TimeoutError) as error:

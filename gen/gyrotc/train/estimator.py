@@ -2,7 +2,7 @@
 
 Two inputs (temperature and its rate, in any units) are trained by the default method of `gyrotc.train.methods`, any
 other number of inputs by orthogonal least squares: samples as centers, one width, size by BIC. Needs
-scikit-learn 1.6 or later (`pip install gyrotc[sklearn]`).
+scikit-learn 1.6 or later (`pip install "gyrotc[sklearn]"`).
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..common.errors import InputError
+from ..common.errors import InputError, install_command
 from ..common.inputs import parse_json
 from ..results.base import checked_result
 from ..results.release import RELEASED, Release
@@ -144,7 +144,7 @@ def _serialization() -> Any:
         from cryptography.hazmat.primitives import serialization
     except ImportError as error:
         raise InputError(
-            "signatures", "the package cryptography is not installed", "pip install 'gyrotc[sign]'"
+            "signatures", "the package cryptography is not installed", install_command("sign")
         ) from error
     return serialization
 

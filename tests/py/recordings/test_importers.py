@@ -418,7 +418,7 @@ def test_a_missing_library_is_one_line_that_says_what_to_install(
     monkeypatch.setitem(sys.modules, "pyulog", None)
     (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
     status, _, error = run("import", tmp_path / "flight.ulg", "--out", tmp_path / "R")
-    assert status == 2 and "pip install 'gyrotc[ulog]'" in error and error.count("\n") == 1
+    assert status == 2 and 'pip install "gyrotc[ulog]"' in error and error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -555,7 +555,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
     assert status == 2
     assert error.startswith(f"gyrotc: {name}: ")
-    assert f"expected pip install 'gyrotc[{extra}]'" in error
+    assert f'expected pip install "gyrotc[{extra}]"' in error
 
 
 GOES_ON = {

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.errors import InputError
+from ...common.errors import InputError, install_command
 
 __all__ = [
     "CHUNK_ROWS",
@@ -147,7 +147,7 @@ def library(path: Path, module: str, extra: str, what: str) -> ModuleType:
     except ImportError as error:
         package = module.split(".", maxsplit=1)[0]
         found = f"{what} is read by {package}, which is not installed"
-        raise InputError(path.name, found, f"pip install 'gyrotc[{extra}]'") from error
+        raise InputError(path.name, found, install_command(extra)) from error
 
 
 def numbers(values: Any) -> Array:
