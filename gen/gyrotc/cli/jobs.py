@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -216,6 +217,8 @@ def build(
             tell(f"axis {result.model.axis}")
         _print_built(result)
     tell(f"report: {out / 'report.html'}")
+    if any(result.evaluation.structure_left and not result.diagnosis for result in results):
+        tell(f"next, as the residual is more than noise: gyrotc diagnose {shlex.quote(str(dataset))}")
     failures = [
         (f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures
     ]

@@ -171,6 +171,10 @@ class ModelSizes(Part):
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
 
 
+_RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, sqrt(1.3^2 - 1)
+_OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
+
+
 class Evaluation(UnitResult):
     """What the compiled code makes of recordings (`gyrotc evaluate`)."""
 
@@ -215,6 +219,14 @@ class Evaluation(UnitResult):
         if self.left_out:
             return "left_out", self.left_out
         return ("train", self.train) if self.train else None
+
+    @property
+    def structure_left(self) -> bool:
+        """Whether the residual holds more than noise, by its RMS or by a finding: `gyrotc diagnose` is next."""
+        judged, floor = self.judged(), self.noise_floor_dph
+        rms = judged[1].after.rms_dph if judged else None
+        above = bool(floor) and rms is not None and rms > _RMS_OVER_FLOOR * (floor or 0.0)
+        return above or any(finding.id in _OF_STRUCTURE for finding in self.findings)
 
 
 class FigureChange(Part):

@@ -22,7 +22,7 @@ from gyrotc.model import Model
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
 from gyrotc.recordings.records import Dataset
-from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, Statistics
+from gyrotc.results.evaluation import Evaluation, FigureUncertainty, FoundIn, Pooled, Statistics
 from gyrotc.results.release import HeldLimits
 from gyrotc.results.training import Training
 from test_limits import EVALUATION, VERIFICATION
@@ -170,6 +170,23 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
     for entry in write_summary(tmp_path, entries).serials:
         assert entry.verdict == views[entry.name].decision, entry.name
     assert {entry.verdict for entry in entries if entry.status == "failed"} == {"FAIL"}
+
+
+@pytest.mark.parametrize(
+    ("over_floor", "finding", "left"),
+    [(1.29, "run_outlier", False), (1.31, "run_outlier", True), (1.0, "does_not_generalise", True)],
+)
+def test_structure_that_is_left_leads_to_a_diagnosis(
+    over_floor: float, finding: str, left: bool, model_dict: dict[str, Any]
+) -> None:
+    found = (FoundIn(id=finding, text="", evidence={}),)
+    evaluation = EVALUATION.model_copy(update={"exam": pooled(1e-3 * over_floor), "findings": found})
+    assert evaluation.structure_left == left
+    shown = UnitResults(
+        Model.from_dict(model_dict), evaluation, None, VERIFICATION, None, None, None, None, None
+    )
+    page = page_environment().get_template("parts.html.j2").module.messages(shown)
+    assert ("gyrotc diagnose DATASET" in page) == left
 
 
 def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(

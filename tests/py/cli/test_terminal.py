@@ -317,3 +317,17 @@ def test_the_cache_is_told_cleared_and_kept_to_a_limit(
     )
     (cache.folder() / "limit_bytes").write_text("much")
     assert cache.limit() == 2 * 10**9
+
+
+@pytest.mark.parametrize(("left", "diagnosis"), [(True, None), (False, None), (True, "made")])
+def test_a_build_ends_with_the_next_command(
+    left: bool, diagnosis: str | None, monkeypatch: pytest.MonkeyPatch, gyrotc: Command
+) -> None:
+    evaluation = SimpleNamespace(structure_left=left, content=dict)
+    built = SimpleNamespace(
+        model=SimpleNamespace(axis=None), evaluation=evaluation, diagnosis=diagnosis, failures=()
+    )
+    monkeypatch.setattr("gyrotc.jobs.build.build", lambda *_, **__: [built])
+    monkeypatch.setattr("gyrotc.cli.jobs._print_built", lambda _: None)
+    last = gyrotc("build", "my data").stdout.splitlines()[-1]
+    assert last.endswith("gyrotc diagnose 'my data'") == (left and diagnosis is None), last
