@@ -115,9 +115,7 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
     else:
         causes = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = causes if cycle is None else cycle.states
-    extension = extend(
-        dataset, records, states, chosen, say, single_cycle=cycle is not None, named=bool(causes)
-    )
+    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
     extended, training = _extended_model(dataset, extension, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)

@@ -331,13 +331,8 @@ def extend(
     say: Progress,
     *,
     single_cycle: bool = False,
-    named: bool = True,
 ) -> Extension:
-    """Refits the model with the causes and measures the gain.
-
-    Args:
-        named: Whether the verdict names the causes: those that it does not name are measured and never shipped.
-    """
+    """Refits the model with the causes and measures the gain."""
     say("measuring the gain")
     refitting = Refitting(dataset, records, options, single_cycle=single_cycle)
     effects = completed(refitting.train, [Effect.of(c) for c in causes])
@@ -348,7 +343,7 @@ def extend(
     floor = floor_of([*chain[-1], *refitting.on_training(effects)])
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
     steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
-    crossed = shipping(refitting, effects if named else [])
+    crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     return Extension(
         steps=tuple(steps),

@@ -6,8 +6,8 @@ and one or two states stand beside it, by an information criterion that counts i
 states, which every package has, unless plays are clearly better. What explains the recordings as well is reported.
 
 A static dT/dt, f(T) + g(T) dT/dt and flows that saturate, is a rival like any other: memory is named only where it
-is clearly better than every one of them, and never where the temperature does not turn. What states that are not named
-would gain is measured (`extend`); they are not shipped.
+is clearly better than every one of them, and never where the temperature does not turn. States that are not named may
+still be a good correction: that is for the unseen stretches of history to say (`extend`).
 """
 
 from __future__ import annotations

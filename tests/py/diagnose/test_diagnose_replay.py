@@ -16,7 +16,7 @@ from gyrotc.diagnose.attribution import Attribution, attribute
 from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.candidates import columns_of
 from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import Refitting, extend, stand_ins_of
+from gyrotc.diagnose.extension import Refitting, stand_ins_of
 from gyrotc.diagnose.gains import Gains
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
 from gyrotc.diagnose.refit import Effect, Played, added_range, play_runs, samples
@@ -476,42 +476,6 @@ def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> No
     at = np.array([20.0, 20.0])
     cold, hot = found.model.map_dph(at, np.array([low, high]))
     assert cold == pytest.approx(hot, rel=1e-5), "no dT/dt in the map"
-
-
-def one_state(folder: Path, amplitude: float) -> Path:
-    """A cycle of a curved map of T and a first-order state, with noise."""
-    print("seed", SEED)
-    time, temperature = cycle(3)
-    x = (temperature - 25.0) / 45.0
-    state = first_order(60.0, time, temperature) - temperature
-    noise = np.random.default_rng(SEED).standard_normal(time.size)
-    rate = 1000.0 * x + 400.0 * x**3 + amplitude * state + 20.0 * noise
-    return recorded_cycle(folder, temperature, rate, CUT_S)
-
-
-def test_states_that_are_not_named_are_measured_and_not_shipped(tmp_path: Path) -> None:
-    """Cross-validation alone would ship them: of a weak state a static dT/dt explains as much."""
-    dataset = load(one_state(tmp_path, 8.0))
-    taken = records_of(dataset, "train", block_s=10.0, average_s=10.0)
-    found = cycle_of(taken)
-    assert found.states and not found.causes and found.not_testable
-    options = FitOptions(average_s=10.0)
-    shipped = [
-        extend(dataset, taken, found.states, options, lambda _: None, single_cycle=True, named=named).shipped
-        for named in (False, True)
-    ]
-    assert [len(effects) for effects in shipped] == [0, 1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("amplitude", "verdict"), [(8.0, "not_testable"), (40.0, "partial")])
-def test_a_verdict_that_names_nothing_ships_nothing(tmp_path: Path, amplitude: float, verdict: str) -> None:
-    found = diagnose(load(one_state(tmp_path, amplitude)), options=FitOptions(average_s=10.0))
-    result = found.result
-    assert result.verdict == verdict and result.shipping is not None and result.single_cycle is not None
-    named = verdict != "not_testable"
-    assert [bool(result.physical), result.shipping.ships, found.model is not None] == [named] * 3
-    assert result.single_cycle.gain is not None, "what the states would gain is given in any case"
 
 
 def test_clean_cycles_get_no_memory(tmp_path: Path) -> None:
