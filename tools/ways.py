@@ -32,7 +32,7 @@ EXTRAS = ("sign", "sklearn", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros",
 
 def generator(work: Path, wheel: Path, sdist: Path) -> Iterator[dict[str, Any]]:
     """Installs gyrotc by each way into an environment of its own, and emits C with it."""
-    git = f"gyrotc @ git+file://{ROOT}@HEAD#subdirectory=gen"
+    git = f"git+file://{ROOT}#subdirectory=gen"
     ways = [
         ("pip, from the source folder", ["{bin}/pip", "install", "-q", str(ROOT / "gen")]),
         ("pip, from git", ["{bin}/pip", "install", "-q", git]),
