@@ -342,7 +342,13 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[V
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         tests = [pool.submit(one, target) for target in targets]
         try:
-            return [entry for test in tests for entry in test.result()]
+            entries = []
+            for test in tests:
+                # In steps: a signal that comes just before a wait without end is handled only after it.
+                while not test.done():
+                    wait([test], timeout=_NEXT_PROGRAM_S)
+                entries += test.result()
+            return entries
         except BaseException:  # one failed, or the user stops: the others end now, not with their queue
             pool.shutdown(wait=False, cancel_futures=True)
             while not all(test.done() for test in tests):  # a thread may go on with a next program
