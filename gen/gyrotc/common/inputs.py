@@ -58,6 +58,7 @@ CEILINGS: dict[str, Ceiling] = {
     "rows": Ceiling(1e8, "rows of one recording"),
     "columns": Ceiling(256.0, "columns of one recording"),
     "parquet_ratio": Ceiling(250.0, "size of a Parquet file once unpacked over its size, above 64 MiB"),
+    "parser_s": Ceiling(20.0, "processor time of the reader of a logger's file for each 8 MiB of it, s"),
     "text_mib": Ceiling(4.0, "size of a dataset.toml, manifest, scenario, limits file or model.json, MiB"),
     "result_mib": Ceiling(32.0, "size of a JSON result, truth.json, picture or board log, MiB"),
     "nesting": Ceiling(32.0, "depth of tables and lists within one another in TOML and JSON"),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from ...common.errors import InputError
-from ...common.inputs import open_input, refuse_above
+from ...common.inputs import open_input
 from .csv_table import open_csv
 from .map_file import Map
+from .parser_process import Parser, open_confined
 from .tables import LoggerFile
 
 __all__ = ["open_logger_file"]
@@ -28,6 +28,17 @@ _MAGIC = (
     (b"UnFinMF ", "mdf"),
 )
 _NAMED = {".mat": "mat"}
+_PARSERS = {
+    "mat": Parser(".matfile", "open_mat", "scipy.io"),
+    "hdf5": Parser(".hdf5", "open_hdf5", "h5py"),
+    "parquet": Parser(".parquet", "open_parquet", "pyarrow.parquet"),
+    "tdms": Parser(".tdms", "open_tdms", "nptdms"),
+    "ulog": Parser(".ulog", "open_ulog", "pyulog"),
+    "dataflash": Parser(".dataflash", "open_dataflash", "pymavlink.DFReader"),
+    "rosbag": Parser(".rosbag", "open_rosbag", "rosbags.highlevel", unpacks=True, beside=True),
+    "mdf": Parser(".mdf", "open_mdf", "asammdf", unpacks=True),
+}
+"""Formats that a library reads: each in a process of its own. CSV is split into lines and cells here."""
 _REFUSED = (
     (b"PK\x03\x04", "a ZIP archive or a spreadsheet", "its files, unpacked; a spreadsheet saved as CSV"),
     (b"\x1f\x8b", "compressed by gzip", "the file unpacked (gunzip)"),
@@ -44,7 +55,7 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
     """
     if path.is_dir():
         if (path / "metadata.yaml").is_file():
-            return _opener("rosbag")(path)
+            return open_confined(_PARSERS["rosbag"], path)
         raise InputError(str(path), "is a folder", "files of a logger, or the folder of a ROS 2 bag")
     opened, _ = open_input(path, path.name, "a file of a logger")
     with opened as file:
@@ -55,37 +66,4 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
     kind = next((kind for magic, kind in _MAGIC if head.startswith(magic)), _NAMED.get(path.suffix.lower()))
     if kind is None:
         return open_csv(path, chosen.csv.given())
-    return _within_limits(_opener(kind)(path))
-
-
-def _within_limits(file: LoggerFile) -> LoggerFile:
-    """The file, where no table of it declares more rows than are read: a few bytes can declare any number."""
-    try:
-        for table in file.tables:
-            refuse_above("rows", getattr(table, "rows", 0), f"{file.path.name} {table.name}".rstrip(), "rows")
-            refuse_above("columns", len(table.columns), f"{file.path.name} {table.name}".rstrip(), "columns")
-    except InputError:
-        file.close()
-        raise
-    return file
-
-
-def _opener(kind: str) -> Callable[[Path], LoggerFile]:
-    """The function that opens a format; its library is imported only then."""
-    if kind == "mat":
-        from .matfile import open_mat as opener
-    elif kind == "hdf5":
-        from .hdf5 import open_hdf5 as opener
-    elif kind == "parquet":
-        from .parquet import open_parquet as opener
-    elif kind == "tdms":
-        from .tdms import open_tdms as opener
-    elif kind == "ulog":
-        from .ulog import open_ulog as opener
-    elif kind == "dataflash":
-        from .dataflash import open_dataflash as opener
-    elif kind == "rosbag":
-        from .rosbag import open_rosbag as opener
-    else:
-        from .mdf import open_mdf as opener
-    return opener
+    return open_confined(_PARSERS[kind], path)

@@ -66,7 +66,7 @@ def open_hdf5(path: Path) -> LoggerFile:
 
 
 def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
-    """Values that lie in other files are not read: a stranger's file may name any file of the user, or a pipe.
+    """Values that lie in other files are not read: a file of others may name any file of the user, or a pipe.
 
     Links to other files need no test, `visititems` does not follow them.
     """
